@@ -57,6 +57,6 @@ pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 pub use takt_rt as rt;
 pub use takt_rt::{
     AxisPoint, AxisSnapshot, AxisTarget, BusHealth, CallbackCycle, DriveState, Event, EventKind, Follow,
-    Origin, Phase, RejectReason, RequestError, RequestId, Rule, Snapshot, StopCategory, StopCause,
-    StopReason, StreamCounts, StreamReport, StreamState, TimingLevel, linux::ThreadReport, plan,
+    OperationMode, Origin, Phase, RejectReason, RequestError, RequestId, Rule, Snapshot, StopCategory,
+    StopCause, StopReason, StreamCounts, StreamReport, StreamState, TimingLevel, linux::ThreadReport, plan,
 };

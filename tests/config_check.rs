@@ -49,6 +49,25 @@ fn a_configuration_that_fits_is_shown_with_limits_units_and_buses_and_exit_code_
 }
 
 #[test]
+fn the_modes_that_an_axis_may_be_changed_to_are_shown_and_their_pdos_are_counted() {
+    let changing = configs().join("erob-modes/erob-changing.toml");
+    let text = standard_output(&check(&changing, &[]));
+    for part in ["Modes of operation", "csv, cst", "while disabled", "Torque that streams may ask for"] {
+        assert!(text.contains(part), "{part:?} is missing in\n{text}");
+    }
+    let value = json(&check(&changing, &["--json"]));
+    assert_eq!(value["axes"][0]["other_modes"], serde_json::json!(["csv", "cst"]));
+    assert_eq!(value["axes"][0]["mode_change"], "while disabled");
+    // In CSP and CSV alone it would hold its place, or go on at its speed; the worst is a torque.
+    let goes_on = &value["axes"][0]["without_controller"];
+    assert_eq!(goes_on["does"], "goes_on");
+    let plain = json(&check(&configs().join("erob-modes/erob-csp.toml"), &["--json"]));
+    assert_eq!(plain["axes"][0]["other_modes"], serde_json::json!([]));
+    let load = |value: &Value| value["buses"][0]["load_percent"].as_f64().unwrap();
+    assert!(load(&value) > load(&plain) + 5.0, "{} {}", load(&value), load(&plain));
+}
+
+#[test]
 fn a_script_reads_the_same_as_one_json_object() {
     let output = check(&configs().join("arm6-erob.toml"), &["--json"]);
     assert_eq!(output.status.code(), Some(0));

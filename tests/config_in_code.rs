@@ -153,6 +153,43 @@ const CASES: &[Case] = &[
     ("own heartbeat", |c| axis(c).heartbeat_ns = Some(0), &[AXIS, "`axis.heartbeat` cannot be 0 s"]),
     ("interpolation", |c| axis(c).drive = DriveFamily::YzAim, &[AXIS, "`axis.mode` cannot be"]),
     (
+        "other modes of a YZ-AIM",
+        |c| {
+            let yz_aim =
+                Axis::new("joint2", c.axes[1].bus, c.axes[1].node, DriveFamily::YzAim, c.axes[1].limits);
+            c.axes[1] = yz_aim.with_other_modes(vec![Control::ProfilePosition]);
+        },
+        &[AXIS, "`axis.modes` cannot be given for a YZ-AIM", "no object 6061"],
+    ),
+    (
+        "another profile mode",
+        |c| axis(c).other_modes = vec![Control::ProfileVelocity],
+        &[AXIS, "`axis.modes` cannot be ProfileVelocity"],
+    ),
+    (
+        "other modes of a profile mode",
+        |c| {
+            axis(c).control = Control::ProfilePosition;
+            axis(c).other_modes = vec![Control::Position];
+        },
+        &[AXIS, "`axis.modes` cannot be given for an axis in another mode than"],
+    ),
+    (
+        "the first mode again",
+        |c| axis(c).other_modes = vec![Control::Position],
+        &[AXIS, "\"csp\" is in `axis.modes` twice"],
+    ),
+    (
+        "one other mode twice",
+        |c| axis(c).other_modes = vec![Control::Velocity { position_gain: 20.0 }; 2],
+        &[AXIS, "\"csv\" is in `axis.modes` twice"],
+    ),
+    (
+        "gain of another mode",
+        |c| axis(c).other_modes = vec![Control::Velocity { position_gain: 900.0 }],
+        &[AXIS, "`axis.velocity_loop.position_gain` cannot be 900 1/s"],
+    ),
+    (
         "gain",
         |c| axis(c).control = Control::Velocity { position_gain: f64::NAN },
         &[AXIS, "`axis.velocity_loop.position_gain` cannot be NaN"],
@@ -383,6 +420,18 @@ fn a_configuration_made_in_code_has_the_defaults_of_a_file() {
         })
     };
     made_and_read(ErobCanopen, "mode = \"cst\"", "1 ms", cst, 1_000_000);
+    let changing = |axis: Axis| {
+        let torque = Control::Torque {
+            stiffness: 1600.0,
+            damping: 80.0,
+            inertia: 1.0,
+            viscous_friction: 1.0,
+            coulomb_friction: 0.5,
+        };
+        axis.with_other_modes(vec![Control::Velocity { position_gain: 20.0 }, torque])
+    };
+    let modes = "modes = [\"csp\", \"csv\", \"cst\"]";
+    made_and_read(ErobCanopen, modes, "1 ms", changing, 1_000_000);
 }
 
 #[test]

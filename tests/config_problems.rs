@@ -172,6 +172,14 @@ cases! {
         "[program]\nrepeat = 1\n\n[[program.move]]\nto = [\"30 deg\", 0.5]\nvelocity = \"80 %\"\ndwell = \"200 ms\"\n\n[[program.move]]" => "[program.move]", at "[program.move]": WrongType { expected, found: "a table", .. } if expected.contains("[[double brackets]]"),
     }
 
+    modes_to_change_to_are_checked_each_with_its_loop {
+        "mode = \"csp\"" => "modes = [\"csp\", \"pv\"]", at "modes": UnknownChoice { key, given, .. } if key == "axis.modes" && given == "pv",
+        "mode = \"csp\"" => "modes = \"csv\"", at "modes": WrongType { expected: "a list", .. },
+        "mode = \"csp\"" => "modes = [\"csv\", \"csp\", \"csv\"]", at "modes": Repeated { key, given } if key == "axis.modes" && given == "csv",
+        "mode = \"csp\"" => "mode = \"pp\"\nmodes = [\"csv\"]", at "modes": OutOfRange { key, value, .. } if key == "axis.modes" && value.contains("another mode than"),
+        "mode = \"csp\"" => "modes = [\"csv\"]\nvelocity_loop = { position_gain = \"900 1/s\" }", at "position_gain": OutOfRange { key, .. } if key == "axis.velocity_loop.position_gain",
+    }
+
     wrong_units_are_named {
         "velocity = \"100 deg/s\"" => "velocity = \"100 deg\"", at "\"100 deg\"": WrongUnit { unit, quantity, .. } if unit == "deg" && quantity.unit == "rad/s",
         "torque = \"31 Nm\"" => "torque = \"31 N\"", at "31 N\"": WrongUnit { quantity, .. } if quantity.unit == "Nm",

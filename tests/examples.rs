@@ -15,6 +15,7 @@ macro_rules! programs {
 
 programs! {
     after_a_stop: "../examples/after_a_stop.rs",
+    change_mode: "../examples/change_mode.rs",
     compliance: "../examples/compliance.rs",
     config_in_code: "../examples/config_in_code.rs",
     embed: "../examples/embed.rs",
@@ -43,6 +44,11 @@ fn the_first_program_moves_an_arm() {
 #[test]
 fn a_joint_is_soft_then_driven_by_a_torque_and_then_turns() {
     compliance::run(config("erob-modes/erob-cst.toml")).unwrap();
+}
+
+#[test]
+fn a_joint_is_taken_through_its_three_modes() {
+    change_mode::run(config("erob-modes/erob-changing.toml")).unwrap();
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::time::Duration;
 use takt::controller::VirtualRun;
 use takt::controller::{MotionError, Outcome};
 use takt::{AxisPoint, CommandError, Config, Controller, SessionOptions, StreamHandle, TrajectoryPoint};
-use takt_rt::{ControlLaw, EventKind, Phase, Rule, StopCategory, StreamState};
+use takt_rt::{ControlLaw, EventKind, OperationMode, Phase, Rule, StopCategory, StreamState};
 
 const LONG: Duration = Duration::from_secs(20);
 
@@ -97,6 +97,34 @@ fn with_positions() -> Config {
     config.axes[3].control = ControlLaw::Position;
     config.program.moves.retain(|program_move| program_move.group == 0);
     config
+}
+
+#[test]
+fn the_mode_of_one_group_is_changed_while_the_other_moves() {
+    let mut config = with_positions();
+    let velocity = ControlLaw::Velocity { position_gain: 20.0 };
+    config.axes[3] = config.axes[3].clone().with_other_modes(vec![velocity]);
+    let controller = Controller::start(config, SessionOptions::default()).unwrap();
+    let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
+    let csv = OperationMode::CyclicSynchronousVelocity;
+    let of_all = controller.change_mode(csv).unwrap();
+    let refused = controller.wait(of_all, LONG).unwrap_err().to_string();
+    assert!(refused.contains("must name it: arm, gripper"), "{refused}");
+
+    let motion = arm.move_to(&[0.6, -0.3, 0.4]).unwrap();
+    gripper.disable().unwrap();
+    gripper.wait_for(Phase::Disabled, LONG).unwrap();
+    let change = gripper.change_mode(csv).unwrap();
+    controller.wait(change, LONG).unwrap();
+    assert_eq!(arm.state().phase, Phase::Moving);
+    gripper.enable().unwrap();
+    gripper.wait_for(Phase::Holding, LONG).unwrap();
+    let closing = gripper.move_to(&[0.2]).unwrap();
+    controller.wait(closing, LONG).unwrap();
+    controller.wait(motion, LONG).unwrap();
+    let modes: Vec<i8> = controller.state().axes().iter().map(|axis| axis.mode_set).collect();
+    assert_eq!(modes, [8, 8, 8, 9]);
+    controller.finish().unwrap();
 }
 
 const MILLISECOND_NS: u64 = 1_000_000;

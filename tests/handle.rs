@@ -8,9 +8,9 @@ use takt::config::{Feedback, Follow};
 use takt::rt::RequestKind;
 use takt::rt::linux::{Policy, Step};
 use takt::{
-    CommandError, Config, Controller, DriveState, Event, EventKind, Events, Handle, MotionError, MoveOptions,
-    Outcome, Phase, PointRefusal, Rule, SessionOptions, Snapshot, StartFailure, StopCategory, StreamError,
-    StreamHandle, StreamState, WaitError,
+    AxisPoint, CommandError, Config, Controller, DriveState, Event, EventKind, Events, Handle, MotionError,
+    MoveOptions, OperationMode, Outcome, Phase, PointRefusal, Rule, SessionOptions, Snapshot, StartFailure,
+    StopCategory, StreamError, StreamHandle, StreamState, WaitError,
 };
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -345,6 +345,41 @@ fn everything_that_a_drive_reports_is_in_the_state_with_the_time_that_it_is_from
     let age_ns = axis.feedback_age_ns(state.at_ns).unwrap();
     assert!(age_ns < 1_000_000, "{age_ns} ns");
     assert_eq!(joint.wait(motion, PATIENCE), Ok(()));
+}
+
+#[test]
+fn a_mode_is_changed_while_the_joint_is_disabled_and_what_cannot_be_is_refused_in_words() {
+    let joint = start("erob-modes/erob-changing.toml");
+    let torque = [AxisPoint::Torque(0.0)];
+    let refused = |mode: OperationMode| {
+        let change = joint.change_mode(mode).unwrap();
+        match joint.wait(change, PATIENCE) {
+            Err(MotionError::Refused(refused)) => refused.to_string(),
+            other => panic!("{other:?}"),
+        }
+    };
+    let words = refused(OperationMode::CyclicSynchronousTorque);
+    assert!(words.contains("the drive of joint must be disabled for it"), "{words}");
+    let words = refused(OperationMode::ProfilePosition);
+    assert!(words.contains("joint cannot be in mode 1 (profile position)"), "{words}");
+    let csv = OperationMode::CyclicSynchronousVelocity;
+    assert_eq!(joint.change_axis_mode(7, csv), Err(CommandError::NoSuchAxis { axis: 7, axes: 1 }));
+    let in_csp = joint.stream().push_now(&torque).unwrap_err().to_string();
+    assert!(in_csp.contains("CyclicSynchronousPosition"), "{in_csp}");
+
+    joint.disable().unwrap();
+    joint.wait_for(Phase::Disabled, PATIENCE).unwrap();
+    let change = joint.change_axis_mode(0, OperationMode::CyclicSynchronousTorque).unwrap();
+    assert_eq!(joint.wait(change, PATIENCE), Ok(()));
+    let axis = joint.state().axes[0];
+    assert_eq!((axis.mode, axis.mode_set), (Some(10), 10));
+    joint.enable().unwrap();
+    joint.wait_for(Phase::Holding, PATIENCE).unwrap();
+    // What a point may ask for is what the present mode takes.
+    assert_eq!(joint.stream().push_now(&torque), Ok(()));
+    let motion = joint.move_to(&[0.3]).unwrap();
+    assert_eq!(joint.wait(motion, PATIENCE), Ok(()));
+    assert_eq!(joint.finish().unwrap().outcome, Outcome::Finished);
 }
 
 #[test]

@@ -166,6 +166,11 @@ impl ControlLaw {
         matches!(self, Self::ProfilePosition | Self::ProfileVelocity | Self::ProfileTorque)
     }
 
+    /// Whether it is for one of the cyclic synchronous modes: CSP, CSV or CST.
+    pub const fn is_cyclic_synchronous(&self) -> bool {
+        matches!(self, Self::Position | Self::Velocity { .. } | Self::Torque { .. })
+    }
+
     /// The number on the wire that is the target.
     pub const fn target_slot(&self) -> CommandSlot {
         match self {

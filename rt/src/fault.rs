@@ -103,6 +103,13 @@ pub enum Fault {
         /// Object 6060.
         expected: OperationMode,
     },
+    /// A drive was told another mode of operation and has not shown it in time.
+    ModeNotShown {
+        /// Object 6061; 0 if it is not reported.
+        shown: i8,
+        /// Object 6060.
+        expected: OperationMode,
+    },
     /// A torque or an impedance was wanted of an axis in a mode that has none: only in cyclic synchronous torque the loop is
     /// closed here.
     NoTorqueInMode {
@@ -265,6 +272,8 @@ pub enum Rule {
     StiffnessLimit = 30,
     /// [`Fault::DampingLimit`].
     DampingLimit = 31,
+    /// [`Fault::ModeNotShown`].
+    ModeNotShown = 32,
 }
 
 impl Fault {
@@ -284,6 +293,7 @@ impl Fault {
             Self::DriveFault { .. } => Rule::DriveFault,
             Self::DriveDisabled { .. } => Rule::DriveDisabled,
             Self::ModeChanged { .. } => Rule::ModeChanged,
+            Self::ModeNotShown { .. } => Rule::ModeNotShown,
             Self::NoTorqueInMode { .. } => Rule::NoTorqueInMode,
             Self::StiffnessLimit { .. } => Rule::StiffnessLimit,
             Self::DampingLimit { .. } => Rule::DampingLimit,
@@ -322,7 +332,9 @@ impl Fault {
             Self::LateFeedback { cycles } => (cycles.into(), 0.0),
             Self::DriveFault { error_code: code } | Self::EmergencyMessage { code } => (code.into(), 0.0),
             Self::DriveDisabled { statusword } => (statusword.into(), 0.0),
-            Self::ModeChanged { shown, expected } => (shown.into(), (expected as i8).into()),
+            Self::ModeChanged { shown, expected } | Self::ModeNotShown { shown, expected } => {
+                (shown.into(), (expected as i8).into())
+            }
             Self::NoTorqueInMode { mode } => (0.0, (mode as i8).into()),
             Self::StiffnessLimit { stiffness, limit } => (stiffness, limit),
             Self::DampingLimit { damping, limit } => (damping, limit),
@@ -367,6 +379,9 @@ impl Fault {
             Rule::ModeChanged => {
                 Self::ModeChanged { shown: seen as i8, expected: OperationMode::from_number(allowed as i8)? }
             }
+            Rule::ModeNotShown => {
+                Self::ModeNotShown { shown: seen as i8, expected: OperationMode::from_number(allowed as i8)? }
+            }
             Rule::NoTorqueInMode => Self::NoTorqueInMode { mode: OperationMode::from_number(allowed as i8)? },
             Rule::StiffnessLimit => Self::StiffnessLimit { stiffness: seen, limit: allowed },
             Rule::DampingLimit => Self::DampingLimit { damping: seen, limit: allowed },
@@ -393,7 +408,7 @@ impl Fault {
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 32] = [
+    pub const ALL: [Self; 33] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -426,6 +441,7 @@ impl Rule {
         Self::NoTorqueInMode,
         Self::StiffnessLimit,
         Self::DampingLimit,
+        Self::ModeNotShown,
     ];
 
     /// Its word in configurations and reports.
@@ -463,6 +479,7 @@ impl Rule {
             Self::NoTorqueInMode => "no_torque_in_mode",
             Self::StiffnessLimit => "stiffness_limit",
             Self::DampingLimit => "damping_limit",
+            Self::ModeNotShown => "mode_not_shown",
         }
     }
 
@@ -491,6 +508,7 @@ impl Rule {
             | Self::DriveFault
             | Self::DriveDisabled
             | Self::ModeChanged
+            | Self::ModeNotShown
             | Self::EnableTimeout
             | Self::BusLost
             | Self::NotTransmitted

@@ -209,6 +209,9 @@ pub struct AxisSnapshot {
     pub current_per_mille: Option<i16>,
     /// Object 6061, the mode of operation that the drive shows; `None` if the drive does not report it.
     pub mode: Option<i8>,
+    /// Object 6060, the mode of operation that is commanded; 0 before the first cycle. While it is being changed this is the new
+    /// mode already, and `mode` the old one until the drive shows the new one.
+    pub mode_set: i8,
     /// Object 6041.
     pub statusword: u16,
     /// What it says of the drive.

@@ -61,8 +61,8 @@ mod wire;
 
 pub use answers::{Answer, Answers};
 pub use axis::{
-    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, Pdo,
-    TorqueLimits,
+    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
+    ModeCondition, Pdo, TorqueLimits,
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
@@ -90,8 +90,8 @@ pub use record::{
     RecordedStop,
 };
 pub use request::{
-    AxisProcessData, ExecutionStart, MappedPdo, Move, ProfileMove, RejectReason, Request, RequestEnvelope,
-    RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
+    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, RejectReason, Request,
+    RequestEnvelope, RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,

@@ -118,6 +118,22 @@ impl CommandSlot {
     }
 }
 
+impl CommandSlot {
+    /// The object whose value it is.
+    pub const fn object(self) -> MappedObject {
+        match self {
+            Self::Controlword => MappedObject::new(0x6040, 0, 16),
+            Self::OperationMode => MappedObject::new(0x6060, 0, 8),
+            Self::TargetPosition => MappedObject::new(0x607A, 0, 32),
+            Self::TargetVelocity => MappedObject::new(0x60FF, 0, 32),
+            Self::TargetTorque => MappedObject::new(0x6071, 0, 16),
+            Self::VelocityOffset => MappedObject::new(0x60B1, 0, 32),
+            Self::TorqueOffset => MappedObject::new(0x60B2, 0, 16),
+            Self::Zero => MappedObject::new(0x0005, 0, 8),
+        }
+    }
+}
+
 impl FeedbackSlot {
     /// Where an object's value goes; [`FeedbackSlot::Ignored`] for one that takt does not know.
     pub const fn of(object: MappedObject) -> Self {
@@ -281,6 +297,11 @@ impl Mapping {
             shift = end;
         }
         Ok(Self { fields, bytes: (shift / 8) as u8 })
+    }
+
+    /// Whether it carries a number to a drive, where it is a mapping of commands.
+    pub fn sends(&self, slot: CommandSlot) -> bool {
+        self.fields.iter().any(|field| field.slot == slot as u8)
     }
 
     /// The length of the payload in bytes.

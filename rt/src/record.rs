@@ -1,6 +1,6 @@
 //! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
 
-use crate::cia402;
+use crate::cia402::{self, OperationMode};
 use crate::fault::Rule;
 use crate::phase::Phase;
 use crate::request::{RequestError, RequestId};
@@ -186,6 +186,13 @@ pub enum EventKind {
         state: cia402::DriveState,
         /// The statusword that showed it.
         statusword: u16,
+    },
+    /// A drive shows the mode of operation that it was changed to.
+    Mode {
+        /// The axis.
+        axis: u8,
+        /// The new mode, object 6061.
+        mode: OperationMode,
     },
     /// A drive sent an emergency message (CiA 301, 7.2.7).
     Emergency {

@@ -75,6 +75,12 @@ pub enum Request<const AXES: usize = MAX_AXES> {
     /// Give a drive in a profile mode a target. The group is moving until all its targets are reached, and as long as a
     /// velocity or a torque is wanted.
     SetProfileTarget(ProfileMove),
+    /// Change the mode of operation of drives. The group must be disabled; or where the drive takes another mode at any time
+    /// ([`ModeCondition::AtRest`](crate::ModeCondition::AtRest)), it may hold its position, with its joints at rest on their
+    /// set-points. It is a motion by its answer: finished when the drives show their new modes. A drive that does not in time is a
+    /// fault, and is told its former mode again. Until then the group is still in the phase that it was in, and takes nothing but a
+    /// stop and [`Request::Disable`]. A stop that takes the power ends the change.
+    ChangeMode(ModeChange<AXES>),
     /// Follow [`HostInterface::stream`](crate::HostInterface::stream). A command that was written before counts, unless it has
     /// expired by the cycle that takes this request up.
     Stream,
@@ -94,7 +100,7 @@ pub enum Request<const AXES: usize = MAX_AXES> {
     Disable,
     /// Clear latched faults: raise controlword bit 7 for some cycles. Refused while any drive is enabled.
     ResetFaults,
-    /// Refuse to enable from now on, whoever asks: the run is ending, and the drives' watchdogs are about to be switched off.
+    /// Refuse to enable and to change modes from now on, whoever asks, and end a change that is under way: the run is ending, and the drives' watchdogs are about to be switched off.
     InhibitEnable,
     /// Leave the loop after this cycle. The drives get no more set-points.
     Shutdown,
@@ -113,6 +119,7 @@ impl<const AXES: usize> Request<AXES> {
             Self::Enable => RequestKind::Enable,
             Self::Move(_) => RequestKind::Move,
             Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
+            Self::ChangeMode(_) => RequestKind::ChangeMode,
             Self::Stream => RequestKind::Stream,
             Self::Execute { .. } => RequestKind::Execute,
             Self::RunCallback(_) => RequestKind::RunCallback,
@@ -185,6 +192,13 @@ pub struct Move<const AXES: usize = MAX_AXES> {
     pub minimum_duration_s: f64,
 }
 
+/// Other modes of operation for the axes of a group.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModeChange<const AXES: usize = MAX_AXES> {
+    /// The mode for each axis, by its number; `None` leaves it as it is. What is there for axes of other groups does not count.
+    pub modes: [Option<OperationMode>; AXES],
+}
+
 /// A target for one drive in a profile mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProfileMove {
@@ -234,11 +248,13 @@ pub enum RequestKind {
     Execute = 15,
     /// A callback.
     RunCallback = 16,
+    /// Another mode of operation.
+    ChangeMode = 17,
 }
 
 impl RequestKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 18] = [
         Self::Sync,
         Self::TimeOfDay,
         Self::RatedTorque,
@@ -256,6 +272,7 @@ impl RequestKind {
         Self::Shutdown,
         Self::Execute,
         Self::RunCallback,
+        Self::ChangeMode,
     ];
 }
 
@@ -402,11 +419,37 @@ pub enum RejectReason {
     },
     /// The host has no callback under this number.
     UnknownCallback,
+    /// The mode of the group is being changed.
+    ModeChanging,
+    /// The axis is not set up for this mode.
+    UnknownMode {
+        /// The mode that was asked for.
+        mode: OperationMode,
+    },
+    /// The process data of the axis do not carry an object that the change of its mode needs.
+    ObjectNotMapped {
+        /// The object.
+        object: MappedObject,
+    },
+    /// The drive takes another mode only while it is disabled.
+    NotDisabled,
+    /// The joint is not at rest.
+    NotAtRest {
+        /// How fast it is, or was a few cycles ago.
+        velocity: f64,
+    },
+    /// The joint is at rest too far from its set-point: in another mode it would be pulled there in one step.
+    OffSetPoint {
+        /// How far.
+        distance: f64,
+        /// How far it may be.
+        limit: f64,
+    },
 }
 
 impl RejectReason {
     /// One of each, in the order of their numbers, with numbers of no meaning.
-    pub const ALL: [Self; 30] = [
+    pub const ALL: [Self; 36] = [
         Self::Phase,
         Self::StopLatched { rule: Rule::FollowingError },
         Self::EnableInhibited,
@@ -437,6 +480,12 @@ impl RejectReason {
         Self::GroupNotNamed { groups: 2 },
         Self::OtherGroup { asked: 1, of_axis: 2 },
         Self::UnknownCallback,
+        Self::ModeChanging,
+        Self::UnknownMode { mode: OperationMode::CyclicSynchronousTorque },
+        Self::ObjectNotMapped { object: MappedObject::new(0x6060, 0, 8) },
+        Self::NotDisabled,
+        Self::NotAtRest { velocity: 1.0 },
+        Self::OffSetPoint { distance: 2.0, limit: 1.0 },
     ];
 
     /// The number that stands for it in recordings.
@@ -472,6 +521,12 @@ impl RejectReason {
             Self::GroupNotNamed { .. } => 27,
             Self::OtherGroup { .. } => 28,
             Self::UnknownCallback => 29,
+            Self::ModeChanging => 30,
+            Self::UnknownMode { .. } => 31,
+            Self::ObjectNotMapped { .. } => 32,
+            Self::NotDisabled => 33,
+            Self::NotAtRest { .. } => 34,
+            Self::OffSetPoint { .. } => 35,
         }
     }
 
@@ -482,16 +537,18 @@ impl RejectReason {
             Self::StopLatched { rule } => (f64::from(rule as u8), 0.0),
             Self::MissedSlots { missed, limit } => (missed.into(), limit.into()),
             Self::UnknownAxis { axis, axes } => (axis.into(), axes.into()),
-            Self::WrongMode { mode } => ((mode as i8).into(), 0.0),
+            Self::WrongMode { mode } | Self::UnknownMode { mode } => ((mode as i8).into(), 0.0),
             Self::PositionLimit { position: value, limit }
             | Self::VelocityLimit { velocity: value, limit }
             | Self::TorqueLimit { torque: value, limit }
-            | Self::NoRoomToStop { rest: value, limit } => (value, limit),
+            | Self::NoRoomToStop { rest: value, limit }
+            | Self::OffSetPoint { distance: value, limit } => (value, limit),
             Self::VelocityScale { scale: value } | Self::AccelerationScale { scale: value } => (value, 1.0),
             Self::NotFinite { value }
             | Self::MinimumDuration { duration_s: value }
+            | Self::NotAtRest { velocity: value }
             | Self::RatedTorque { torque: value } => (value, 0.0),
-            Self::Mapping { object } => (object.parameter().into(), 0.0),
+            Self::Mapping { object } | Self::ObjectNotMapped { object } => (object.parameter().into(), 0.0),
             Self::IdTaken { id } => (id.value().into(), 0.0),
             Self::TooManyFrames { frames, limit } => (frames.into(), limit.into()),
             Self::UnknownGroup { group, groups } => (group.into(), groups.into()),
@@ -500,6 +557,8 @@ impl RejectReason {
             Self::StartMismatch { position, present } => (position, present),
             Self::UnknownTrajectory
             | Self::UnknownCallback
+            | Self::ModeChanging
+            | Self::NotDisabled
             | Self::TooLate
             | Self::SuccessorPending
             | Self::Phase
@@ -544,6 +603,12 @@ impl RejectReason {
             27 => Self::GroupNotNamed { groups: asked as u8 },
             28 => Self::OtherGroup { asked: asked as u8, of_axis: allowed as u8 },
             29 => Self::UnknownCallback,
+            30 => Self::ModeChanging,
+            31 => Self::UnknownMode { mode: OperationMode::from_number(asked as i8)? },
+            32 => Self::ObjectNotMapped { object: MappedObject::from_parameter(asked as u32) },
+            33 => Self::NotDisabled,
+            34 => Self::NotAtRest { velocity: asked },
+            35 => Self::OffSetPoint { distance: asked, limit: allowed },
             _ => return None,
         })
     }
@@ -611,6 +676,18 @@ impl core::fmt::Display for RejectReason {
             }
             Self::UnknownTrajectory => f.write_str("the host has no such trajectory"),
             Self::UnknownCallback => f.write_str("the host has no such callback"),
+            Self::ModeChanging => f.write_str("the mode of operation is being changed"),
+            Self::UnknownMode { mode } => write!(f, "the axis is not set up for {mode:?}"),
+            Self::ObjectNotMapped { object } => {
+                write!(f, "object {object} is not in the process data, and a change of the mode needs it")
+            }
+            Self::NotDisabled => f.write_str("the drive takes another mode only while it is disabled"),
+            Self::NotAtRest { velocity } => {
+                write!(f, "the joint is not at rest, or has not been for some cycles: {velocity}")
+            }
+            Self::OffSetPoint { distance, limit } => {
+                write!(f, "the joint is {distance} from its set-point; at most {limit} is allowed")
+            }
             Self::StartMismatch { position, present } => {
                 write!(
                     f,

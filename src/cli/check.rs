@@ -9,6 +9,7 @@ use clap::Args;
 use serde::Serialize;
 use takt::bus::schedule::{self, BusSchedule};
 use takt::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel};
+use takt::rt::ModeCondition;
 
 use super::exit::Exit;
 use super::print;
@@ -85,6 +86,10 @@ struct AxisCheck {
     bus: String,
     node: u8,
     mode: &'static str,
+    /// The modes that it may be changed to at run time.
+    other_modes: Vec<&'static str>,
+    /// When its drive takes another mode; `None` where it stays in its own.
+    mode_change: Option<&'static str>,
     is_linear: bool,
     position_min: f64,
     position_max: f64,
@@ -126,11 +131,24 @@ impl ComplianceCheck {
     fn of(axis: &Axis) -> Option<Self> {
         let Compliance { stiffness_max, damping_max, torque_rise_ns } = axis.compliance;
         let torque_rate = axis.limits.torque / (torque_rise_ns.max(1) as f64 / 1e9);
-        matches!(axis.control, Control::Torque { .. }).then_some(Self {
+        axis.controls().any(|control| matches!(control, Control::Torque { .. })).then_some(Self {
             stiffness_max,
             damping_max,
             torque_rate,
         })
+    }
+}
+
+/// The word for a mode in a configuration.
+fn mode(control: &Control) -> &'static str {
+    match control {
+        Control::Position => "csp",
+        Control::Velocity { .. } => "csv",
+        Control::Torque { .. } => "cst",
+        Control::Interpolated => "ip",
+        Control::ProfilePosition => "pp",
+        Control::ProfileVelocity => "pv",
+        Control::ProfileTorque => "pt",
     }
 }
 
@@ -158,20 +176,18 @@ impl AxisCheck {
         let counts =
             |position: f64| (direction * position * counts_per_unit + f64::from(axis.zero_counts)).round();
         let (first, second) = (counts(axis.limits.position_min), counts(axis.limits.position_max));
-        let mode = match axis.control {
-            Control::Position => "csp",
-            Control::Velocity { .. } => "csv",
-            Control::Torque { .. } => "cst",
-            Control::Interpolated => "ip",
-            Control::ProfilePosition => "pp",
-            Control::ProfileVelocity => "pv",
-            Control::ProfileTorque => "pt",
-        };
         Self {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
             node: axis.node,
-            mode,
+            mode: mode(&axis.control),
+            other_modes: axis.other_modes.iter().map(mode).collect(),
+            mode_change: (!axis.other_modes.is_empty()).then(|| axis.drive.mode_condition()).flatten().map(
+                |condition| match condition {
+                    ModeCondition::Disabled => "while disabled",
+                    ModeCondition::AtRest => "at rest",
+                },
+            ),
             is_linear: axis.travel != Travel::Rotary,
             position_min: axis.limits.position_min,
             position_max: axis.limits.position_max,

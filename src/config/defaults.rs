@@ -143,7 +143,7 @@ pub fn longest_gap_ns(period_ns: u64) -> u64 {
 
 /// `[master] heartbeat`. A drive that would go on moving without the controller is to notice soon that it is gone.
 pub fn master_heartbeat_ns(axes: &[Axis], period_ns: u64) -> u64 {
-    if axes.iter().any(|axis| goes_on_alone(&axis.control)) {
+    if axes.iter().flat_map(Axis::controls).any(goes_on_alone) {
         // The heartbeat leaves in a cycle, in whole milliseconds.
         URGENT_HEARTBEAT_NS.max(period_ns.next_multiple_of(1_000_000))
     } else {
@@ -217,26 +217,27 @@ pub const fn following_error(travel: Travel) -> f64 {
 }
 
 /// `[[axis]] target_tolerance`. In CST the loop has no integral part: static friction holds the joint off its target by
-/// friction / stiffness at most.
-pub fn target_tolerance(travel: Travel, control: &Control) -> f64 {
+/// friction / stiffness at most. With several modes, it is the largest.
+pub fn target_tolerance(travel: Travel, controls: &[Control]) -> f64 {
     let own = match travel {
         Travel::Rotary => TARGET_TOLERANCE_RAD,
         Travel::Linear { .. } => TARGET_TOLERANCE_M,
     };
-    match control {
+    controls.iter().fold(own, |own, control| match control {
         Control::Torque { stiffness, coulomb_friction, .. } => {
             own.max(TARGET_TOLERANCE_PER_FRICTION * coulomb_friction / stiffness)
         }
         _ => own,
-    }
+    })
 }
 
 /// `[axis.torque_loop] stiffness_max`, `damping_max` and `torque_rise`: no more than the axis' own loop.
-pub const fn compliance(control: &Control) -> Compliance {
-    let (stiffness_max, damping_max) = match *control {
-        Control::Torque { stiffness, damping, .. } => (stiffness, damping),
-        _ => (0.0, 0.0),
-    };
+pub fn compliance(controls: &[Control]) -> Compliance {
+    let gains = controls.iter().find_map(|control| match *control {
+        Control::Torque { stiffness, damping, .. } => Some((stiffness, damping)),
+        _ => None,
+    });
+    let (stiffness_max, damping_max) = gains.unwrap_or_default();
     Compliance { stiffness_max, damping_max, torque_rise_ns: TORQUE_RISE_NS }
 }
 

@@ -134,20 +134,21 @@ impl Axis {
             node,
             drive,
             control,
+            other_modes: vec![],
             travel,
             counts_per_turn: drive.counts_per_turn(),
             gear_ratio: defaults::GEAR_RATIO,
             reversed: false,
             zero_counts: 0,
             limits,
-            compliance: defaults::compliance(&control),
+            compliance: defaults::compliance(&[control]),
             feed_forward: FeedForward::default(),
             following_error: FollowingError {
                 limit: defaults::following_error(travel),
                 time_ns: defaults::FOLLOWING_ERROR_TIME_NS,
             },
             start_tolerance: defaults::start_tolerance(travel),
-            target_tolerance: defaults::target_tolerance(travel, &control),
+            target_tolerance: defaults::target_tolerance(travel, &[control]),
             follow: Follow::default(),
             missed_feedback_cycles: defaults::MISSED_FEEDBACK_CYCLES,
             transmission_type: defaults::TRANSMISSION_TYPE,
@@ -170,7 +171,7 @@ impl Axis {
         self.travel = Travel::Linear { lead_m };
         self.following_error.limit = defaults::following_error(self.travel);
         self.start_tolerance = defaults::start_tolerance(self.travel);
-        self.target_tolerance = defaults::target_tolerance(self.travel, &self.control);
+        self.set_defaults_of_modes();
         self
     }
 
@@ -179,9 +180,23 @@ impl Axis {
     #[must_use]
     pub fn with_control(mut self, control: Control) -> Self {
         self.control = control;
-        self.compliance = defaults::compliance(&control);
-        self.target_tolerance = defaults::target_tolerance(self.travel, &control);
+        self.set_defaults_of_modes();
         self
+    }
+
+    /// The same, which may be changed to these modes at run time as well. Their defaults are as for
+    /// [`with_control`](Self::with_control).
+    #[must_use]
+    pub fn with_other_modes(mut self, other_modes: Vec<Control>) -> Self {
+        self.other_modes = other_modes;
+        self.set_defaults_of_modes();
+        self
+    }
+
+    fn set_defaults_of_modes(&mut self) {
+        let controls: Vec<Control> = self.controls().copied().collect();
+        self.compliance = defaults::compliance(&controls);
+        self.target_tolerance = defaults::target_tolerance(self.travel, &controls);
     }
 }
 

@@ -11,7 +11,7 @@ pub use takt_rt::AxisLimits as Limits;
 /// How an axis is commanded. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
 pub use takt_rt::ControlLaw as Control;
-use takt_rt::Dialect;
+use takt_rt::{Dialect, ModeCondition};
 
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
@@ -192,6 +192,9 @@ pub struct Axis {
     pub drive: DriveFamily,
     /// How it is commanded, with the gains of the loop that the controller closes itself. Default: position.
     pub control: Control,
+    /// The modes that it may be changed to at run time, beside that one, with their gains: cyclic synchronous modes, each once.
+    /// Everything that each of them needs is required and mapped. Default: none.
+    pub other_modes: Vec<Control>,
     /// Rotary (the default) or linear.
     pub travel: Travel,
     /// Counts of one turn of the position that the drive reports. Default: the family's (eRob: 524288, YZ-AIM: 32768).
@@ -256,6 +259,13 @@ pub enum DriveFamily {
     YzAim,
 }
 
+impl Axis {
+    /// How it may be commanded: in the mode that it starts in, and in those that it may be changed to.
+    pub fn controls(&self) -> impl Iterator<Item = &Control> {
+        std::iter::once(&self.control).chain(&self.other_modes)
+    }
+}
+
 impl Travel {
     /// How far the joint gets in one turn: rad (m).
     pub const fn per_turn(self) -> f64 {
@@ -275,6 +285,17 @@ impl DriveFamily {
         match self {
             Self::ErobCanopen => "erob-canopen",
             Self::YzAim => "yz-aim",
+        }
+    }
+
+    /// When its drives take another mode at run time; `None` if they cannot be changed by process data.
+    ///
+    /// An eRob must be disabled before every change (eRunner manual, chapter 5). A YZ-AIM has no object 6061 that would show the change,
+    /// and no cyclic synchronous mode: it interpolates only where 2619h = 7 is stored (manual, 5.10.3).
+    pub const fn mode_condition(self) -> Option<ModeCondition> {
+        match self {
+            Self::ErobCanopen => Some(ModeCondition::Disabled),
+            Self::YzAim => None,
         }
     }
 

@@ -6,8 +6,8 @@ use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
     GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError,
-    NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan, TimingLadder,
-    TorqueLimits,
+    ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan,
+    TimingLadder, TorqueLimits,
 };
 
 use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
@@ -18,6 +18,8 @@ use crate::drive::{PdoPlan, ProcessData, yz_aim};
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
 /// How long a drive may take to acknowledge a target in profile position.
 const ACKNOWLEDGE_TIMEOUT_NS: u64 = 500_000_000;
+/// How long a drive may take to show another mode of operation. No manual says; a real one is faster by far.
+const MODE_TIMEOUT_NS: u64 = 500_000_000;
 /// If set-points are not transmitted for longer than this, the group stops.
 const NOT_TRANSMITTED_NS: u64 = 4_000_000;
 /// The most service frames on a bus in one cycle before set-points are sent.
@@ -156,6 +158,11 @@ fn axis_parameters(
         )
         .unwrap_or(u32::MAX),
         law: axis.control,
+        mode_changes: ModeChanges {
+            laws: axis.other_modes.iter().take(ModeChanges::MOST).copied().collect(),
+            condition: axis.drive.mode_condition().unwrap_or_default(),
+            timeout_cycles: cycles(MODE_TIMEOUT_NS),
+        },
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
         torque_limits: torque_limits(axis),

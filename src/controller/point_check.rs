@@ -50,21 +50,22 @@ pub enum PointRefusal {
     },
 }
 
-/// Checks that an axis takes a point. Positions and velocities are led to within the limits, whatever they are.
+/// Checks that an axis takes a point while it is commanded so: in the mode that it starts in, or in one that it has been changed to.
+/// Positions and velocities are led to within the limits, whatever they are.
 ///
 /// # Errors
 /// What it does not take.
-pub fn check_point(axis: &Axis, point: &AxisPoint) -> Result<(), PointRefusal> {
+pub fn check_point(axis: &Axis, control: &Control, point: &AxisPoint) -> Result<(), PointRefusal> {
     if !point.is_finite() {
         return Err(PointRefusal::NotFinite { value: *point });
     }
-    let has_torque_loop = matches!(axis.control, Control::Torque { .. });
+    let has_torque_loop = matches!(control, Control::Torque { .. });
     let within = |torque: f64| {
         let limit = axis.limits.torque;
         if torque.abs() <= limit { Ok(()) } else { Err(PointRefusal::Torque { torque, limit }) }
     };
     let torque_loop = || {
-        let mode = axis.control.operation_mode();
+        let mode = control.operation_mode();
         if has_torque_loop { Ok(()) } else { Err(PointRefusal::NoTorqueInMode { mode }) }
     };
     match *point {
@@ -119,24 +120,27 @@ mod tests {
         let (csp, cst) = (axis(Control::Position), axis(CST));
         let soft = AxisPoint::position(0.1).with_impedance(100.0, 10.0);
         for point in [AxisPoint::position(0.1), AxisPoint::Velocity(9.0)] {
-            assert_eq!((check_point(&csp, &point), check_point(&cst, &point)), (Ok(()), Ok(())));
+            assert_eq!(
+                (check_point(&csp, &csp.control, &point), check_point(&cst, &cst.control, &point)),
+                (Ok(()), Ok(()))
+            );
         }
         for point in [AxisPoint::Torque(5.0), soft] {
             let mode = OperationMode::CyclicSynchronousPosition;
-            assert_eq!(check_point(&csp, &point), Err(PointRefusal::NoTorqueInMode { mode }));
-            assert_eq!(check_point(&cst, &point), Ok(()));
+            assert_eq!(check_point(&csp, &csp.control, &point), Err(PointRefusal::NoTorqueInMode { mode }));
+            assert_eq!(check_point(&cst, &cst.control, &point), Ok(()));
         }
         let fed_forward = AxisPoint::position(0.1).with_torque(3.0);
-        assert_eq!(check_point(&csp, &fed_forward), Err(PointRefusal::NoFeedForward));
-        assert_eq!(check_point(&cst, &fed_forward), Ok(()));
+        assert_eq!(check_point(&csp, &csp.control, &fed_forward), Err(PointRefusal::NoFeedForward));
+        assert_eq!(check_point(&cst, &cst.control, &fed_forward), Ok(()));
         let csp = Axis { feed_forward: FeedForward::Torque, ..csp };
-        assert_eq!(check_point(&csp, &fed_forward), Ok(()));
+        assert_eq!(check_point(&csp, &csp.control, &fed_forward), Ok(()));
     }
 
     #[test]
     fn what_is_beyond_a_limit_is_refused_with_the_limit() {
         let cst = axis(CST);
-        let refusal = |point: AxisPoint| check_point(&cst, &point).unwrap_err();
+        let refusal = |point: AxisPoint| check_point(&cst, &cst.control, &point).unwrap_err();
         let torque = PointRefusal::Torque { torque: -20.1, limit: 20.0 };
         assert_eq!(refusal(AxisPoint::Torque(-20.1)), torque);
         assert_eq!(refusal(AxisPoint::position(0.0).with_torque(-20.1)), torque);

@@ -117,12 +117,14 @@ fn identity(list: &mut StepList, axis: &Axis) {
         "supported modes",
         "choose another control mode for this axis, or load firmware that has this one",
     );
-    // Some units support mode 7 without declaring it in 6502 (eRunner manual, figure 5-38); 6061 will show it.
-    let check = match axis.control {
-        Control::Interpolated => Check::Any,
-        control => Check::Supports(control.operation_mode()),
-    };
-    list.read(objects::SUPPORTED_DRIVE_MODES, check, Fact::SupportedModes);
+    for control in axis.controls() {
+        // Some units support mode 7 without declaring it in 6502 (eRunner manual, figure 5-38); 6061 will show it.
+        let check = match control {
+            Control::Interpolated => Check::Any,
+            control => Check::Supports(control.operation_mode()),
+        };
+        list.read(objects::SUPPORTED_DRIVE_MODES, check, Fact::SupportedModes);
+    }
 }
 
 /// Stops and disables the drive. A communication reset ends neither its torque nor its motion.
@@ -246,13 +248,17 @@ fn ratings(list: &mut StepList, axis: &Axis) {
         "ratings",
         "torque cannot be commanded without the drive's rated torque: choose another control mode",
     );
-    let is_torque_sent =
-        axis.control.target_slot() == CommandSlot::TargetTorque || axis.feed_forward.has_torque();
+    let is_torque_sent = has_target(axis, CommandSlot::TargetTorque) || axis.feed_forward.has_torque();
     let torque = if is_torque_sent { Check::Positive } else { Check::Any };
     list.read(objects::MOTOR_RATED_CURRENT, Check::Any, Fact::RatedCurrent);
     list.read(objects::MOTOR_RATED_TORQUE, torque, Fact::RatedTorque);
     list.read_optional(objects::MAX_TORQUE, Fact::MaxTorque);
     list.read_optional(objects::QUICK_STOP_OPTION_CODE, Fact::QuickStopOptionCode);
+}
+
+/// Whether a mode of the axis has this target.
+fn has_target(axis: &Axis, target: CommandSlot) -> bool {
+    axis.controls().any(|control| control.target_slot() == target)
 }
 
 /// Sets the drive's limits beyond those of the controller, which acts first. Sets the drive's profile to the axis'
@@ -261,14 +267,13 @@ fn ratings(list: &mut StepList, axis: &Axis) {
 fn limits(list: &mut StepList, axis: &Axis) {
     list.begin("limits", "choose limits for this axis that its drive accepts");
     let limits = &axis.limits;
-    let target = axis.control.target_slot();
-    if target == CommandSlot::TargetPosition {
+    if has_target(axis, CommandSlot::TargetPosition) {
         // In profile position mode the drive follows its own profile, so its following error is not limited here.
         let error = if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
         list.write_unless_in_file(axis, FOLLOWING_ERROR_WINDOW, counts(axis, error).min(i32::MAX.into()));
         list.write_unless_in_file(axis, objects::PROFILE_VELOCITY, counts(axis, limits.velocity));
     }
-    if target != CommandSlot::TargetTorque {
+    if has_target(axis, CommandSlot::TargetPosition) || has_target(axis, CommandSlot::TargetVelocity) {
         list.write_unless_in_file(axis, objects::PROFILE_ACCELERATION, counts(axis, limits.acceleration));
         list.write_unless_in_file(axis, objects::PROFILE_DECELERATION, counts(axis, limits.deceleration));
     }

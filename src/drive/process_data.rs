@@ -79,21 +79,25 @@ impl ProcessData {
 
     /// The objects that a drive with free mapping must receive in every cycle.
     pub(super) fn needed_commands(axis: &Axis) -> Vec<MappedObject> {
-        let target = match axis.control.target_slot() {
+        let target_of = |control: &Control| match control.target_slot() {
             CommandSlot::TargetVelocity => TARGET_VELOCITY,
             CommandSlot::TargetTorque => TARGET_TORQUE,
             _ => TARGET_POSITION,
         };
-        let (follows_position, follows_torque) = (target == TARGET_POSITION, target == TARGET_TORQUE);
-        let mut objects = vec![CONTROLWORD, target];
+        let mut objects = vec![CONTROLWORD, target_of(&axis.control)];
         if axis.control.is_profile() {
             return objects;
         }
-        // It fits beside the target.
-        if axis.feed_forward.has_torque() && !follows_torque {
+        if changes_mode(axis) {
+            objects.push(OPERATION_MODE);
+        }
+        objects.extend(axis.other_modes.iter().map(target_of));
+        let follows = |target| axis.controls().map(target_of).any(|own| own == target);
+        // It fits beside the target, where there is one.
+        if axis.feed_forward.has_torque() && (follows(TARGET_POSITION) || follows(TARGET_VELOCITY)) {
             objects.push(TORQUE_OFFSET);
         }
-        if axis.feed_forward.has_velocity() && follows_position {
+        if axis.feed_forward.has_velocity() && follows(TARGET_POSITION) {
             objects.push(VELOCITY_OFFSET);
         }
         objects
@@ -101,7 +105,11 @@ impl ProcessData {
 
     /// The objects that a drive with free mapping must send in every cycle.
     pub(super) fn needed_feedback(axis: &Axis) -> Vec<MappedObject> {
-        [STATUSWORD, POSITION].into_iter().chain(axis.feedback.iter().copied().map(mapped)).collect()
+        let asked = axis.feedback.iter().copied();
+        // Nothing else shows that the drive has taken another mode.
+        let is_mode_missing = changes_mode(axis) && !axis.feedback.contains(&Feedback::OperationMode);
+        let mode = is_mode_missing.then_some(Feedback::OperationMode);
+        [STATUSWORD, POSITION].into_iter().chain(mode.into_iter().chain(asked).map(mapped)).collect()
     }
 
     /// Maps a drive with free mapping: command and feedback in as many PDOs as they need, controlword and target, statusword and
@@ -179,6 +187,11 @@ impl ProcessData {
             self.commands.iter().find(|command| command.transmission == TransmissionType::EveryCycle)?;
         self.unused.iter().find(|pdo| pdo.number == command.number)
     }
+}
+
+/// Whether the mode of an axis may be changed at run time.
+fn changes_mode(axis: &Axis) -> bool {
+    !axis.other_modes.is_empty()
 }
 
 /// Objects in their order in as few PDOs as that takes.

@@ -117,7 +117,7 @@ impl FileStream {
 
 fn check(row: &PlayRow, axis: Option<&Axis>, point: &JointPoint) -> Result<(), PlayFileError> {
     let Some(axis) = axis else { return Ok(()) };
-    check_point(axis, &point_of(point)).map_err(|reason| {
+    check_point(axis, &axis.control, &point_of(point)).map_err(|reason| {
         let problem = FileProblem::Rows { joint: Some(axis.name.clone()), words: reason.to_string() };
         PlayFileError { line: row.line, column: None, problem }
     })

@@ -179,6 +179,9 @@ impl EventFields {
             EventKind::DriveState { axis, state, statusword } => {
                 Self { kind: 3, axis: Some(axis), drive_state: state as u8, statusword, ..none }
             }
+            EventKind::Mode { axis, mode } => {
+                Self { kind: 9, axis: Some(axis), value: f64::from(mode as i8), ..none }
+            }
             EventKind::Emergency { axis, code, register, manufacturer } => Self {
                 kind: 4,
                 axis: Some(axis),
@@ -266,8 +269,8 @@ pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut C
 mod tests {
     use super::*;
     use takt_rt::{
-        DriveState, Fault, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind, Rule,
-        StopCategory, StopCause, StopReason, StreamState, TimingLevel,
+        DriveState, Fault, OperationMode, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind,
+        Rule, StopCategory, StopCause, StopReason, StreamState, TimingLevel,
     };
 
     /// The constants of a definition that stand in front of `field`, with the names as Rust writes them.
@@ -349,6 +352,7 @@ mod tests {
             }),
             EventKind::Timing { level: TimingLevel::Normal },
             EventKind::Stream { state: StreamState::Dry },
+            EventKind::Mode { axis: 0, mode: OperationMode::CyclicSynchronousVelocity },
         ];
         let encoded = kinds.map(|kind| {
             let name = format!("{kind:?}");

@@ -52,7 +52,10 @@ fn mode(number: f64) -> String {
 /// An event as one line, without its time. Where there are several groups, the line begins with the one that it concerns, unless
 /// it concerns an axis that it names.
 pub fn event(event: &Event, machine: &Machine) -> String {
-    let is_of_axis = matches!(event.kind, EventKind::DriveState { .. } | EventKind::Emergency { .. });
+    let is_of_axis = matches!(
+        event.kind,
+        EventKind::DriveState { .. } | EventKind::Mode { .. } | EventKind::Emergency { .. }
+    );
     match event.group.filter(|_| machine.groups.len() > 1 && !is_of_axis) {
         Some(group) => format!("{}: {}", machine.group_name(group), what_happened(event, machine)),
         None => what_happened(event, machine),
@@ -73,6 +76,9 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
         EventKind::Stream { state: StreamState::Callback } => "a callback leads the axes".to_owned(),
         EventKind::DriveState { axis, state: to, statusword } => {
             format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), to.name())
+        }
+        EventKind::Mode { axis, mode: new } => {
+            format!("{}: changed to {}", machine.axis_name(axis), mode((new as i8).into()))
         }
         EventKind::Emergency { axis, code: 0, .. } => {
             format!("{}: emergency message: no error any more", machine.axis_name(axis))
@@ -162,6 +168,10 @@ mod tests {
             }),
             "slide: emergency message: error 0x7305 (incremental sensor 1 fault), register 0x21, \
              manufacturer 01 02 03 04 FF; try: check the encoder and its cable, then power-cycle the drive"
+        );
+        assert_eq!(
+            words(EventKind::Mode { axis: 0, mode: OperationMode::CyclicSynchronousVelocity }),
+            "shoulder: changed to mode 9 (cyclic synchronous velocity)"
         );
         assert_eq!(words(EventKind::MissedSlots { count: 30 }), "30 slots were missed: the thread was late");
         assert_eq!(

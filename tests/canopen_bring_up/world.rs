@@ -145,6 +145,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         node,
         drive: DriveFamily::ErobCanopen,
         control: Control::Position,
+        other_modes: vec![],
         travel: Travel::Rotary,
         counts_per_turn: 524_288.0,
         gear_ratio: 1.0,

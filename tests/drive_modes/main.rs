@@ -8,6 +8,7 @@ mod bus_budget;
 mod closed_loops;
 mod configuration_file;
 mod interpolation;
+mod mode_changes;
 mod offsets;
 mod profile_position;
 mod profile_torque;

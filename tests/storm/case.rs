@@ -28,6 +28,8 @@ pub struct Case {
     pub overload: Overload,
     /// Whether callbacks lead the groups, too.
     pub has_callbacks: bool,
+    /// Whether somebody changes modes of operation, too.
+    pub has_mode_changes: bool,
     /// Whether somebody has checked trajectories carried out.
     pub has_trajectories: bool,
     pub dice: Dice,
@@ -136,6 +138,7 @@ impl Case {
             hardship,
             overload,
             has_callbacks: false,
+            has_mode_changes: false,
             has_trajectories: false,
             dice,
         }

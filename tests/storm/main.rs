@@ -9,6 +9,7 @@ mod bounds;
 mod case;
 mod client;
 mod client_callback;
+mod client_mode;
 mod client_stream;
 mod client_trajectory;
 mod concern;
@@ -45,6 +46,8 @@ const CYCLES: u64 = 10_000_000;
 const SHARDS: u64 = 16;
 /// Of storms in which callbacks lead the groups.
 const CALLBACK_CASES: u64 = 120;
+/// Of storms in which modes of operation are changed.
+const MODE_CASES: u64 = 120;
 /// A shard ends after so many failures.
 const FAILURES_AT_MOST: usize = 5;
 
@@ -154,4 +157,24 @@ fn the_invariants_hold_where_callbacks_lead_the_groups_overrun_and_panic() {
     for rule in [Rule::CallbackOverrun, Rule::CallbackPanicked] {
         assert!(stops.contains(rule.key()), "never: {rule:?}");
     }
+}
+
+#[test]
+fn the_invariants_hold_where_modes_of_operation_are_changed() {
+    let (mut changed_cycles, mut stops) = (0, BTreeSet::new());
+    let first = number("TAKT_STORM_FIRST").unwrap_or(0);
+    for seed in first..first + MODE_CASES {
+        let mut case = Case { has_mode_changes: true, is_serving: true, ..Case::of(seed) };
+        case.clients = case.clients.max(1);
+        client_mode::let_modes_change(&mut case.config);
+        match play(&case) {
+            Ok(done) => {
+                changed_cycles += done.changed_cycles;
+                stops.extend(done.stops);
+            }
+            Err(wrong) => panic!("seed {seed}, with modes: {} {wrong}\n{}", case.config.name, case.text),
+        }
+    }
+    assert!(changed_cycles > 1000, "in another mode than at first, only {changed_cycles} cycles in motion");
+    assert!(stops.contains(Rule::ModeNotShown.key()), "never: a mode that is not shown");
 }

@@ -33,6 +33,7 @@ fn moving(name: &'static str, text: &str) -> Case {
         broken_off: None,
         hardship: Hardship::default(),
         has_callbacks: false,
+        has_mode_changes: false,
         has_trajectories: false,
         overload: Overload::default(),
         dice: Dice::new(0),

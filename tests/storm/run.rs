@@ -17,6 +17,7 @@ use takt_rt::{
 use crate::case::Case;
 use crate::client::{Client, RecentRequests, are_open};
 use crate::client_callback::CallbackClient;
+use crate::client_mode::ModeClient;
 use crate::client_trajectory::TrajectoryClient;
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
@@ -109,6 +110,8 @@ pub struct Done {
     pub outcomes: Vec<FaultOutcome>,
     /// The rules of all stops.
     pub stops: BTreeSet<&'static str>,
+    /// Cycles in which an axis moved in another mode of operation than its first.
+    pub changed_cycles: u64,
     /// How often a callback, and a checked trajectory, has begun to lead a group.
     pub callbacks: u64,
     pub trajectories: u64,
@@ -133,6 +136,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut fingerprint = Fingerprint::default();
     let mut outcomes: Vec<FaultOutcome> = vec![];
     let mut stops = BTreeSet::new();
+    let mut changed_cycles = 0;
     let at_most = case.length + (END_AT_MOST_S * 1e9 / config.cycle.period_ns as f64) as u64;
     let (mut enabled, mut cycles, mut callbacks) = (None, 0, 0);
     let mut goes_on = true;
@@ -169,6 +173,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
             _ => None,
         }));
         clients.note_answers(&world.snapshot);
+        changed_cycles += u64::from(moves_in_other_mode(config, &world.snapshot));
         fingerprint.take_cycle(&world);
         let World { log, snapshot, truth, events, .. } = &mut world;
         let mut look = |record: &_| {
@@ -213,7 +218,25 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
     let trajectories = clients.trajectories.map_or(0, |client| client.begun);
     let fingerprint = fingerprint.value();
-    Ok(Done { cycles, fingerprint, outcomes, stops, callbacks, trajectories, is_bring_up_failed })
+    Ok(Done {
+        cycles,
+        fingerprint,
+        outcomes,
+        stops,
+        changed_cycles,
+        callbacks,
+        trajectories,
+        is_bring_up_failed,
+    })
+}
+
+fn moves_in_other_mode(config: &Config, snapshot: &Snapshot) -> bool {
+    (0..).zip(snapshot.groups()).any(|(group, shown)| {
+        let mut axes = config.axes_of_group(group).into_iter();
+        let is_other =
+            |axis: usize| snapshot.axes[axis].mode_set != config.axes[axis].control.operation_mode() as i8;
+        matches!(shown.phase, Phase::Moving | Phase::Streaming) && axes.any(is_other)
+    })
 }
 
 fn phases_of(snapshot: &Snapshot) -> Vec<Phase> {
@@ -244,6 +267,7 @@ fn note_stop(events: &[Event], outcomes: &mut [FaultOutcome]) {
 struct Clients {
     all: Vec<Client>,
     callbacks: Option<CallbackClient>,
+    modes: Option<ModeClient>,
     trajectories: Option<TrajectoryClient>,
     /// Of each group.
     asked: Vec<RecentRequests>,
@@ -259,12 +283,14 @@ impl Clients {
             .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
             .collect();
         let callbacks = case.has_callbacks.then(|| CallbackClient::new(case.dice.split(u64::MAX - 3)));
+        let modes = case.has_mode_changes.then(|| ModeClient::new(case.dice.split(u64::MAX - 5)));
         let trajectories =
             case.has_trajectories.then(|| TrajectoryClient::new(case.dice.split(u64::MAX - 4)));
         let groups = case.config.groups.len().max(1);
         Self {
             all,
             callbacks,
+            modes,
             trajectories,
             asked: vec![RecentRequests::default(); groups],
             awaited_resets: vec![],
@@ -296,6 +322,9 @@ impl Clients {
         }
         if let Some(callbacks) = &mut self.callbacks {
             callbacks.act(&case.config, snapshot, &mut world.run);
+        }
+        if let Some(modes) = &mut self.modes {
+            modes.act(&case.config, snapshot, &mut world.run);
         }
         if let Some(trajectories) = &mut self.trajectories {
             trajectories.act(&case.config, snapshot, &mut world.run);

@@ -55,12 +55,7 @@ impl Axis {
         if !is_enabled && law.target_slot() != CommandSlot::TargetPosition {
             return (law.idle(self.joint.position_counts()), 0.0);
         }
-        let input = LoopInput {
-            set: self.set_points.sent_now(),
-            due: self.set_points.due(),
-            position: self.joint.position(),
-            velocity: self.joint.velocity(),
-        };
+        let input = self.loop_input();
         // Where nobody takes a torque, none is wanted either.
         let is_torque_taken = law.target_slot() == CommandSlot::TargetTorque || feed_forward.has_torque();
         let torque = if is_torque_taken {
@@ -75,6 +70,17 @@ impl Axis {
             self.set_offsets(input.set.velocity, torque);
         }
         (raw, torque)
+    }
+
+    /// What the loops that are closed here compare in this cycle.
+    #[inline]
+    pub(super) fn loop_input(&self) -> LoopInput {
+        LoopInput {
+            set: self.set_points.sent_now(),
+            due: self.set_points.due(),
+            position: self.joint.position(),
+            velocity: self.joint.velocity(),
+        }
     }
 
     /// Sets what the drive adds in its own loops: its velocity loop has the velocity of the set-point already where it follows

@@ -136,6 +136,11 @@ impl Axis {
         (self.is_heard() && self.reported_slots.contains(slot)).then(|| self.feedback.feedback(slot))
     }
 
+    /// Whether the process data of the drive carry a number that it reports.
+    pub fn reports(&self, slot: FeedbackSlot) -> bool {
+        self.reported_slots.contains(slot)
+    }
+
     /// Whether the drive has reported at all.
     pub fn is_heard(&self) -> bool {
         self.joint.is_heard()
@@ -178,10 +183,12 @@ impl Axis {
     }
 
     /// The mode of operation (object 6061) that the drive shows, if it differs from ours. A drive that has not reported yet
-    /// shows none.
+    /// shows none. While the mode is being changed, the drive may show any.
     #[inline]
     pub fn foreign_mode(&self) -> Option<i8> {
-        self.mode().filter(|shown| *shown != self.parameters.law.operation_mode() as i8)
+        let is_foreign =
+            |shown: &i8| *shown != self.parameters.law.operation_mode() as i8 && !self.is_changing_mode();
+        self.mode().filter(is_foreign)
     }
 
     /// The mode of operation (object 6061) that the drive shows, if it reports it.

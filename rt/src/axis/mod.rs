@@ -2,7 +2,7 @@
 //!
 //! The parts of an [`Axis`], a file each: `set_points` and `delay` (where it is to be, and the guard),
 //! `stream` (what a source wants, and the set-points that come of it), `torque_loop` (the torque where it is made here),
-//! `profile_mode` (targets instead of set-points), `joint` and `plausibility` (where the joint is), `reception` and
+//! `mode` (its change at run time), `profile_mode` (targets instead of set-points), `joint` and `plausibility` (where the joint is), `reception` and
 //! `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
 //! `sdo_fallback` (the controlword when process data do not arrive), `command` (the frames), `rest` (has the joint stopped).
 //!
@@ -26,6 +26,7 @@ mod drive_report;
 mod feedback;
 mod joint;
 mod late_reply;
+mod mode;
 mod parameters;
 mod plausibility;
 mod power;
@@ -51,6 +52,7 @@ use controlword::ControlwordSender;
 use drive_report::DriveReport;
 use joint::JointEstimate;
 use late_reply::{LateReplyDetector, SetPointSkip};
+use mode::Mode;
 use power::Power;
 use profile_mode::ProfileMode;
 use reception::Reception;
@@ -60,7 +62,8 @@ use torque_loop::TorqueLoop;
 
 pub use feedback::Jump;
 pub use parameters::{
-    AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Pdo, TorqueLimits,
+    AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, ModeChanges, ModeCondition,
+    Pdo, TorqueLimits,
 };
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
@@ -76,6 +79,7 @@ pub struct Axis {
     /// Which numbers the drive reports.
     reported_slots: FeedbackSlots,
     set_points: SetPoints,
+    mode: Mode,
     /// What is done with a target beyond the limits, by what leads the axis now.
     follow: Follow,
     /// Where the axis rests while a stream has run dry, or a callback commands nothing.
@@ -112,6 +116,7 @@ impl Axis {
             command,
             feedback: ProcessImage::default(),
             set_points: SetPoints::default(),
+            mode: Mode::default(),
             stream_rest: 0.0,
             torque_loop: TorqueLoop::default(),
             profile: ProfileMode::default(),
@@ -248,6 +253,7 @@ impl Axis {
             torque: self.torque(),
             current_per_mille: self.current_per_mille(),
             mode: self.mode(),
+            mode_set: self.mode_set(),
             statusword: self.statusword(),
             drive_state: self.drive_state(),
             error_code: self.error_code(),

@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 
+use crate::cia402::OperationMode;
 use crate::control::{ControlLaw, GainError};
 use crate::dialect::Dialect;
 use crate::frame::Id;
@@ -92,6 +93,49 @@ impl FeedForward {
     }
 }
 
+/// When a drive takes another mode of operation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ModeCondition {
+    /// Only while it has no torque: the axis must be disabled before, and enabled again after that.
+    #[default]
+    Disabled,
+    /// In any state. Here it changes while the joint is at rest.
+    AtRest,
+}
+
+/// The modes that an axis may be changed to at run time, beside the one that it starts in. Its process data must carry object
+/// 6060, the target of each mode, and object 6061.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ModeChanges {
+    /// How it is commanded in each of them: cyclic synchronous modes, each once.
+    pub laws: ArrayVec<ControlLaw, { Self::MOST }>,
+    /// When its drive takes another mode.
+    pub condition: ModeCondition,
+    /// Cycles within which its drive must show the new mode in object 6061.
+    pub timeout_cycles: u32,
+}
+
+impl ModeChanges {
+    /// The most other modes: there are three cyclic synchronous ones.
+    pub const MOST: usize = 2;
+
+    /// Checks the laws, and that they are for different modes.
+    fn validate(&self, first: &ControlLaw) -> Result<(), AxisParametersError> {
+        for (index, law) in self.laws.iter().enumerate() {
+            law.validate().map_err(AxisParametersError::Gain)?;
+            let (mode, mut earlier) = (law.operation_mode(), self.laws.iter().take(index));
+            let is_repeated =
+                mode == first.operation_mode() || earlier.any(|earlier| earlier.operation_mode() == mode);
+            if is_repeated || !law.is_cyclic_synchronous() {
+                return Err(AxisParametersError::OtherMode { mode });
+            }
+        }
+        let mode = first.operation_mode();
+        let is_possible = self.laws.is_empty() || first.is_cyclic_synchronous() && self.timeout_cycles > 0;
+        if is_possible { Ok(()) } else { Err(AxisParametersError::OtherMode { mode }) }
+    }
+}
+
 /// Everything about an axis that does not change while it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisParameters {
@@ -112,8 +156,10 @@ pub struct AxisParameters {
     /// Cycles of the bus from one controlword to the next on the way to operation enabled; 0 where the drive shows how
     /// far it has come.
     pub controlword_spacing_cycles: u32,
-    /// How it is commanded.
+    /// How it is commanded. A change of its mode exchanges this with one of `mode_changes`.
     pub law: ControlLaw,
+    /// The modes that it may be changed to.
+    pub mode_changes: ModeChanges,
     /// SI to drive units.
     pub scale: Scale,
     /// What it may never be asked to do.
@@ -153,6 +199,11 @@ pub enum AxisParametersError {
     Limit(LimitError),
     /// A gain is not a number that can be used.
     Gain(GainError),
+    /// A mode to change to or from is none of the cyclic synchronous ones, is named twice, or has no time to be shown in.
+    OtherMode {
+        /// The mode.
+        mode: OperationMode,
+    },
     /// A highest stiffness or damping, or the rate of the torque, is negative or no number.
     TorqueLimit {
         /// What it is.
@@ -179,6 +230,10 @@ impl core::fmt::Display for AxisParametersError {
             Self::NoPdo => f.write_str("there must be a PDO to the drive and one from it"),
             Self::Limit(error) => error.fmt(f),
             Self::Gain(error) => error.fmt(f),
+            Self::OtherMode { mode } => write!(
+                f,
+                "{mode:?} cannot be changed to at run time: only cyclic synchronous modes can, each named once, with a time-out"
+            ),
             Self::TorqueLimit { value } => {
                 write!(f, "a highest stiffness, damping or rate of the torque must not be negative: {value}")
             }
@@ -203,6 +258,7 @@ impl AxisParameters {
         }
         self.limits.validate().map_err(AxisParametersError::Limit)?;
         self.law.validate().map_err(AxisParametersError::Gain)?;
+        self.mode_changes.validate(&self.law)?;
         let TorqueLimits { stiffness, damping, rate } = self.torque_limits;
         if let Some(value) =
             [stiffness, damping, rate].into_iter().find(|value| value.is_nan() || *value < 0.0)
@@ -246,6 +302,7 @@ pub(super) mod tests {
             dialect: Dialect::Cia402,
             controlword_spacing_cycles: 0,
             law: ControlLaw::Position,
+            mode_changes: ModeChanges::default(),
             scale: Scale::new(ScaleParameters {
                 counts_per_turn: 524_288.0,
                 velocity_units_per_turn: 524_288.0,
@@ -293,6 +350,26 @@ pub(super) mod tests {
         assert_eq!(error, AxisParametersError::Limit(LimitError::Velocity { value: -1.0 }));
         let error = error_of(|axis| axis.law = ControlLaw::Velocity { position_gain: f64::INFINITY });
         assert!(matches!(error, AxisParametersError::Gain(_)));
+        let velocity = ControlLaw::Velocity { position_gain: 10.0 };
+        let other_modes = |first: ControlLaw, laws: &[ControlLaw], timeout_cycles: u32| {
+            let mode_changes = ModeChanges {
+                laws: laws.iter().copied().collect(),
+                timeout_cycles,
+                ..ModeChanges::default()
+            };
+            AxisParameters { law: first, mode_changes, ..parameters() }.validate()
+        };
+        assert_eq!(other_modes(ControlLaw::Position, &[velocity], 1), Ok(()));
+        for (first, laws, timeout_cycles) in [
+            (ControlLaw::Position, [ControlLaw::Position].as_slice(), 1),
+            (ControlLaw::Position, &[velocity, velocity], 1),
+            (ControlLaw::Position, &[ControlLaw::ProfileVelocity], 1),
+            (ControlLaw::ProfilePosition, &[velocity], 1),
+            (ControlLaw::Position, &[velocity], 0),
+        ] {
+            let refused = other_modes(first, laws, timeout_cycles);
+            assert!(matches!(refused, Err(AxisParametersError::OtherMode { .. })), "{laws:?}");
+        }
         for bad in [f64::NAN, 0.0, -0.1] {
             let error = error_of(|axis| axis.following_error_limit = bad);
             assert!(matches!(error, AxisParametersError::FollowingErrorLimit { .. }));

@@ -48,6 +48,11 @@ impl Axis {
             && self.following.error().abs() <= self.parameters.following_error_limit
     }
 
+    /// Whether the joint has been reported to stand for some cycles.
+    pub fn is_at_rest(&self) -> bool {
+        self.joint.is_settled()
+    }
+
     /// Whether the joint is reported to stand.
     pub(super) fn is_standing(&self) -> bool {
         self.joint.is_standing(self.parameters.limits.velocity)

@@ -38,6 +38,12 @@ impl TorqueLoop {
         self.demand = demand;
     }
 
+    /// The loop begins to drive a joint that stands, with a torque that is fed forward from the first command on.
+    pub(super) fn begin_holding(&mut self, torque: f64) {
+        let demand = TorqueDemand::Law { torque };
+        *self = Self { demand, commanded: demand, offset: 0.0, torque, is_resumed: false };
+    }
+
     /// The set-point begins anew: whatever the loop makes of that, the torque goes on from where it was.
     pub(super) fn resume(&mut self) {
         self.is_resumed = true;

@@ -154,6 +154,9 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             let is_faulted = axis.drive_state().is_faulted();
             let reset_word = if is_faulted { self.fault_reset_word() } else { None };
             axis.command(self.goal_of(axis, shared), reset_word);
+            if self.has_other_modes {
+                axis.command_other_modes();
+            }
             for frame in axis.frames() {
                 shared.dropped += u64::from(batch.try_push(frame).is_err());
             }

@@ -3,7 +3,7 @@
 use super::Engine;
 use super::group::{Group, GroupContext};
 use super::shared::Shared;
-use super::state::{GroupState, PowerRemoval};
+use super::state::{AtRest, GroupState, PowerRemoval};
 use crate::axis::Axis;
 use crate::control::ControlLaw;
 use crate::fault::Fault;
@@ -216,8 +216,14 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     fn carry_out(&mut self, category: StopCategory) {
+        // Nothing moves: only what takes the power ends a change of the mode.
+        if matches!(self.group.state, GroupState::ChangingMode(AtRest::Holding))
+            && category < StopCategory::Two
+        {
+            self.cancel_mode_change(AtRest::Holding);
+        }
         match (&self.group.state, category) {
-            (GroupState::Passive | GroupState::Disabled, _) => {}
+            (GroupState::Passive | GroupState::Disabled | GroupState::ChangingMode(_), _) => {}
             // While the power goes, the set-points go on to rest at the limits: a drive that is slow to obey
             // gets no step. Without a trajectory to rest they stay where they are.
             (_, StopCategory::Zero) => self.remove_power_now(),

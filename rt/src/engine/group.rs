@@ -28,6 +28,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) places: Range<usize>,
     /// The buses that concern it.
     pub(super) buses: BitSet,
+    /// Whether the mode of any of its axes may be changed.
+    pub(super) has_other_modes: bool,
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.
     pub(super) stream: StreamSample<AXES>,
@@ -67,6 +69,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             motion: GroupTrajectory::new(places.clone()),
             places,
             buses,
+            has_other_modes: false,
             state: GroupState::Passive,
             stream: StreamSample::default(),
             callback_ns: None,

@@ -4,7 +4,7 @@ use super::encode::FAULT_RESET_CYCLES;
 use super::group::GroupContext;
 use super::requests::{Handled, require_phase};
 use super::shared::Ending;
-use super::state::{GroupState, PowerRemoval, Stream};
+use super::state::{AtRest, GroupState, PowerRemoval, Stream};
 use super::targets::{Rejection, check_profile_target, check_scales, check_target};
 use crate::axis::Axis;
 use crate::control::ControlLaw;
@@ -36,6 +36,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 self.require_phase(&[Phase::Holding, Phase::Moving])?;
                 self.require_no_fault()
             }
+            Request::ChangeMode(change) => self.check_mode_change(change),
             Request::Stream => self.check_stream(),
             Request::Disable if matches!(self.group.state, GroupState::Passive) => {
                 Err(RejectReason::Phase.into())
@@ -52,6 +53,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             Request::Enable => self.begin_enabling(),
             Request::Move(parameters) => self.begin_move(id, parameters)?,
             Request::SetProfileTarget(target) => self.set_profile_target(id, target)?,
+            Request::ChangeMode(change) => self.begin_mode_change(id, change),
             Request::Stream => self.begin_stream(),
             Request::Stop(category) => self.begin_stop(StopCause::Requested, Origin::Group, *category),
             Request::Disable => self.begin_disabling(),
@@ -71,6 +73,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     pub(super) fn require_phase(&self, possible: &[Phase]) -> Handled {
+        if matches!(self.group.state, GroupState::ChangingMode(_)) {
+            return Err(RejectReason::ModeChanging.into());
+        }
         require_phase(self.group.state.phase(), possible)
     }
 
@@ -220,7 +225,13 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     fn begin_disabling(&mut self) {
         match self.group.state {
-            GroupState::Passive | GroupState::Disabled | GroupState::Disabling(_) => {}
+            GroupState::Passive
+            | GroupState::Disabled
+            | GroupState::ChangingMode(AtRest::Disabled)
+            | GroupState::Disabling(_) => {}
+            GroupState::ChangingMode(AtRest::Holding) => {
+                self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::One);
+            }
             _ if self.must_come_to_rest() || matches!(self.group.state, GroupState::Stopping) => {
                 self.begin_stop(StopCause::Requested, Origin::Group, StopCategory::One);
             }

@@ -12,12 +12,13 @@
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
 //! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases), `streaming` those
-//!   of a stream, `executing` those of a trajectory, `in_loop` those of a callback;
+//!   of a stream, `executing` those of a trajectory, `in_loop` those of a callback; `changing_mode` changes modes of operation;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
 mod backlog;
+mod changing_mode;
 mod encode;
 mod executing;
 mod faults;
@@ -133,6 +134,7 @@ pub enum Deadline {
 ///     dialect: Dialect::Cia402,
 ///     controlword_spacing_cycles: 0,
 ///     law: ControlLaw::Position,
+///     mode_changes: ModeChanges::default(),
 ///     scale: Scale::new(ScaleParameters {
 ///         counts_per_turn: 524_288.0,
 ///         velocity_units_per_turn: 524_288.0,
@@ -238,7 +240,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         for (number, axes) in (0..).zip(parameters.axes_of_groups()) {
             let places = first..first + axes.len();
             first = places.end;
-            groups.push(Group::new(number, places, parameters.buses_of(&axes)));
+            let mut group = Group::new(number, places, parameters.buses_of(&axes));
+            let mut own = axes.iter().filter_map(|axis| parameters.axes.get(usize::from(*axis)));
+            group.has_other_modes = own.any(|axis| !axis.mode_changes.laws.is_empty());
+            groups.push(group);
         }
         for (group, own) in groups.iter_mut().zip(&parameters.groups) {
             group.stops_with = own.stops_with.clone();

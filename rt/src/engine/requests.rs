@@ -76,6 +76,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             | Request::Enable
             | Request::Move(_)
             | Request::SetProfileTarget(_)
+            | Request::ChangeMode(_)
             | Request::Stream
             | Request::Stop(_)
             | Request::Disable
@@ -182,7 +183,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             (
                 None,
                 _,
-                Request::Move(_) | Request::Stream | Request::Execute { .. } | Request::RunCallback(_),
+                Request::Move(_)
+                | Request::ChangeMode(_)
+                | Request::Stream
+                | Request::Execute { .. }
+                | Request::RunCallback(_),
             ) if groups > 1 => Err(RejectReason::GroupNotNamed { groups }.into()),
             (None, ..) => Ok(0..groups),
         }

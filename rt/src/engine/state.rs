@@ -5,10 +5,12 @@
 //! ─────────  ──────────────────────────────────────────────────────────────────────  ─────────────────────
 //! Passive    Request::Activate                                                       Disabled
 //! Disabled   Request::Enable                                                         Enabling
+//!            Request::ChangeMode                                                     Disabled, changing mode
 //! Enabling   every drive shows operation enabled                                     Holding
 //!            a stop, Request::Disable                                                Disabling
 //! Holding    Request::Move, Request::SetProfileTarget, Request::Execute              Moving
 //!            Request::Stream, Request::RunCallback                                   Streaming
+//!            Request::ChangeMode                                                     Holding, changing mode
 //!            Request::Disable, a stop of category 1 or 0                             Stopping, Disabling
 //! Moving     the targets are reached                                                 Holding
 //!            Request::Disable, a stop                                                Stopping, Disabling (0)
@@ -19,7 +21,8 @@
 //! Disabling  no drive shows torque any more, or the patience is over                 Disabled
 //! ```
 //!
-//! A number in brackets is a stop category of IEC 60204-1.
+//! A number in brackets is a stop category of IEC 60204-1. While a group changes its mode it is shown in the phase that it has come
+//! from and goes back to. It does nothing else then but stop and be disabled.
 
 use super::executing::Execution;
 use super::in_loop::InLoop;
@@ -37,6 +40,8 @@ pub(super) enum GroupState<const AXES: usize> {
     Disabled,
     Enabling,
     Holding,
+    /// Drives are told another mode of operation and have not shown it yet.
+    ChangingMode(AtRest),
     Moving {
         /// Whether the end of the motion has been reported; a velocity or a torque goes on after that.
         is_reported: bool,
@@ -48,6 +53,15 @@ pub(super) enum GroupState<const AXES: usize> {
     InLoop(InLoop),
     Stopping,
     Disabling(PowerRemoval),
+}
+
+/// The phase in which a group changes its mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum AtRest {
+    /// Without power.
+    Disabled,
+    /// Enabled, every joint at rest.
+    Holding,
 }
 
 /// How far a stream has come.
@@ -77,9 +91,9 @@ impl<const AXES: usize> GroupState<AXES> {
     pub(super) const fn phase(&self) -> Phase {
         match self {
             Self::Passive => Phase::Passive,
-            Self::Disabled => Phase::Disabled,
+            Self::Disabled | Self::ChangingMode(AtRest::Disabled) => Phase::Disabled,
             Self::Enabling => Phase::Enabling,
-            Self::Holding => Phase::Holding,
+            Self::Holding | Self::ChangingMode(AtRest::Holding) => Phase::Holding,
             Self::Moving { .. } | Self::Executing(_) => Phase::Moving,
             Self::Streaming(_) | Self::InLoop(_) => Phase::Streaming,
             Self::Stopping => Phase::Stopping,
@@ -90,10 +104,14 @@ impl<const AXES: usize> GroupState<AXES> {
     /// Where the drives are led.
     pub(super) const fn goal(&self) -> Goal {
         match self {
-            Self::Passive | Self::Disabled | Self::Disabling(PowerRemoval::Shutdown) => Goal::Disabled,
+            Self::Passive
+            | Self::Disabled
+            | Self::ChangingMode(AtRest::Disabled)
+            | Self::Disabling(PowerRemoval::Shutdown) => Goal::Disabled,
             Self::Disabling(PowerRemoval::DisableVoltage) => Goal::NoVoltage,
             Self::Enabling
             | Self::Holding
+            | Self::ChangingMode(AtRest::Holding)
             | Self::Moving { .. }
             | Self::Executing(_)
             | Self::Streaming(_)
@@ -112,6 +130,6 @@ impl<const AXES: usize> GroupState<AXES> {
 
     /// Whether a drive may have torque.
     pub(super) const fn has_power(&self) -> bool {
-        !matches!(self, Self::Passive | Self::Disabled)
+        !matches!(self, Self::Passive | Self::Disabled | Self::ChangingMode(AtRest::Disabled))
     }
 }

@@ -103,6 +103,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         match self.group.state {
             GroupState::Passive => {}
             GroupState::Disabled | GroupState::Holding => self.hold(),
+            GroupState::ChangingMode(at) => self.step_mode_change(at)?,
             GroupState::Enabling => self.step_enabling(),
             GroupState::Moving { is_reported } => self.step_move(is_reported)?,
             GroupState::Executing(execution) => self.step_execution(&execution)?,

@@ -26,6 +26,9 @@ pub fn whole(check: &Check, config: &Config) -> String {
     }
     let axes = alike(&check.axes, is_shown_alike);
     let _ = write!(text, "\nLimits\n{}", limits_table(&axes));
+    if let Some(table) = modes_table(&axes) {
+        let _ = write!(text, "\nModes of operation\n{table}");
+    }
     if let Some(table) = torque_table(&axes) {
         let _ = write!(text, "\nTorque that streams may ask for\n{table}");
     }
@@ -194,6 +197,22 @@ fn torque_table(axes: &[&[AxisCheck]]) -> Option<Table> {
         ]);
     }
     has_rows.then_some(table)
+}
+
+/// The axes whose mode may be changed at run time; `None` without one.
+fn modes_table(axes: &[&[AxisCheck]]) -> Option<Table> {
+    let mut table = Table::new(["axis", "starts in", "may be changed to", "when"]);
+    let changing = axes.iter().filter_map(|group| Some((group, group.first()?)));
+    let changing: Vec<_> = changing.filter(|(_, axis)| !axis.other_modes.is_empty()).collect();
+    for (group, axis) in &changing {
+        table.row([
+            counted_span(group.iter().map(|axis| axis.name.as_str())),
+            axis.mode.to_owned(),
+            axis.other_modes.join(", "),
+            axis.mode_change.unwrap_or_default().to_owned(),
+        ]);
+    }
+    (!changing.is_empty()).then_some(table)
 }
 
 fn units_table(axes: &[&[AxisCheck]]) -> Table {

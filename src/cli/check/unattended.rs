@@ -28,11 +28,27 @@ pub enum Unattended {
 }
 
 impl Unattended {
-    /// The worst case: at full speed (with a torque: in full acceleration), with the last heartbeat just sent, and a drive that
-    /// brakes with the deceleration limit.
+    /// The worst case: in the worst of its modes, at full speed (with a torque: in full acceleration), with the last heartbeat just
+    /// sent, and a drive that brakes with the deceleration limit.
     pub fn of(axis: &Axis, config: &Config) -> Self {
+        let worst = axis.other_modes.iter().map(|control| Self::in_mode(control, axis, config));
+        worst.fold(Self::in_mode(&axis.control, axis, config), |worst, other| {
+            if other.travel() > worst.travel() { other } else { worst }
+        })
+    }
+
+    /// How far it goes.
+    const fn travel(&self) -> f64 {
+        match self {
+            Self::EndsItsMove => 0.0,
+            Self::HoldsLastSetPoint { travel } | Self::GoesOn { travel, .. } => *travel,
+            Self::GoesOnForEver => f64::INFINITY,
+        }
+    }
+
+    fn in_mode(control: &Control, axis: &Axis, config: &Config) -> Self {
         let (limits, master) = (&axis.limits, &config.master);
-        match axis.control {
+        match *control {
             Control::Position | Control::Interpolated => {
                 let cycle_s = config.bus_cycle(axis.bus).period_ns as f64 / 1e9;
                 Self::HoldsLastSetPoint { travel: axis.following_error.limit + limits.velocity * cycle_s }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use takt_rt::MAX_AXES;
 
 use super::bus::ReadBus;
-use super::control::control;
+use super::control::modes;
 use super::entry::Entry;
 use super::limits::{following_error, limits};
 use super::machine::{boolean, heartbeat, node};
@@ -135,9 +135,11 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         let is_simulated = interface == Some(&Interface::Simulated);
         Surroundings::new(period_ns, transmission_type, joint.inertia(), is_simulated)
     });
-    let (control, compliance) = control(&mut section, drive, q, &joint, surroundings.as_ref()).unzip();
-    if let (Some(control), Some(surroundings)) = (control, &surroundings) {
-        rules::axis::joint(control, &joint, surroundings.is_simulated(), |key| joint_section.spot(key));
+    let modes = modes(&mut section, drive, q, &joint, surroundings.as_ref());
+    let control = modes.as_ref().map(|modes| modes.control);
+    if let (Some(modes), Some(surroundings)) = (&modes, &surroundings) {
+        let is_simulated = surroundings.is_simulated();
+        rules::axis::joint(&modes.all(), &joint, is_simulated, |key| joint_section.spot(key));
     }
     joint_section.finish();
     if drive == Some(DriveFamily::YzAim) {
@@ -172,25 +174,27 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let place = bus.zip(node);
     let build = || {
         let (bus, node) = place?;
-        let (travel, control, counting) = (travel?, control?, counting?);
+        let (travel, modes, counting) = (travel?, modes?, counting?);
+        let controls = modes.all();
         Some(Axis {
             name: name.clone()?,
             bus,
             node,
             drive: drive?,
-            control,
+            control: modes.control,
+            other_modes: modes.others,
             travel,
             counts_per_turn: counting.counts_per_turn,
             gear_ratio: counting.gear_ratio,
             reversed: counting.reversed,
             zero_counts: counting.zero_counts,
             limits: limits?,
-            compliance: compliance?,
+            compliance: modes.compliance,
             feed_forward,
             following_error,
             start_tolerance: start_tolerance.unwrap_or(defaults::start_tolerance(travel)),
             target_tolerance: target_tolerance
-                .unwrap_or_else(|| defaults::target_tolerance(travel, &control)),
+                .unwrap_or_else(|| defaults::target_tolerance(travel, &controls)),
             follow: follow.unwrap_or_default(),
             missed_feedback_cycles: missed
                 .and_then(|cycles| u16::try_from(cycles).ok())

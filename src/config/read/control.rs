@@ -7,20 +7,36 @@ use crate::config::model::{Compliance, Control, DriveFamily, Joint};
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
+use crate::config::rules;
 use crate::config::rules::loops::{self, Origin, Surroundings, TorqueLoop};
 use crate::drive::yz_aim;
 
-/// The mode, with the gains of the loop that it needs. The gains of the other loops are read and not used, so that the mode
-/// can be changed in one line. Without the surroundings, whose period could not be read, no loop is judged.
-///
-/// With it comes what a source may ask of the torque loop.
-pub fn control(
+/// How an axis is commanded.
+pub struct Modes {
+    /// The mode that it starts in, with the gains of the loop that it needs.
+    pub control: Control,
+    /// Those that it may be changed to.
+    pub others: Vec<Control>,
+    /// What a source may ask of the torque loop.
+    pub compliance: Compliance,
+}
+
+impl Modes {
+    /// All of them.
+    pub fn all(&self) -> Vec<Control> {
+        std::iter::once(self.control).chain(self.others.clone()).collect()
+    }
+}
+
+/// The modes. The gains of loops that none of them needs are read and not used, so that the mode can be changed in one line.
+/// Without the surroundings, whose period could not be read, no loop is judged.
+pub fn modes(
     section: &mut Section<'_>,
     drive: Option<DriveFamily>,
     q: Quantities,
     joint: &Joint,
     surroundings: Option<&Surroundings>,
-) -> Option<(Control, Compliance)> {
+) -> Option<Modes> {
     let period_s =
         surroundings.map_or(defaults::PERIOD_NS, |surroundings| surroundings.period_ns) as f64 / 1e9;
     let mut velocity_section = section.section("velocity_loop");
@@ -46,18 +62,20 @@ pub fn control(
         (Some(entry), _) => entry.choice(&modes).flatten(),
         (None, drive) => Some(drive.map_or(Control::Position, defaults::control)),
     };
-    if let Some(surroundings) = surroundings {
-        match control {
-            Some(Control::Velocity { position_gain }) => {
+    let others = others(section, drive, control, &modes);
+    for law in control.iter().chain(&others) {
+        let Some(surroundings) = surroundings else { break };
+        match *law {
+            Control::Velocity { position_gain } => {
                 loops::velocity_loop(&velocity_section.spot("position_gain"), position_gain, surroundings);
             }
-            Some(law @ Control::Torque { stiffness, damping, inertia, .. }) => {
+            Control::Torque { stiffness, damping, inertia, .. } => {
                 let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia() };
                 let origin = origin.unwrap_or(Origin::Gains);
                 gains.check(q, surroundings, |key| torque_section.spot(key), origin);
                 if asked.has_gains() {
                     // The stiffest spring that a stream may ask for must not swing either.
-                    let Compliance { stiffness_max, damping_max, .. } = asked.of(&law);
+                    let Compliance { stiffness_max, damping_max, .. } = asked.of(&[*law]);
                     let gains = TorqueLoop { stiffness: stiffness_max, damping: damping_max, ..gains };
                     let at = |key| torque_section.spot(AskedCompliance::key_of(key));
                     gains.check(q, surroundings, at, Origin::Gains);
@@ -68,7 +86,41 @@ pub fn control(
     }
     velocity_section.finish();
     torque_section.finish();
-    control.map(|control| (control, asked.of(&control)))
+    let control = control?;
+    let controls: Vec<Control> = std::iter::once(control).chain(others.clone()).collect();
+    Some(Modes { control, others, compliance: asked.of(&controls) })
+}
+
+/// The modes that the axis may be changed to, without the one that it starts in. A loop whose gains are wrong is left out: they have
+/// been reported.
+fn others(
+    section: &mut Section<'_>,
+    drive: Option<DriveFamily>,
+    control: Option<Control>,
+    modes: &[(&'static str, Option<Control>)],
+) -> Vec<Control> {
+    let Some(entry) = section.get("modes") else { return vec![] };
+    if let (Some(drive), Some(control)) = (drive, control)
+        && !rules::axis::has_other_modes(&entry.spot, drive, control)
+    {
+        return vec![];
+    }
+    let own = control.map(|control| control.operation_mode());
+    let mut seen = vec![];
+    let mut others = vec![];
+    for entry in entry.list().into_iter().flatten() {
+        let Some(mode) = entry.choice(&rules::axis::CHANGEABLE_MODES) else { continue };
+        let of_mode = modes.iter().find(|(word, _)| entry.is_word(word));
+        if seen.contains(&mode) {
+            rules::axis::repeated_mode(&entry.spot, mode);
+        } else if let Some((_, Some(law))) = of_mode
+            && own != Some(mode)
+        {
+            others.push(*law);
+        }
+        seen.push(mode);
+    }
+    others
 }
 
 /// The limits of what a source may ask of the torque loop, as far as the file gives them.
@@ -106,8 +158,8 @@ impl AskedCompliance {
         }
     }
 
-    fn of(&self, control: &Control) -> Compliance {
-        let default = defaults::compliance(control);
+    fn of(&self, controls: &[Control]) -> Compliance {
+        let default = defaults::compliance(controls);
         Compliance {
             stiffness_max: self.stiffness_max.unwrap_or(default.stiffness_max),
             damping_max: self.damping_max.unwrap_or(default.damping_max),

@@ -1,6 +1,6 @@
 //! The axes.
 
-use takt_rt::MAX_AXES;
+use takt_rt::{MAX_AXES, OperationMode};
 
 use super::loops::Surroundings;
 use super::{Fields, limits, loops, master, name, simulation};
@@ -126,8 +126,12 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
     let is_simulated = config.buses.get(axis.bus).is_some_and(|bus| bus.interface == Interface::Simulated);
     let surroundings =
         Surroundings::new(period_ns, axis.transmission_type, axis.joint.inertia(), is_simulated);
-    loops::validate(axis.control, q, axis.joint.inertia(), &surroundings, fields);
-    joint(axis.control, &axis.joint, is_simulated, |key| fields.within("joint").at(key));
+    for control in axis.controls() {
+        loops::validate(*control, q, axis.joint.inertia(), &surroundings, fields);
+    }
+    let controls: Vec<Control> = axis.controls().copied().collect();
+    joint(&controls, &axis.joint, is_simulated, |key| fields.within("joint").at(key));
+    validate_other_modes(axis, &fields.at("modes"));
 }
 
 fn validate_joint(joint: &Joint, q: Quantities, fields: &Fields<'_>) {
@@ -147,8 +151,13 @@ fn validate_joint(joint: &Joint, q: Quantities, fields: &Fields<'_>) {
 
 /// The torque loop of CST feeds the joint's mechanics forward. On a real bus they are those of a real joint, and no default
 /// suits it.
-pub fn joint<'a>(control: Control, joint: &Joint, is_simulated: bool, at: impl Fn(&'static str) -> Spot<'a>) {
-    if is_simulated || !matches!(control, Control::Torque { .. }) {
+pub fn joint<'a>(
+    controls: &[Control],
+    joint: &Joint,
+    is_simulated: bool,
+    at: impl Fn(&'static str) -> Spot<'a>,
+) {
+    if is_simulated || !controls.iter().any(|control| matches!(control, Control::Torque { .. })) {
         return;
     }
     let needed = [
@@ -209,6 +218,49 @@ fn mode(spot: &Spot<'_>, drive: DriveFamily, control: Control) {
         let allowed = "a mode of YZ-AIM drives: \"ip\", \"pp\" or \"pv\"".to_owned();
         spot.report_range(format!("{:?}", control.operation_mode()), allowed);
     }
+}
+
+/// The modes that an axis may be changed to at run time, by their words.
+pub const CHANGEABLE_MODES: [(&str, OperationMode); 3] = [
+    ("csp", OperationMode::CyclicSynchronousPosition),
+    ("csv", OperationMode::CyclicSynchronousVelocity),
+    ("cst", OperationMode::CyclicSynchronousTorque),
+];
+
+fn validate_other_modes(axis: &Axis, spot: &Spot<'_>) {
+    if axis.other_modes.is_empty() || !has_other_modes(spot, axis.drive, axis.control) {
+        return;
+    }
+    let mut seen = vec![axis.control.operation_mode()];
+    for control in &axis.other_modes {
+        let mode = control.operation_mode();
+        if !control.is_cyclic_synchronous() {
+            spot.report_range(format!("{mode:?}"), "\"csp\", \"csv\" or \"cst\"".to_owned());
+        } else if seen.contains(&mode) {
+            repeated_mode(spot, mode);
+        }
+        seen.push(mode);
+    }
+}
+
+/// Whether a drive that starts like this can be changed to other modes; reports it if not.
+pub fn has_other_modes(spot: &Spot<'_>, drive: DriveFamily, control: Control) -> bool {
+    let (given, allowed) = if drive.mode_condition().is_none() {
+        let given = "given for a YZ-AIM";
+        (given, "left out: no object 6061 shows its mode, and it interpolates only with 2619h = 7 stored")
+    } else if !control.is_cyclic_synchronous() {
+        let given = "given for an axis in another mode than \"csp\", \"csv\" or \"cst\"";
+        (given, "left out, or `mode` one of them: only they change without a bump")
+    } else {
+        return true;
+    };
+    spot.report_range(given.to_owned(), allowed.to_owned());
+    false
+}
+
+pub fn repeated_mode(spot: &Spot<'_>, mode: OperationMode) {
+    let word = CHANGEABLE_MODES.iter().find(|(_, own)| *own == mode).map_or("", |(word, _)| word);
+    spot.report(ProblemKind::Repeated { key: spot.key.clone(), given: word.to_owned() });
 }
 
 /// A YZ-AIM interpolates from target to target in 2 ms (manual, 5.10.3).

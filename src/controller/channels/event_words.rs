@@ -1,7 +1,8 @@
 //! The layout of an event in 64-bit words.
 
 use takt_rt::{
-    Event, EventKind, Phase, RejectReason, RequestError, RequestId, RequestKind, StreamState, TimingLevel,
+    Event, EventKind, OperationMode, Phase, RejectReason, RequestError, RequestId, RequestKind, StreamState,
+    TimingLevel,
 };
 
 use super::latest::Words;
@@ -20,6 +21,7 @@ const MISSED_SLOTS: u8 = 6;
 const TIMING: u8 = 7;
 const REJECTED: u8 = 8;
 const STREAM: u8 = 9;
+const MODE: u8 = 10;
 
 pub fn put_event(event: &Event, words: &mut Words<'_>) {
     words.put(event.slot);
@@ -42,6 +44,7 @@ pub fn put_event(event: &Event, words: &mut Words<'_>) {
             let [low, high] = statusword.to_le_bytes();
             put_kind(DRIVE_STATE, [*axis, *state as u8, low, high, 0]);
         }
+        EventKind::Mode { axis, mode } => put_kind(MODE, [*axis, *mode as u8, 0, 0, 0]),
         EventKind::Emergency { axis, code, register, manufacturer: [a, b, c, d, e] } => {
             let [low, high] = code.to_le_bytes();
             put_kind(EMERGENCY, [*axis, low, high, *register, 0]);
@@ -77,6 +80,7 @@ pub fn take_event(words: &mut Words<'_>) -> Event {
             let manufacturer = [m0, m1, m2, m3, m4];
             EventKind::Emergency { axis: a, code: u16::from_le_bytes([b, c]), register: d, manufacturer }
         }
+        MODE => EventKind::Mode { axis: a, mode: OperationMode::from_number(b as i8).unwrap_or(NO_MODE) },
         MISSED_SLOTS => EventKind::MissedSlots { count: words.take() },
         STREAM => {
             EventKind::Stream { state: StreamState::ALL.get(usize::from(a)).copied().unwrap_or_default() }
@@ -88,6 +92,9 @@ pub fn take_event(words: &mut Words<'_>) -> Event {
     };
     Event { slot, at_ns, group: group.checked_sub(1), kind }
 }
+
+/// In place of a mode that was overwritten while it was read.
+const NO_MODE: OperationMode = OperationMode::CyclicSynchronousPosition;
 
 /// In place of a rejection that was overwritten while it was read.
 const NO_REJECTION: RequestError = RequestError {
@@ -109,6 +116,7 @@ mod tests {
         let phases = || prop::sample::select(&Phase::ALL[..]);
         let states = prop::sample::select(&DriveState::ALL[..]);
         let streams = prop::sample::select(&StreamState::ALL[..]);
+        let modes = prop::sample::select(&OperationMode::ALL[..]);
         let levels = prop::sample::select(&TimingLevel::ALL[..]);
         prop_oneof![
             (phases(), phases()).prop_map(|(from, to)| EventKind::PhaseChanged { from, to }),
@@ -125,6 +133,7 @@ mod tests {
             any::<u64>().prop_map(|count| EventKind::MissedSlots { count }),
             streams.prop_map(|state| EventKind::Stream { state }),
             levels.prop_map(|level| EventKind::Timing { level }),
+            (any::<u8>(), modes).prop_map(|(axis, mode)| EventKind::Mode { axis, mode }),
             rejections().prop_map(EventKind::Rejected),
         ]
     }

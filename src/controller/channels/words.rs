@@ -57,6 +57,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         torque: None,
         current_per_mille: None,
         mode: None,
+        mode_set: 0,
         statusword: 0,
         drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
@@ -268,7 +269,8 @@ fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
     let mode = u64::from(axis.mode.unwrap_or_default() as u8) << 32;
     let are_reported = [axis.torque.is_some(), axis.current_per_mille.is_some(), axis.mode.is_some()];
     let reported = are_reported.iter().rev().fold(0, |bits, is_reported| bits << 1 | u64::from(*is_reported));
-    words.put(u64::from(axis.feedback_age) | current | mode | reported << 40);
+    let mode_set = u64::from(axis.mode_set as u8) << 48;
+    words.put(u64::from(axis.feedback_age) | current | mode | reported << 40 | mode_set);
     words.put(axis.feedback_slot);
     words.put(axis.feedback_ns);
 }
@@ -288,6 +290,7 @@ fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
         torque: is_reported(0).then_some(torque),
         current_per_mille: is_reported(1).then_some((reported >> 16) as i16),
         mode: is_reported(2).then_some((reported >> 32) as i8),
+        mode_set: (reported >> 48) as i8,
         statusword: packed as u16,
         drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
@@ -394,11 +397,13 @@ pub(super) mod tests {
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
         let states = prop::sample::select(&DriveState::ALL[..]);
-        let reported = any::<(Option<f64>, Option<i16>, Option<i8>, u16, u16, bool, u16, u16, [u64; 2])>();
+        let reported =
+            any::<(Option<f64>, Option<i16>, (Option<i8>, i8), u16, u16, bool, u16, u16, [u64; 2])>();
         (any::<[f64; 6]>(), reported, states).prop_map(|(numbers, reported, drive_state)| {
             let [position_set, velocity_set, torque_set, position, velocity, following_error] = numbers;
-            let (torque, current_per_mille, mode, statusword, error_code, is_heard, unanswered, age, at) =
+            let (torque, current_per_mille, modes, statusword, error_code, is_heard, unanswered, age, at) =
                 reported;
+            let (mode, mode_set) = modes;
             AxisSnapshot {
                 position_set,
                 velocity_set,
@@ -409,6 +414,7 @@ pub(super) mod tests {
                 torque,
                 current_per_mille,
                 mode,
+                mode_set,
                 statusword,
                 drive_state,
                 error_code,

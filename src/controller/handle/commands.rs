@@ -3,15 +3,15 @@
 use std::time::Duration;
 
 use takt_rt::{
-    Answer, ControlLaw, MAX_AXES, Move, ProfileMove, ProfileTarget, Request, RequestId, RequestTarget,
-    Snapshot, StopCategory,
+    Answer, AxisSnapshot, ControlLaw, MAX_AXES, ModeChange, Move, OperationMode, ProfileMove, ProfileTarget,
+    Request, RequestId, RequestTarget, Snapshot, StopCategory,
 };
 
 use super::Handle;
 use super::error::{CommandError, Refused};
 use super::motion::{MotionId, MoveOptions};
 use super::waiting::now_ns;
-use crate::config::Axis;
+use crate::config::{Axis, Control};
 use crate::controller::channels::{MotionEnd, WAITING_AT_MOST};
 
 impl Handle {
@@ -85,6 +85,71 @@ impl Handle {
         let own = self.axis(axis, ControlLaw::ProfileTorque, "profile torque, mode = \"pt\"")?;
         within(own, torque, -own.limits.torque, own.limits.torque)?;
         self.set_profile_target(axis, ProfileTarget::Torque(torque), valid_for)
+    }
+
+    /// Changes the mode of operation of every axis, as far as `modes` of the configuration allow. An axis that is in it already stays.
+    ///
+    /// The axes keep their places. A drive that takes another mode only while it is disabled, as an eRob, must be disabled before
+    /// ([`Handle::disable`]), and enabled again after that. [`Handle::wait`] returns when the drives show the new mode. Until then
+    /// nothing else is possible but to stop and to disable, which ends the change. Of a stop of category 2, which leaves the change
+    /// under way, the wait tells as well. A drive that does not show the mode in time is a fault, which must be reset, and is told its
+    /// former mode again.
+    ///
+    /// With several groups, each changes by [`GroupHandle::change_mode`](super::GroupHandle::change_mode).
+    ///
+    /// ```no_run
+    /// # fn example(arm: &takt::Handle) -> takt::Result {
+    /// use std::time::Duration;
+    /// use takt::{OperationMode, Phase};
+    ///
+    /// let patience = Duration::from_secs(5);
+    /// arm.disable()?;
+    /// arm.wait_for(Phase::Disabled, patience)?;
+    /// let change = arm.change_mode(OperationMode::CyclicSynchronousVelocity)?;
+    /// arm.wait(change, patience)?;
+    /// arm.enable()?;
+    /// # Ok(())
+    /// # }
+    /// ```
+    ///
+    /// # Errors
+    /// [`CommandError::Full`], [`CommandError::Ended`]. That the change is refused says [`Handle::wait`].
+    pub fn change_mode(&self, mode: OperationMode) -> Result<MotionId, CommandError> {
+        let axes: Vec<usize> = (0..self.axes().len()).collect();
+        self.change_modes(RequestTarget::All, &axes, mode)
+    }
+
+    /// As [`Handle::change_mode`], for one axis. The others of its group hold, or stay disabled, meanwhile.
+    ///
+    /// # Errors
+    /// [`CommandError::NoSuchAxis`], and as [`Handle::change_mode`].
+    pub fn change_axis_mode(&self, axis: usize, mode: OperationMode) -> Result<MotionId, CommandError> {
+        if axis >= self.axes().len() {
+            return Err(CommandError::NoSuchAxis { axis, axes: self.axes().len() });
+        }
+        self.change_modes(self.group_of(axis), &[axis], mode)
+    }
+
+    /// Changes the mode of these axes, which are of the group that is asked.
+    pub(super) fn change_modes(
+        &self,
+        group: RequestTarget,
+        axes: &[usize],
+        mode: OperationMode,
+    ) -> Result<MotionId, CommandError> {
+        let mut modes = [None; MAX_AXES];
+        for axis in axes {
+            if let Some(own) = modes.get_mut(*axis) {
+                *own = Some(mode);
+            }
+        }
+        self.begin_motion(group, Request::ChangeMode(ModeChange { modes }))
+    }
+
+    /// How an axis is commanded at present, by a state.
+    pub(super) fn present_control(axis: &Axis, shown: &AxisSnapshot) -> Control {
+        let present = axis.controls().find(|control| control.operation_mode() as i8 == shown.mode_set);
+        *present.unwrap_or(&axis.control)
     }
 
     /// Requests a stop of this category, and returns at once. A stop is never refused. The real-time thread takes it in its next cycle. It

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use takt_rt::{CallbackCycle, GroupSnapshot, Phase, Request, RequestTarget, StopCategory};
+use takt_rt::{CallbackCycle, GroupSnapshot, OperationMode, Phase, Request, RequestTarget, StopCategory};
 
 use super::Handle;
 use super::error::{CommandError, WaitError};
@@ -101,6 +101,14 @@ impl GroupHandle {
         callback: impl FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send + 'static,
     ) -> Result<CallbackHandle, CommandError> {
         self.handle.lead_in_loop((self.target(), self.number), &self.axes, options, callback)
+    }
+
+    /// As [`Handle::change_mode`], for the axes of the group. [`Handle::change_axis_mode`] changes one of them.
+    ///
+    /// # Errors
+    /// See [`Handle::change_mode`].
+    pub fn change_mode(&self, mode: OperationMode) -> Result<MotionId, CommandError> {
+        self.handle.change_modes(self.target(), &self.axes, mode)
     }
 
     /// As [`Handle::stop`]; it discards the waiting requests for this group, and for all of them.

@@ -7,7 +7,7 @@ use takt_rt::{Answer, MotionState, RequestId, RequestTarget, Snapshot};
 use super::Handle;
 use super::error::{MotionError, Refused, Stopped, WaitError};
 
-/// Identifies a motion, for [`Handle::wait`].
+/// Identifies a motion, or a change of the mode, for [`Handle::wait`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MotionId {
     pub(super) request: RequestId,

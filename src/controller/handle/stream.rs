@@ -1,11 +1,12 @@
 //! Streams: points stamped with the time that they are meant for, from any thread.
 
+use std::cell::OnceCell;
 use std::time::Duration;
 
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{
-    AxisPoint, Clock, GroupSnapshot, MAX_AXES, Nanoseconds, PointRole, Request, StreamPoint, StreamReport,
-    StreamState,
+    AxisPoint, Clock, GroupSnapshot, MAX_AXES, Nanoseconds, PointRole, Request, Snapshot, StreamPoint,
+    StreamReport, StreamState,
 };
 
 use super::error::CommandError;
@@ -113,9 +114,10 @@ impl StreamHandle {
         if self.handle.0.life.is_ending() {
             return Err(StreamError::Ended);
         }
+        let state = OnceCell::new();
         for (number, point) in points.iter().enumerate() {
             for (axis, entry) in point.axes.iter().enumerate().take(self.axis_count()) {
-                self.check(number, axis, entry)?;
+                self.check(number, axis, entry, &state)?;
             }
         }
         self.hand_over(points)
@@ -168,15 +170,23 @@ impl StreamHandle {
         if axes.len() != expected {
             return Err(StreamError::Count { given: axes.len(), axes: expected });
         }
+        let state = OnceCell::new();
         let mut all = [AxisPoint::default(); MAX_AXES];
         for (axis, (to, from)) in all.iter_mut().zip(axes).enumerate() {
             *to = (*from).into();
-            self.check(point, axis, to)?;
+            self.check(point, axis, to, &state)?;
         }
         Ok(all)
     }
 
-    fn check(&self, point: usize, axis: usize, entry: &AxisPoint) -> Result<(), StreamError> {
+    /// Checks an entry of a point by the mode that its axis is in: by the state, where the axis has several.
+    fn check(
+        &self,
+        point: usize,
+        axis: usize,
+        entry: &AxisPoint,
+        state: &OnceCell<Snapshot>,
+    ) -> Result<(), StreamError> {
         let number = match self.to {
             StreamTarget::All => Some(axis),
             StreamTarget::Group { number, .. } => match self.handle.groups().get(usize::from(number)) {
@@ -185,8 +195,17 @@ impl StreamHandle {
                 None => Some(axis),
             },
         };
-        let Some(of_axis) = number.and_then(|number| self.handle.axes().get(number)) else { return Ok(()) };
-        check_point(of_axis, entry).map_err(|reason| StreamError::Refused { point, axis, reason })
+        let Some((number, of_axis)) =
+            number.and_then(|number| Some((number, self.handle.axes().get(number)?)))
+        else {
+            return Ok(());
+        };
+        let shown = || state.get_or_init(|| self.handle.state()).axes.get(number);
+        let control = match of_axis.other_modes.is_empty() {
+            true => of_axis.control,
+            false => shown().map_or(of_axis.control, |shown| Handle::present_control(of_axis, shown)),
+        };
+        check_point(of_axis, &control, entry).map_err(|reason| StreamError::Refused { point, axis, reason })
     }
 }
 

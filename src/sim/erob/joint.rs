@@ -28,7 +28,17 @@ const IDLE_NS: Nanoseconds = 1_000_000;
 const MOTOR_ENCODER_RATIO: f64 = 100.0;
 /// Rated torque for one ampere, from the ratings of the 80H120I (31 N·m at 6.3 A).
 const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
+/// From a new value of 6060 until the drive is in that mode and 6061 shows it: two steps of its loops, and less than an SDO exchange. In
+/// the manual's sequences the next SDO reads the new mode.
+const MODE_CHANGE_NS: Nanoseconds = 250_000;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
+
+/// A mode that the drive is about to be in.
+#[derive(Clone, Copy, Debug)]
+struct ComingMode {
+    number: i8,
+    due_ns: Nanoseconds,
+}
 
 /// A simulated eRob joint module with CANopen firmware.
 #[derive(Clone, Debug)]
@@ -51,6 +61,7 @@ pub struct ErobJoint {
     /// A fault injected since the last advance.
     injected: Option<DriveFault>,
     defects: ErobDefects,
+    coming_mode: Option<ComingMode>,
     save_ns: Nanoseconds,
     /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
@@ -87,6 +98,7 @@ impl ErobJoint {
             has_pdo_error: false,
             injected: None,
             defects: ErobDefects::default(),
+            coming_mode: None,
             save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
@@ -145,18 +157,30 @@ impl ErobJoint {
         }
     }
 
-    /// 6061 follows 6060 while the drive is not enabled, if the unit has the mode.
+    /// 6061 follows 6060 while the drive has no torque, if the unit has the mode. The manual asks to disable before every change, and does
+    /// not say what becomes of a change before that: here it waits until the torque is gone. An SDO is refused, a PDO cannot be.
     fn follow_mode(&mut self) {
-        if self.device.state().has_torque() {
-            return;
-        }
         let number = self.dictionary.signed(at::OPERATION_MODE) as i8;
         let supported = self.dictionary.get(at::SUPPORTED_MODES);
         let is_supported = OperationMode::from_number(number).is_some_and(|mode| {
             supported & mode.supported_bit() != 0
                 || mode == OperationMode::InterpolatedPosition && self.parameters.has_interpolated_position
         });
-        if is_supported {
+        let is_shown = self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8 == number;
+        self.coming_mode = match self.coming_mode {
+            _ if !is_supported || is_shown || self.device.state().has_torque() => None,
+            Some(coming) if coming.number == number => Some(coming),
+            _ => Some(ComingMode { number, due_ns: self.now_ns.max(self.stepped_ns) + MODE_CHANGE_NS }),
+        };
+    }
+
+    /// Takes the mode that is due.
+    fn take_coming_mode(&mut self) {
+        let Some(ComingMode { number, due_ns }) = self.coming_mode else { return };
+        if self.device.state().has_torque() {
+            self.coming_mode = None;
+        } else if due_ns <= self.stepped_ns {
+            self.coming_mode = None;
             self.dictionary.set(at::OPERATION_MODE_DISPLAY, number as u8 as u32);
         }
     }
@@ -227,6 +251,7 @@ impl ErobJoint {
         self.servo.reset();
         self.torque = 0.0;
         self.has_pdo_error = false;
+        self.coming_mode = None;
         self.save_ns = NEVER;
     }
 

@@ -1,9 +1,9 @@
 //! Decodes the messages of a recording.
 
 use takt_rt::{
-    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, GroupRecord, Origin,
-    Phase, RecordedStop, RejectReason, RequestError, RequestId, RequestKind, Rule, StopCategory, StopCause,
-    StopReason, StreamState, TimingLevel,
+    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, GroupRecord,
+    OperationMode, Origin, Phase, RecordedStop, RejectReason, RequestError, RequestId, RequestKind, Rule,
+    StopCategory, StopCause, StopReason, StreamState, TimingLevel,
 };
 
 use super::EventFields;
@@ -178,6 +178,7 @@ impl EventFields {
             }),
             7 => EventKind::Timing { level: *TimingLevel::ALL.get(usize::from(self.timing_level))? },
             8 => EventKind::Stream { state: *StreamState::ALL.get(self.value as usize)? },
+            9 => EventKind::Mode { axis: self.axis?, mode: OperationMode::from_number(self.value as i8)? },
             _ => return None,
         })
     }
@@ -247,6 +248,7 @@ mod tests {
             EventKind::MotionFinished { request: RequestId(9) },
             EventKind::DriveState { axis: 2, state: DriveState::OperationEnabled, statusword: 0x1637 },
             EventKind::Timing { level: TimingLevel::Degraded },
+            EventKind::Mode { axis: 1, mode: OperationMode::CyclicSynchronousTorque },
             EventKind::Emergency { axis: 1, code: 0x7305, register: 0x21, manufacturer: [1, 2, 3, 4, 5] },
             EventKind::MissedSlots { count: 30 },
             EventKind::Stream { state: StreamState::Dry },

@@ -17,6 +17,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
         RequestKind::Enable => "enabling",
         RequestKind::Move => "the move",
         RequestKind::SetProfileTarget => "the target",
+        RequestKind::ChangeMode => "the change of the mode",
         RequestKind::Stream => "the stream",
         RequestKind::Execute => "the trajectory",
         RequestKind::RunCallback => "the callback",
@@ -117,6 +118,20 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
             "it begins at {position:.6} {length} while {axis} is at {present:.6} {length}, or at another velocity"
         ),
         RejectReason::TooLate => "the cycle at which it was to begin has passed".to_owned(),
+        RejectReason::ModeChanging => "the mode of operation is being changed".to_owned(),
+        RejectReason::UnknownMode { mode: wanted } => {
+            format!("{axis} cannot be in {}: it is not among its `modes`", mode((wanted as i8).into()))
+        }
+        RejectReason::ObjectNotMapped { object } => {
+            format!("{object} is not in the PDOs of {axis}, and a change of its mode needs it")
+        }
+        RejectReason::NotDisabled => format!("the drive of {axis} must be disabled for it"),
+        RejectReason::NotAtRest { velocity } => {
+            format!("{axis} is not at rest, or has not been for some cycles ({velocity:.4} {length}/s)")
+        }
+        RejectReason::OffSetPoint { distance, limit } => format!(
+            "{axis} is {distance:.6} {length} from its set-point (allowed: {limit:.6} {length}), and would be pulled there"
+        ),
         RejectReason::SuccessorPending => {
             "another trajectory is already to take the place of the present one".to_owned()
         }

@@ -80,6 +80,11 @@ pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             mode(shown.into()),
             mode((expected as i8).into())
         ),
+        Fault::ModeNotShown { shown, expected } => format!(
+            "the drive of {axis} has not changed to {} in time: it shows {}",
+            mode((expected as i8).into()),
+            mode(shown.into())
+        ),
         Fault::NoTorqueInMode { mode: own } => format!(
             "a torque or an impedance was wanted of {axis}, which is in {} and takes them in CST alone",
             mode((own as i8).into())

@@ -8,8 +8,8 @@ use core::f64::consts::TAU;
 use takt_rt::{
     AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CommandPdo, ControlLaw, CycleInput,
     CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
-    HostInterface, Id, MappedObject, Mapping, Pdo, Phase, Received, Request, RequestEnvelope, RequestId,
-    RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
+    HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope,
+    RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
 };
 
 // The C library gives the program its entry; nothing else of it is used.
@@ -71,6 +71,7 @@ fn axis() -> Option<AxisParameters> {
         feedback_since: FeedbackSince::Sync,
         unused: Default::default(),
         law: ControlLaw::Position,
+        mode_changes: ModeChanges::default(),
         scale: Scale::new(scale).ok()?,
         limits: AxisLimits {
             position_min: -3.0,

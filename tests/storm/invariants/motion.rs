@@ -20,7 +20,8 @@ pub fn check(seen: &Seen<'_>) -> Result<(), String> {
     for (index, axis) in seen.config.axes.iter().enumerate() {
         let (truth, concern) = (&seen.truth[index], &seen.concerns[index]);
         // Nothing but the loop that takt closes bounds the speed of a joint that is given torque.
-        let has_own_velocity_loop = !matches!(axis.control, Control::ProfileTorque | Control::Torque { .. });
+        let is_given_torque = |law: &Control| matches!(law, Control::ProfileTorque | Control::Torque { .. });
+        let has_own_velocity_loop = !axis.controls().any(is_given_torque);
         let most = OVERSHOOT * axis.limits.velocity;
         if has_own_velocity_loop && truth.state.has_torque() && truth.velocity.abs() > most {
             return Err(format!("{}: at {} beyond {most}: {truth:?}", axis.name, truth.velocity));

@@ -32,7 +32,8 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
     let is_loop_closed_here = |axis: u8| {
         let axis = seen.config.axes.get(usize::from(axis));
         axis.is_some_and(|axis| {
-            matches!(axis.control, ControlLaw::Velocity { .. } | ControlLaw::Torque { .. })
+            let mut laws = axis.controls();
+            laws.any(|law| matches!(law, ControlLaw::Velocity { .. } | ControlLaw::Torque { .. }))
         })
     };
     let is_right = match (reason.rule(), reason.origin) {
@@ -56,9 +57,14 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
         // A joint swings where the machine is too late to close its loop.
         (Rule::FollowingError, Origin::Axis(axis)) if is_crowded(axis) && is_loop_closed_here(axis) => true,
+        (Rule::ModeNotShown, Origin::Axis(axis)) if is_crowded(axis) => true,
         // An eRob stops its node: it has no process data any more, and says so. A YZ-AIM shows an alarm.
         (
-            Rule::DriveFault | Rule::MissedFeedback | Rule::EmergencyMessage | Rule::DriveDisabled,
+            Rule::DriveFault
+            | Rule::ModeNotShown
+            | Rule::MissedFeedback
+            | Rule::EmergencyMessage
+            | Rule::DriveDisabled,
             Origin::Axis(axis),
         ) if has_missed_heartbeat(axis) => true,
         (Rule::NodeNotOperational, Origin::Axis(axis)) if has_missed_heartbeat(axis) => {
@@ -71,6 +77,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::DriveFault
             | Rule::DriveDisabled
             | Rule::ModeChanged
+            | Rule::ModeNotShown
             | Rule::EnableTimeout
             | Rule::NotAcknowledged
             | Rule::NodeLost

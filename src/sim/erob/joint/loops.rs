@@ -29,6 +29,7 @@ impl ErobJoint {
     fn step(&mut self, duration_ns: Nanoseconds) {
         let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
         self.stepped_ns += duration_ns;
+        self.take_coming_mode();
         self.evaluate(self.stepped_ns);
         let is_driven = self.device.state().has_torque();
         if is_driven {

@@ -1,0 +1,123 @@
+//! The change of an axis' mode of operation at run time, without a bump.
+//!
+//! Object 6060 is sent, and the drive shows in object 6061 when it has taken the new mode. From one to the other it may be in
+//! either mode. So the targets of both keep the joint where it is:
+//!
+//! | mode | target until the drive shows the new mode | from then on |
+//! | --- | --- | --- |
+//! | CSP | the set-point as it is held | the set-point |
+//! | CSV | to it: 0; from it: what its position loop makes | what its position loop makes |
+//! | CST | to it: what its loop makes, with so much fed forward that it begins at the torque that the drive has reported; from it: what its loop makes | what its loop makes, with the same fed forward until a source commands a torque |
+//!
+//! The target of a mode that an axis may be changed to is always one at rest, whatever mode the axis is in.
+
+use super::Axis;
+use super::torque_loop::TorqueLoop;
+use crate::cia402::OperationMode;
+use crate::control::{ControlLaw, TorqueDemand};
+use crate::pdo::CommandSlot;
+
+/// Whether the drive is in the mode of the axis' law.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) enum Mode {
+    /// It is, or what it shows is a fault.
+    #[default]
+    Settled,
+    /// It is told to change to that of another law, and has not shown it yet.
+    Changing {
+        /// The law that is to come into force.
+        to: ControlLaw,
+        /// What a loop of CST needs fed forward (N·m, N) to begin at the torque that holds the joint.
+        holding: f64,
+    },
+}
+
+impl Axis {
+    /// The law for a mode: the present one, or one that the axis may be changed to.
+    pub fn law_for(&self, mode: OperationMode) -> Option<&ControlLaw> {
+        let laws = core::iter::once(&self.parameters.law).chain(&self.parameters.mode_changes.laws);
+        laws.into_iter().find(|law| law.operation_mode() == mode)
+    }
+
+    /// Whether the process data of the drive carry a number to it.
+    pub fn sends(&self, slot: CommandSlot) -> bool {
+        self.parameters.commands.iter().any(|command| command.pdo.mapping.sends(slot))
+    }
+
+    /// Object 6060 as it is sent.
+    pub fn mode_set(&self) -> i8 {
+        self.command.command(CommandSlot::OperationMode) as i8
+    }
+
+    /// Whether the drive is told another mode and has not shown it yet.
+    pub fn is_changing_mode(&self) -> bool {
+        self.mode != Mode::Settled
+    }
+
+    /// Whether the drive shows the mode that it is told.
+    pub fn shows_commanded_mode(&self) -> bool {
+        self.mode() == Some(self.mode_set())
+    }
+
+    /// Tells the drive another mode, from the next command on.
+    pub fn begin_mode_change(&mut self, to: ControlLaw) {
+        let of_loop = to.torque(&self.loop_input(), &TorqueDemand::default());
+        let holding = self.torque().unwrap_or(0.0) - of_loop;
+        self.mode = Mode::Changing { to, holding };
+        self.command.set(CommandSlot::OperationMode, to.operation_mode() as i32);
+    }
+
+    /// The drive shows the new mode: its law is in force.
+    pub fn end_mode_change(&mut self) {
+        let Mode::Changing { to, holding } = core::mem::take(&mut self.mode) else { return };
+        let was_torque = matches!(self.parameters.law, ControlLaw::Torque { .. });
+        let is_torque = matches!(to, ControlLaw::Torque { .. });
+        let laws = &mut self.parameters.mode_changes.laws;
+        if let Some(place) = laws.iter_mut().find(|law| **law == to) {
+            core::mem::swap(place, &mut self.parameters.law);
+        }
+        // The offsets are those of the new mode from now on.
+        self.command.set(CommandSlot::VelocityOffset, 0);
+        self.command.set(CommandSlot::TorqueOffset, 0);
+        if is_torque {
+            self.torque_loop.begin_holding(holding);
+        } else if was_torque {
+            self.torque_loop = TorqueLoop::default();
+            if self.parameters.feed_forward.has_torque() {
+                self.torque_loop.begin_holding(self.torque_set);
+            }
+        }
+    }
+
+    /// The drive is told its former mode again, whose law has been in force all the time.
+    pub fn cancel_mode_change(&mut self) {
+        self.mode = Mode::Settled;
+        self.command.set(CommandSlot::OperationMode, self.parameters.law.operation_mode() as i32);
+    }
+
+    /// Writes the targets of the modes that the axis is not in, beside the command of its own law. Comes after [`Axis::command`].
+    #[inline(never)]
+    pub fn command_other_modes(&mut self) {
+        let is_enabled = self.is_enabled();
+        let Self { parameters, command, .. } = self;
+        // Of a drive that is not enabled it follows the joint within the limits, as in CSP.
+        let position = parameters.scale.position_to_counts(self.set_points.sent_now().position);
+        for law in &parameters.mode_changes.laws {
+            command.set(law.target_slot(), law.idle(position));
+        }
+        if let (Mode::Changing { to, holding }, true) = (self.mode, is_enabled)
+            && to.target_slot() == CommandSlot::TargetTorque
+        {
+            let torque = self.torque_while_changing(&to, holding);
+            self.command.set(CommandSlot::TargetTorque, torque);
+        }
+    }
+
+    /// Object 6071 for a drive that may be in CST already, and adds the torque offset of its former mode then.
+    fn torque_while_changing(&self, to: &ControlLaw, holding: f64) -> i32 {
+        let (scale, limit) = (&self.parameters.scale, self.parameters.limits.torque);
+        let torque = to.torque(&self.loop_input(), &TorqueDemand::Law { torque: holding });
+        let offset = self.command.command(CommandSlot::TorqueOffset);
+        scale.torque_to_per_mille(torque.clamp(-limit, limit)).saturating_sub(offset)
+    }
+}
