@@ -10,10 +10,12 @@
 //! 1. `cycle`: [`Cycle::run`] is one whole cycle on one screen: SYNC, feedback, compute, encode, send.
 //! 2. `engine`: [`Engine`] has the axes and the groups that they move in. Its documentation has the order of calls and a program
 //!    of its own; `engine/state` has the table of phases.
-//! 3. `axis`: [`Axis`] is one joint: its set-points, where the joint is, the power of its drive.
-//! 4. `guard`: the last check of every set-point; [`AxisLimits`] is what it checks against.
-//! 5. [`plan`]: the trajectory planner, of use by itself; `group_trajectory` is what the engine makes of it.
-//! 6. `cia402`, `dialect`, `profile`, `control`, `units`, `pdo`: how a drive is spoken to: its state machine ([`DriveState`]),
+//! 3. `source`: what is wanted of the axes in a slot: streams ([`LookAhead`]), trajectories ([`TrajectoryView`]), callbacks
+//!    ([`CallbackRun`]), and [`follow`], which keeps the limits.
+//! 4. `axis`: [`Axis`] is one joint: its set-points, where the joint is, the power of its drive.
+//! 5. `guard`: the last check of every set-point; [`AxisLimits`] is what it checks against.
+//! 6. [`plan`]: the trajectory planner, of use by itself; `group_trajectory` is what the engine makes of it.
+//! 7. `cia402`, `dialect`, `profile`, `control`, `units`, `pdo`: how a drive is spoken to: its state machine ([`DriveState`]),
 //!    deviations of a family ([`Dialect`]), the handshake of profile position, the loops closed here ([`ControlLaw`]), SI to
 //!    drive units ([`Scale`]), and PDO mappings compiled to shifts and masks ([`Mapping`]).
 //!
@@ -21,7 +23,7 @@
 //!
 //! - [`HostInterface`]: requests in ([`Request`]), state and records out ([`Snapshot`], [`CycleRecord`], [`Event`]);
 //! - [`BusPort`] and [`Clock`]: what the cycle needs of a bus and of time; `dispatch` finds the axis of an identifier;
-//! - [`Fault`] and [`StopReason`]: what can go wrong, and how the group stops for it; [`RejectReason`]: why a request is rejected;
+//! - [`Fault`] and [`StopReason`]: what can go wrong, and how a group stops for it; [`RejectReason`]: why a request is rejected;
 //! - [`TimingLadder`], `watch`: what is watched over time: missed slots, silent nodes, duplicate node IDs.
 #![no_std]
 #![deny(unsafe_code)]
