@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use takt_rt::{Dialect, OperationMode, Phase};
+use takt_rt::{Dialect, OperationMode, Phase, Rule};
 
 #[path = "../fuzz/subjects/mod.rs"]
 mod subjects;
@@ -85,6 +85,11 @@ fn the_kept_inputs_lead_the_group_through_every_phase_and_move_it_in_every_mode(
         assert!(moved(mode, Dialect::YzAim), "{mode:?} of a YZ-AIM");
     }
     assert!(journeys.iter().any(|journey| journey.refused > 0 && journey.refused < journey.taken));
+    assert!(journeys.iter().any(|journey| journey.calls > 100), "a callback is called");
+    for rule in [Rule::CallbackOverrun, Rule::CallbackPanicked] {
+        assert!(journeys.iter().any(|journey| journey.stops.contains(rule.key())), "{rule:?}");
+    }
+    assert!(journeys.iter().any(|journey| journey.are_apart), "one group moves, and another one does not");
 }
 
 proptest! {

@@ -19,7 +19,7 @@ use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, Scenario
 use takt::telemetry::{
     Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
 };
-use takt_rt::{Event, EventKind, Snapshot, StopReason};
+use takt_rt::{Event, EventKind, Fault, Snapshot, StopReason};
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -225,10 +225,14 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     }
 }
 
+/// The errors of the drives that the stop does not tell already.
 fn drive_errors(session: &Session) -> Vec<DriveError> {
     let machine = &session.log.machine;
+    let told = stop_of(session).and_then(|stop| Some((stop.axis()?, stop.cause.fault().copied()?)));
+    let is_told = |axis, code| told == Some((axis, Fault::DriveFault { error_code: code }));
     let errors =
         session.drive_errors.iter().filter_map(|(axis, code)| Some((u8::try_from(*axis).ok()?, *code)));
+    let errors = errors.filter(|(axis, code)| !is_told(*axis, *code));
     let error = |(axis, code)| DriveError {
         axis: machine.axis_name(axis),
         error: machine.drive_error(axis, code),

@@ -34,7 +34,10 @@ fn the_yz_aim_identifiers_depend_on_the_node_id() {
     };
     assert_eq!(ids(5), [0x205, 0x305, 0x405, 0x505, 0x185, 0x285, 0x385, 0x485]);
     let unknown = dictionary.pdos(None);
-    assert!(unknown.iter().all(|pdo| pdo.id.is_none() && !pdo.is_valid), "without a node there are none");
+    assert!(
+        unknown.iter().all(|pdo| pdo.id.is_none() && pdo.is_valid),
+        "without a node they are valid all the same"
+    );
 }
 
 #[test]

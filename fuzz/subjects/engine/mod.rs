@@ -1,26 +1,28 @@
-//! The engine, given any frames, requests, streams, faults and delays.
+//! The engine, given any frames, requests, streams, callbacks, faults and delays, of one group or two.
 //!
 //! Drives of the simplest kind obey what they are commanded, unless the input has them do something else ([`drive`]). What
 //! is looked at is what leaves on the wire, and what the engine says of itself ([`watch`]).
 
 mod asking;
 mod drive;
+mod leading;
 mod watch;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::OnceLock;
 
 use takt::config::{Config, Control};
 use takt::controller::assemble;
 use takt_rt::{
-    BitSet, BusHealth, BusState, Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect,
-    DriveState, Engine, Event, Frame, HostInterface, LookAhead, MAX_AXES, OperationMode, Phase, Received,
-    Request, RequestEnvelope, RequestId, RequestTarget, SendBatch, Snapshot, StreamPoint, StreamSample,
-    StreamWish,
+    AxisSnapshot, AxisTarget, BitSet, BusHealth, BusState, CallbackCycle, CallbackId, CallbackReturn,
+    Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect, DriveState, Engine, Event, Frame,
+    HostInterface, LookAhead, MAX_AXES, OperationMode, Phase, Received, Request, RequestEnvelope, RequestId,
+    RequestTarget, SendBatch, Snapshot, StreamPoint, StreamSample, StreamWish,
 };
 
 use super::input::Input;
 use drive::ObedientDrive;
+use leading::Leading;
 use watch::Watch;
 
 /// Cycles that one input can last.
@@ -28,7 +30,7 @@ const CYCLES_AT_MOST: u64 = 4_000;
 
 /// By the first byte of an input: most of the time in CSP, where a set-point on the wire is a position.
 fn configuration(number: u8) -> &'static Config {
-    static CONFIGURATIONS: OnceLock<[Config; 8]> = OnceLock::new();
+    static CONFIGURATIONS: OnceLock<[Config; 9]> = OnceLock::new();
     let configurations = CONFIGURATIONS.get_or_init(|| {
         [
             include_str!("../../../configs/arm6-erob.toml"),
@@ -39,12 +41,14 @@ fn configuration(number: u8) -> &'static Config {
             include_str!("../../../configs/erob-modes/erob-pp.toml"),
             include_str!("../../../configs/erob-modes/erob-pt.toml"),
             include_str!("every-mode.toml"),
+            include_str!("two-groups.toml"),
         ]
         .map(|text| Config::parse("example", text).expect("the example is sound"))
     });
     &configurations[match number % 16 {
         number @ 6..=12 => usize::from(number - 5),
         13 | 14 => 7,
+        15 => 8,
         _ => 0,
     }]
 }
@@ -69,6 +73,12 @@ pub struct Journey {
     /// Requests that were taken up and those that were refused.
     pub taken: u64,
     pub refused: u64,
+    /// Calls of the callback.
+    pub calls: u64,
+    /// The rules of all stops.
+    pub stops: BTreeSet<&'static str>,
+    /// Whether one group was in motion while another one was not.
+    pub are_apart: bool,
 }
 
 /// Whatever comes in: no panic, no set-point of an enabled axis beyond its limits or with a step beyond its limits, no axis
@@ -84,8 +94,9 @@ pub fn run(bytes: &[u8]) -> Journey {
 
 /// The other side of the host interface.
 struct Hall {
-    requests: VecDeque<Request>,
+    requests: VecDeque<(RequestTarget, Request)>,
     asked: u64,
+    leading: Leading,
     /// What the stream wants in the next cycle, in place of its points.
     wish: Option<StreamWish>,
     points: Box<LookAhead<MAX_AXES, Vec<StreamPoint>>>,
@@ -103,6 +114,7 @@ impl Hall {
         Self {
             requests: VecDeque::new(),
             asked: 0,
+            leading: Leading::default(),
             wish: None,
             points: Box::new(LookAhead::new(points, assemble::look_ahead(config, &config.axes_of_group(0)))),
             services: VecDeque::new(),
@@ -116,10 +128,10 @@ impl Hall {
 
 impl HostInterface for Hall {
     fn request(&mut self) -> Option<RequestEnvelope> {
-        let request = self.requests.pop_front()?;
+        let (target, request) = self.requests.pop_front()?;
         self.asked += 1;
         self.is_retired |= request == Request::InhibitEnable;
-        Some(RequestEnvelope { id: RequestId(self.asked), target: RequestTarget::All, request })
+        Some(RequestEnvelope { id: RequestId(self.asked), target, request })
     }
 
     fn begin_stream(&mut self, _group: u8) {
@@ -129,6 +141,21 @@ impl HostInterface for Hall {
     fn stream(&mut self, _group: u8, slot_start_ns: u64) -> StreamSample {
         let sample = self.points.sample(slot_start_ns);
         StreamSample { wish: self.wish.take().unwrap_or(sample.wish), ..sample }
+    }
+
+    fn take_callback(&mut self, _group: u8, _callback: CallbackId) -> bool {
+        true
+    }
+
+    fn callback(
+        &mut self,
+        _group: u8,
+        _callback: CallbackId,
+        _cycle: &CallbackCycle,
+        _axes: &[AxisSnapshot; MAX_AXES],
+        targets: &mut [Option<AxisTarget>; MAX_AXES],
+    ) -> CallbackReturn {
+        self.leading.call(targets)
     }
 
     fn service_frame(&mut self, _bus: usize) -> Option<Frame> {
@@ -218,7 +245,8 @@ impl Machine {
             }
             10 => {
                 let request = asking::request(self.config, self.now_ns(), input);
-                self.hall.requests.push_back(request);
+                let target = self.target(input);
+                self.hall.requests.push_back((target, request));
             }
             11 => {
                 let point = asking::point(&self.engine, self.now_ns(), input);
@@ -241,17 +269,41 @@ impl Machine {
                     _ => drive.turn(input.word() as i32),
                 }
             }
-            14 => self.hall.requests.extend([Request::Sync(true), Request::Activate, Request::Enable]),
+            14 => {
+                let all = [Request::Sync(true), Request::Activate, Request::Enable];
+                self.hall.requests.extend(all.map(|request| (RequestTarget::All, request)));
+            }
             _ => {
                 let to_rest = asking::possible_move(self.config, input);
-                self.hall.requests.push_back(Request::Move(to_rest));
+                let target = self.target(input);
+                self.hall.requests.push_back((target, Request::Move(to_rest)));
             }
         }
     }
 
-    /// What else can be wrong with buses and drives.
+    /// For whom a request is: for one of several groups, mostly.
+    fn target(&self, input: &mut Input<'_>) -> RequestTarget {
+        if self.config.groups.len() < 2 {
+            return RequestTarget::All;
+        }
+        match input.byte() % 8 {
+            0 => RequestTarget::All,
+            1 => RequestTarget::Group(input.byte()),
+            number => RequestTarget::Group(number % 2),
+        }
+    }
+
+    /// What else can be wrong with buses and drives, and what a callback does.
     fn disturb(&mut self, input: &mut Input<'_>) {
-        match input.byte() % 4 {
+        let kind = input.byte();
+        if kind >= 192 {
+            if let Some(request) = self.hall.leading.change(self.config, input) {
+                let target = self.target(input);
+                self.hall.requests.push_back((target, request));
+            }
+            return;
+        }
+        match kind % 4 {
             0 => {
                 let mut full = BitSet::default();
                 full.insert(self.slot as usize % self.buses.len());
@@ -271,6 +323,11 @@ impl Machine {
         }
     }
 
+    /// What each group is doing.
+    fn phases(&self) -> Vec<Phase> {
+        (0..).map_while(|group| self.engine.phase(group)).collect()
+    }
+
     fn period_s(&self) -> f64 {
         self.config.cycle.period_ns as f64 * 1e-9
     }
@@ -279,7 +336,7 @@ impl Machine {
         self.slot += 1;
         let now_ns = self.now_ns();
         self.report();
-        let before = self.engine.phase(0).unwrap_or_default();
+        let before = self.phases();
         let mut held_back = self.held_back;
         if disturbed == Disturbed::Blocked {
             (0..self.buses.len()).for_each(|bus| held_back.insert(bus));
@@ -307,7 +364,8 @@ impl Machine {
         self.engine.finish(timing, now_ns, &self.buses, &mut self.hall);
         let has_commands = self.hall.is_commanded;
         assert!(!has_commands || deadline == Deadline::Met);
-        self.obey(&sent, before, has_commands);
+        self.obey(&sent, &before, has_commands);
+        self.watch.has_driven = self.hall.leading.has_driven;
         self.watch.look(&self.engine, &self.hall.events, &self.hall.snapshot, has_commands);
         self.hall.events.clear();
         if self.hall.is_retired {
@@ -317,12 +375,22 @@ impl Machine {
     }
 
     fn note(&mut self, asked: u64) {
+        let phases = self.phases();
         let journey = &mut self.journey;
-        let phase = self.engine.phase(0).unwrap_or_default();
-        if journey.phases.last() != Some(&phase) {
-            journey.phases.push(phase);
+        for phase in &phases {
+            if journey.phases.last() != Some(phase) {
+                journey.phases.push(*phase);
+            }
         }
+        journey.are_apart |= phases.windows(2).any(|pair| {
+            let is_led = |phase: Phase| matches!(phase, Phase::Moving | Phase::Streaming);
+            is_led(pair[0]) != is_led(pair[1])
+        });
+        journey.calls = self.hall.leading.calls;
+        let stops = self.hall.snapshot.groups().iter().filter_map(|group| group.stop);
+        journey.stops.extend(stops.map(|stop| stop.rule().key()));
         for axis in self.engine.axes() {
+            let phase = phases[self.config.group_of_axis(axis.number().into())];
             let mode = (axis.parameters().law.operation_mode(), axis.parameters().dialect);
             let is_moved = matches!(phase, Phase::Moving | Phase::Streaming) && axis.is_enabled();
             if is_moved && !journey.modes_in_motion.contains(&mode) {
@@ -358,9 +426,11 @@ impl Machine {
     }
 
     /// The drives take what was sent to them, and what was sent is looked at.
-    fn obey(&mut self, sent: &[SendBatch], before: Phase, has_acted: bool) {
-        let (phase, period_s) = (self.engine.phase(0).unwrap_or_default(), self.period_s());
+    fn obey(&mut self, sent: &[SendBatch], before: &[Phase], has_acted: bool) {
+        let (phases, period_s) = (self.phases(), self.period_s());
         for index in 0..self.config.axes.len() {
+            let group = self.config.group_of_axis(index);
+            let (before, phase) = (before[group], phases[group]);
             let (axis, drive) = (&self.config.axes[index], &mut self.drives[index]);
             if let Some((_, cycles)) = self.targets[index].as_mut().filter(|_| has_acted) {
                 *cycles += 1;

@@ -1,8 +1,9 @@
 //! What must hold after every cycle, whatever came in.
 
-use takt::config::Config;
+use takt::config::{Config, Control};
 use takt_rt::{
-    Engine, Event, EventKind, Phase, RejectReason, RequestError, RequestKind, Rule, Snapshot, StopReason,
+    Engine, Event, EventKind, GroupSnapshot, Phase, RejectReason, RequestError, RequestKind, Rule, Snapshot,
+    StopReason,
 };
 
 /// Room for rounding, relative to a limit.
@@ -20,17 +21,25 @@ struct Past {
     enabled: u32,
 }
 
-pub struct Watch {
-    config: &'static Config,
-    axes: Vec<Past>,
+/// What is known of a group from the cycles before.
+#[derive(Clone, Default)]
+struct PastGroup {
     phase: Phase,
-    is_retired: bool,
-    refused: u64,
     /// Cycles in which the set-points went on.
     steps: u64,
     /// The reason of the last stop, as its event gave it.
     reported: Option<StopReason>,
     stopping_cycles: u32,
+}
+
+pub struct Watch {
+    config: &'static Config,
+    axes: Vec<Past>,
+    groups: Vec<PastGroup>,
+    is_retired: bool,
+    /// Whether a torque or an impedance was ever wanted of a joint: it need not be on its set-point then.
+    pub has_driven: bool,
+    refused: u64,
     stopping_at_most: u32,
 }
 
@@ -46,12 +55,10 @@ impl Watch {
         Self {
             config,
             axes: vec![Past::default(); config.axes.len()],
-            phase: Phase::Passive,
+            groups: vec![PastGroup::default(); config.groups.len().max(1)],
             is_retired: false,
+            has_driven: false,
             refused: 0,
-            steps: 0,
-            reported: None,
-            stopping_cycles: 0,
             stopping_at_most: (patience_s * 1e9 / config.cycle.period_ns as f64) as u32,
         }
     }
@@ -64,44 +71,61 @@ impl Watch {
     /// Looks at a cycle. `has_acted` tells whether set-points could leave.
     pub fn look(&mut self, engine: &Engine, events: &[Event], snapshot: &Snapshot, has_acted: bool) {
         events.iter().for_each(|event| self.hear(event));
-        assert_eq!(self.phase, engine.phase(0).unwrap_or_default(), "a phase without an event");
-        assert_eq!(self.phase, snapshot.groups[0].phase);
         assert_eq!(self.refused, snapshot.rejected, "a rejection without an event");
-        self.look_at_stop(snapshot, has_acted);
-        if snapshot.groups[0].steps != std::mem::replace(&mut self.steps, snapshot.groups[0].steps) {
-            self.look_at_set_points(engine);
+        for (number, shown) in snapshot.groups().iter().enumerate() {
+            let phase = self.groups[number].phase;
+            assert_eq!(phase, engine.phase(number as u8).unwrap_or_default(), "a phase without an event");
+            assert_eq!(phase, shown.phase);
+            self.look_at_stop(number, shown, has_acted);
+            if shown.steps != std::mem::replace(&mut self.groups[number].steps, shown.steps) {
+                self.look_at_set_points(number, engine);
+            }
         }
     }
 
     fn hear(&mut self, event: &Event) {
+        let is_retired = self.is_retired;
+        let group = event.group.map(usize::from);
+        let number = group.unwrap_or(0);
+        assert!(
+            group.is_some()
+                || matches!(
+                    event.kind,
+                    EventKind::Rejected(_) | EventKind::MissedSlots { .. } | EventKind::Timing { .. }
+                ),
+            "{event:?}"
+        );
         match event.kind {
             EventKind::PhaseChanged { from, to } => {
-                assert_eq!(from, self.phase, "the phase before {to:?}");
+                let group = &mut self.groups[number];
+                assert_eq!(from, group.phase, "the phase before {to:?}");
                 let is_possible = match to {
                     Phase::Passive => false,
                     Phase::Disabled => matches!(from, Phase::Passive | Phase::Disabling),
-                    Phase::Enabling => from == Phase::Disabled && !self.is_retired,
+                    Phase::Enabling => from == Phase::Disabled && !is_retired,
                     Phase::Holding => matches!(from, Phase::Enabling | Phase::Moving | Phase::Stopping),
-                    Phase::Moving | Phase::Streaming => matches!(from, Phase::Holding | Phase::Moving),
+                    // A callback that is over comes to rest by a move.
+                    Phase::Moving => matches!(from, Phase::Holding | Phase::Streaming),
+                    Phase::Streaming => from == Phase::Holding,
                     Phase::Stopping => matches!(from, Phase::Moving | Phase::Streaming),
                     Phase::Disabling => !matches!(from, Phase::Passive | Phase::Disabled),
                 };
                 assert!(is_possible, "{from:?} to {to:?}");
-                self.phase = to;
-                self.stopping_cycles = 0;
+                (group.phase, group.stopping_cycles) = (to, 0);
             }
             EventKind::Stop(stop) => {
-                assert_eq!(stop.phase, self.phase, "{stop:?}");
-                self.reported = Some(stop);
+                let group = &mut self.groups[number];
+                assert_eq!(stop.phase, group.phase, "{stop:?}");
+                group.reported = Some(stop);
             }
-            EventKind::Rejected(rejected) => self.hear_rejection(&rejected),
+            EventKind::Rejected(rejected) => self.hear_rejection(group, &rejected),
             _ => {}
         }
     }
 
-    fn hear_rejection(&mut self, rejected: &RequestError) {
+    fn hear_rejection(&mut self, group: Option<usize>, rejected: &RequestError) {
         self.refused += 1;
-        assert_eq!(rejected.phase, self.phase, "{rejected:?}");
+        assert_eq!(rejected.phase, self.groups[group.unwrap_or(0)].phase, "{rejected:?}");
         assert!(rejected.axis.is_none_or(|axis| usize::from(axis) < self.axes.len()), "{rejected:?}");
         let never = [RequestKind::Sync, RequestKind::Stop, RequestKind::InhibitEnable, RequestKind::Shutdown];
         assert!(!never.contains(&rejected.request), "{rejected:?}");
@@ -111,44 +135,44 @@ impl Watch {
         );
     }
 
-    fn look_at_stop(&mut self, snapshot: &Snapshot, has_acted: bool) {
-        let is_latched = snapshot.groups[0].stop.is_some_and(|stop| stop.rule() != Rule::Requested);
-        if is_latched {
-            let (is_on_way, stop) = (
-                matches!(self.phase, Phase::Enabling | Phase::Moving | Phase::Streaming),
-                snapshot.groups[0].stop,
-            );
-            assert!(!is_on_way, "{:?} in spite of {stop:?}", self.phase);
-        }
-        if let Some(stop) = snapshot.groups[0].stop {
-            let reported = self.reported.expect("a stop without an event");
+    fn look_at_stop(&mut self, number: usize, shown: &GroupSnapshot, has_acted: bool) {
+        let group = &mut self.groups[number];
+        let (phase, stop) = (group.phase, shown.stop);
+        let is_latched = stop.is_some_and(|stop| stop.rule() != Rule::Requested);
+        let is_on_way = matches!(phase, Phase::Enabling | Phase::Moving | Phase::Streaming);
+        assert!(!(is_latched && is_on_way), "{phase:?} in spite of {stop:?}");
+        if let Some(stop) = stop {
+            let reported = group.reported.expect("a stop without an event");
             assert_eq!(
                 (reported.rule(), reported.origin, reported.slot),
                 (stop.rule(), stop.origin, stop.slot)
             );
             assert!(stop.category <= reported.category, "{stop:?} was {reported:?}");
         }
-        if self.phase == Phase::Stopping {
-            assert!(snapshot.groups[0].stop.is_some(), "a stop without a reason");
-            self.stopping_cycles += u32::from(has_acted);
-            assert!(
-                self.stopping_cycles <= self.stopping_at_most,
-                "the stop does not end: {:?}",
-                snapshot.groups[0].stop
-            );
+        if phase == Phase::Stopping {
+            assert!(stop.is_some(), "a stop without a reason");
+            group.stopping_cycles += u32::from(has_acted);
+            assert!(group.stopping_cycles <= self.stopping_at_most, "the stop does not end: {stop:?}");
         }
     }
 
-    fn look_at_set_points(&mut self, engine: &Engine) {
+    fn look_at_set_points(&mut self, group: usize, engine: &Engine) {
         let period_s = self.config.cycle.period_ns as f64 * 1e-9;
-        for ((axis, past), named) in engine.axes().iter().zip(&mut self.axes).zip(&self.config.axes) {
+        for axis in engine.axes() {
+            let number = usize::from(axis.number());
+            if self.config.group_of_axis(number) != group {
+                continue;
+            }
+            let (past, named) = (&mut self.axes[number], &self.config.axes[number]);
             let (limits, now) = (&axis.parameters().limits, axis.set_point().position);
             let [last, before] = past.set;
             past.enabled = if axis.is_enabled() { past.enabled + 1 } else { 0 };
             past.set = [now, last];
-            let (name, phase) = (&named.name, self.phase);
+            let (name, phase) = (&named.name, self.groups[group].phase);
             assert!(now.is_finite(), "{name}: {now}");
-            if axis.is_profile() || past.enabled < 2 {
+            // What is planned behind a torque or an impedance begins where the joint is.
+            let may_be_off = self.has_driven && matches!(named.control, Control::Torque { .. });
+            if axis.is_profile() || past.enabled < 2 || may_be_off {
                 continue;
             }
             let room = ROOM * (limits.position_max - limits.position_min);

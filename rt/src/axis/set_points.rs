@@ -103,16 +103,19 @@ impl SetPoints {
     /// not leave before, the drive does not get the way of several cycles in one.
     #[inline]
     pub(super) fn send_within(&mut self, velocity_limit: f64, cycle_s: f64) {
-        let (due, last) = (self.delay.due(), self.sent[0].position);
-        let farthest = velocity_limit * cycle_s;
-        let way = due.position - last;
-        let next = if way.abs() > farthest * (1.0 + STEP_ROUNDING) {
-            let velocity = velocity_limit.copysign(way);
-            State { position: last + farthest.copysign(way), velocity, acceleration: 0.0 }
-        } else {
-            due
-        };
-        self.note_sent(next);
+        let due = self.delay.due();
+        let way = due.position - self.sent[0].position;
+        if way.abs() > velocity_limit * cycle_s * (1.0 + STEP_ROUNDING) {
+            return self.send_on_way(velocity_limit.copysign(way), cycle_s);
+        }
+        self.note_sent(due);
+    }
+
+    /// Goes on from what was sent last for one cycle at this velocity.
+    #[cold]
+    fn send_on_way(&mut self, velocity: f64, cycle_s: f64) {
+        let position = self.sent[0].position + velocity * cycle_s;
+        self.note_sent(State { position, velocity, acceleration: 0.0 });
     }
 
     fn note_sent(&mut self, state: State) {

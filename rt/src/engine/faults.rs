@@ -89,6 +89,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.fail(origin, Fault::EnableTimeout { cycles, limit });
     }
 
+    #[inline]
     fn check_buses(&mut self, buses: &[BusHealth]) {
         let own = self.group.buses;
         for (bus, health) in buses.iter().enumerate().filter(|(bus, _)| own.contains(*bus)) {
@@ -123,6 +124,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// Checks every axis. A fault that comes up changes what is expected of those behind it.
+    #[inline]
     fn check_axes(&mut self) {
         let mut expected = Expectation::of(self.group);
         for index in 0..self.axes.len() {

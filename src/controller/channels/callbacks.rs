@@ -13,7 +13,7 @@ use takt_rt::{
 
 use super::callback_panic::{self, CaughtPanic};
 use super::callback_record::CallbackRecord;
-use super::lending::{Borrower, Lender, lending};
+use super::lending::{Borrower, LENT_AT_MOST, Lender, lending};
 
 /// A function that leads a group from inside the real-time thread.
 pub type LoopCallback = dyn FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send;
@@ -209,7 +209,7 @@ pub enum CallbackClock {
 
 /// The two ends of the way there and back.
 pub(super) fn callbacks() -> (CallbackGiver, CallbackTaker) {
-    let (lender, borrower) = lending();
+    let (lender, borrower) = lending(LENT_AT_MOST);
     let clock = CallbackClock::Monotonic(MonotonicClock::default());
     (CallbackGiver(lender), CallbackTaker { borrower, clock })
 }

@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! lend:       claim a slot (id 0 → CLAIMED) → put the thing in → show its id
-//! real time:  find the id → take the thing → … → put it into `back`
+//! real time:  find the id → take the thing (id BORROWED) → … → put it into `back`
 //! collect:    take it from `back` → free it → give the slot back (id 0)
 //! ```
 
@@ -16,11 +16,12 @@ use arrayvec::ArrayVec;
 use super::primitives::{AtomicCell, AtomicU64, Ordering};
 
 /// The most things that are with the real-time thread, or on their way there or back.
-pub(super) const LENT_AT_MOST: usize = 16;
+pub const LENT_AT_MOST: usize = 16;
 
-/// A slot that nobody uses, and one that has been claimed.
+/// A slot that nobody uses, one that has been claimed, and one whose thing is with the real-time thread, or has come back.
 const FREE: u64 = 0;
 const CLAIMED: u64 = u64::MAX;
+const BORROWED: u64 = u64::MAX - 1;
 
 struct Slot<T> {
     id: AtomicU64,
@@ -30,21 +31,22 @@ struct Slot<T> {
 
 struct Table<T> {
     newest: AtomicU64,
-    slots: [Slot<T>; LENT_AT_MOST],
+    slots: Box<[Slot<T>]>,
 }
 
-/// The two ends of the way there and back.
-pub(super) fn lending<T>() -> (Lender<T>, Borrower<T>) {
+/// The two ends of the way there and back, for so many things (at most [`LENT_AT_MOST`]).
+pub fn lending<T>(slots: usize) -> (Lender<T>, Borrower<T>) {
     // A cell with a lock inside could stop the real-time thread.
     const { assert!(AtomicCell::<Option<Box<T>>>::is_lock_free()) };
     let slot =
         || Slot { id: AtomicU64::new(FREE), there: AtomicCell::new(None), back: AtomicCell::new(None) };
-    let table = Arc::new(Table { newest: AtomicU64::new(0), slots: std::array::from_fn(|_| slot()) });
+    let slots = (0..slots.min(LENT_AT_MOST)).map(|_| slot()).collect();
+    let table = Arc::new(Table { newest: AtomicU64::new(0), slots });
     (Lender { table: Arc::clone(&table) }, Borrower { table, held: ArrayVec::new() })
 }
 
 /// The end that lends, and collects what has come back. Clone it for every thread.
-pub(super) struct Lender<T> {
+pub struct Lender<T> {
     table: Arc<Table<T>>,
 }
 
@@ -56,7 +58,7 @@ impl<T> Clone for Lender<T> {
 
 impl<T> Lender<T> {
     /// Lends a thing, and returns its number. If too many are lent already, the thing comes back.
-    pub(super) fn lend(&self, thing: Box<T>) -> Result<u64, Box<T>> {
+    pub fn lend(&self, thing: Box<T>) -> Result<u64, Box<T>> {
         let claimed = |slot: &&Slot<T>| {
             slot.id.compare_exchange(FREE, CLAIMED, Ordering::Acquire, Ordering::Relaxed).is_ok()
         };
@@ -68,7 +70,7 @@ impl<T> Lender<T> {
     }
 
     /// Takes a thing back that the real-time thread will not ask for. `None` if it has asked already.
-    pub(super) fn take_back(&self, id: u64) -> Option<Box<T>> {
+    pub fn take_back(&self, id: u64) -> Option<Box<T>> {
         let slot = self.table.slots.iter().find(|slot| slot.id.load(Ordering::Acquire) == id)?;
         let thing = slot.there.take()?;
         slot.id.store(FREE, Ordering::Release);
@@ -76,7 +78,7 @@ impl<T> Lender<T> {
     }
 
     /// Hands over what has come back.
-    pub(super) fn collect(&self, mut take: impl FnMut(Box<T>)) {
+    pub fn collect(&self, mut take: impl FnMut(Box<T>)) {
         for slot in &self.table.slots {
             if let Some(thing) = slot.back.take() {
                 slot.id.store(FREE, Ordering::Release);
@@ -87,7 +89,7 @@ impl<T> Lender<T> {
 }
 
 /// The end of the real-time thread.
-pub(super) struct Borrower<T> {
+pub struct Borrower<T> {
     table: Arc<Table<T>>,
     held: ArrayVec<Held<T>, LENT_AT_MOST>,
 }
@@ -100,7 +102,7 @@ struct Held<T> {
 
 impl<T> Borrower<T> {
     /// The thing with this number. `None` if nothing of this number is lent.
-    pub(super) fn borrow(&mut self, id: u64) -> Option<&mut T> {
+    pub fn borrow(&mut self, id: u64) -> Option<&mut T> {
         if !self.held.iter().any(|held| held.id == id) {
             self.take(id)?;
         }
@@ -110,13 +112,16 @@ impl<T> Borrower<T> {
     fn take(&mut self, id: u64) -> Option<()> {
         let mut slots = self.table.slots.iter();
         let slot = slots.position(|slot| slot.id.load(Ordering::Acquire) == id)?;
-        let thing = self.table.slots.get(slot)?.there.take()?;
+        let place = self.table.slots.get(slot)?;
+        let thing = place.there.take()?;
+        // Whoever asks for this number when the thing has been given back must not find what is lent in the slot by then.
+        place.id.store(BORROWED, Ordering::Relaxed);
         // Each slot has one, so there is room.
         self.held.try_push(Held { id, slot, thing }).ok()
     }
 
     /// Gives back what is not needed any more.
-    pub(super) fn keep(&mut self, mut is_needed: impl FnMut(u64, &mut T) -> bool) {
+    pub fn keep(&mut self, mut is_needed: impl FnMut(u64, &mut T) -> bool) {
         let mut index = 0;
         while let Some(held) = self.held.get_mut(index) {
             if is_needed(held.id, &mut held.thing) {
@@ -142,7 +147,7 @@ mod tests {
 
     #[test]
     fn a_thing_is_borrowed_under_its_number_and_comes_back_when_it_is_not_needed() {
-        let (lender, mut borrower) = lending();
+        let (lender, mut borrower) = lending(LENT_AT_MOST);
         let [first, second] = ['a', 'b'].map(|thing| lender.lend(Box::new(thing)).unwrap());
         assert_eq!([second, first].map(|id| borrower.borrow(id).copied()), [Some('b'), Some('a')]);
         borrower.keep(|id, _| id == second);
@@ -154,7 +159,7 @@ mod tests {
 
     #[test]
     fn slots_are_used_again_and_never_more_than_there_are() {
-        let (lender, mut borrower) = lending();
+        let (lender, mut borrower) = lending(LENT_AT_MOST);
         for _ in 0..3 {
             let ids: Vec<u64> = std::iter::from_fn(|| lender.lend(Box::new(())).ok()).collect();
             assert_eq!(ids.len(), LENT_AT_MOST);

@@ -14,8 +14,9 @@ use super::ChannelError;
 use super::group_axes::GroupAxes;
 use super::ring::{Consumer, Producer, ring};
 
-/// Points that the real-time thread takes in one cycle. The rest waits, so that a flood of them costs a bounded time.
-const POINTS_PER_CYCLE: usize = 32;
+/// Points that the real-time thread takes in one cycle: a chunk of 64 is taken within four. The rest waits, so that a flood of them costs
+/// little time in each cycle.
+const POINTS_PER_CYCLE: usize = 16;
 /// Points that wait for the next cycle.
 const WAITING_POINTS: usize = 256;
 /// Points that the real-time thread can look ahead.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use takt_rt::{TrajectoryId, TrajectorySample};
 
 use super::group_axes::GroupAxes;
-use super::lending::{Borrower, Lender, lending};
+use super::lending::{Borrower, LENT_AT_MOST, Lender, lending};
 use super::primitives::{AtomicU64, Ordering};
 use crate::trajectory::Trajectory;
 
@@ -45,7 +45,7 @@ struct Handed {
 
 /// The two ends of the way there and back.
 pub(super) fn trajectories() -> (TrajectoryGiver, TrajectoryTaker) {
-    let (lender, borrower) = lending();
+    let (lender, borrower) = lending(LENT_AT_MOST);
     (TrajectoryGiver(lender), TrajectoryTaker(borrower))
 }
 

@@ -12,7 +12,7 @@ mod request_numbers {
     pub use crate::request_numbers::RequestNumbers;
 }
 
-mod primitives {
+pub mod primitives {
     pub use crate::array_queue::ArrayQueue;
     pub use crate::atomic_cell::AtomicCell;
     pub use loom::sync::atomic::{Ordering, fence};
@@ -46,6 +46,14 @@ mod primitives {
 
         pub fn fetch_max(&self, value: u64, _: Ordering) -> u64 {
             self.0.fetch_max(value, Ordering::Relaxed)
+        }
+
+        pub fn fetch_add(&self, value: u64, _: Ordering) -> u64 {
+            self.0.fetch_add(value, Ordering::Relaxed)
+        }
+
+        pub fn compare_exchange(&self, current: u64, new: u64, _: Ordering, _: Ordering) -> Result<u64, u64> {
+            self.0.compare_exchange(current, new, Ordering::Relaxed, Ordering::Relaxed)
         }
 
         pub fn compare_exchange_weak(

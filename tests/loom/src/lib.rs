@@ -5,9 +5,10 @@
 //! the channels. It keeps the last seven values of an atomic, and no test here writes more. It does not model load
 //! buffering: a load never sees a store that is executed later. The mailbox has no such executions, since only one end
 //! stores. The ring has none either: an end stores for the other end with release, and no earlier access of its thread can
-//! come after a release store. The same holds for the requests of clients: they change hands by a release of a bit.
+//! come after a release store. The same holds for the requests of clients: they change hands by a release of a bit; and for
+//! what is lent: it changes hands by an exchange of a pointer.
 //!
-//! [`without_fences`] and [`all_relaxed`] are the same sources without the ordering. They must fail: that shows that the
+//! [`without_fences`], [`all_relaxed`] and [`lent_relaxed`] are the same sources without the ordering. They must fail: that shows that the
 //! tests detect a missing ordering.
 
 #![expect(clippy::duplicate_mod, reason = "the same source on other atomics is what the weakened ones are")]
@@ -15,6 +16,9 @@
 pub mod all_relaxed;
 mod array_queue;
 mod atomic_cell;
+pub mod lent;
+pub mod lent_relaxed;
+mod swap_cell;
 pub mod without_fences;
 
 #[path = "../../../src/controller/channels/client_requests.rs"]
