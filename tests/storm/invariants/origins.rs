@@ -58,6 +58,10 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
         // A joint swings where the machine is too late to close its loop.
         (Rule::FollowingError, Origin::Axis(axis)) if is_crowded(axis) && is_loop_closed_here(axis) => true,
         (Rule::ModeNotShown, Origin::Axis(axis)) if is_crowded(axis) => true,
+        // Streams ask for what the first mode takes, and the axis may be in another one.
+        (Rule::NoTorqueInMode, Origin::Axis(axis)) => {
+            seen.config.axes.get(usize::from(axis)).is_some_and(|axis| !axis.other_modes.is_empty())
+        }
         // An eRob stops its node: it has no process data any more, and says so. A YZ-AIM shows an alarm.
         (
             Rule::DriveFault

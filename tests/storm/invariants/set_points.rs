@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use takt::config::{Axis, Config, Control};
 use takt::controller::assemble;
-use takt_rt::{DriveState, Event, EventKind, Phase, Scale};
+use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Scale};
 
 use super::Seen;
 
@@ -47,6 +47,14 @@ pub struct SetPoints {
     sent_slot: u64,
     /// What the last cycle was: the phase, and where the set-point was.
     last: Option<(Phase, f64)>,
+}
+
+/// The target position that an axis is sent, while that is what its drive follows: one that may be changed to other modes is sent the
+/// targets of all of them.
+fn position_on_wire(seen: &Seen<'_>, index: usize) -> Option<i32> {
+    let follows_other = [OperationMode::CyclicSynchronousVelocity, OperationMode::CyclicSynchronousTorque];
+    let mode = OperationMode::from_number(seen.snapshot.axes[index].mode_set);
+    seen.sent[index].position.filter(|_| !mode.is_some_and(|mode| follows_other.contains(&mode)))
 }
 
 impl SetPoints {
@@ -127,8 +135,9 @@ impl SetPoints {
             return Ok(());
         }
         let meant = self.planned.get(self.delay_cycles).map(|due| self.scale.position_to_counts(*due));
-        let is_meant = meant.is_none() || sent.position == meant;
-        let point = Point { position: record.position_set, counts: sent.position, is_meant, cycles };
+        let on_wire = position_on_wire(seen, index);
+        let is_meant = meant.is_none() || on_wire == meant;
+        let point = Point { position: record.position_set, counts: on_wire, is_meant, cycles };
         self.check_on_way(axis, &point, meant, nominal_s)?;
         self.check_point(axis, &point)?;
         self.points = [Some(point), self.points[0], self.points[1]];
@@ -229,7 +238,7 @@ impl SetPoints {
             self.coasting = truth.velocity.abs();
             return Ok(());
         }
-        let Some(counts) = seen.sent[index].position else { return Ok(()) };
+        let Some(counts) = position_on_wire(seen, index) else { return Ok(()) };
         let before = self.on_wire.replace((seen.snapshot.slot, counts));
         let position = self.scale.position_from_counts(counts);
         let count = 1.0 / self.scale.resolution();
