@@ -54,6 +54,8 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::StartPose,
             Origin::Axis(_),
         ) => true,
+        // A mode that was changed to has no torque for a callback that goes on commanding one.
+        (Rule::NoTorqueInMode, Origin::Axis(_)) => seen.are_torques_commanded,
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
         // A joint swings where the machine is too late to close its loop.
         (Rule::FollowingError, Origin::Axis(axis)) if is_crowded(axis) && is_loop_closed_here(axis) => true,
