@@ -54,13 +54,11 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::StartPose,
             Origin::Axis(_),
         ) => true,
-        // A mode that was changed to has no torque for a callback that goes on commanding one.
-        (Rule::NoTorqueInMode, Origin::Axis(_)) => seen.are_torques_commanded,
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
         // A joint swings where the machine is too late to close its loop.
         (Rule::FollowingError, Origin::Axis(axis)) if is_crowded(axis) && is_loop_closed_here(axis) => true,
         (Rule::ModeNotShown, Origin::Axis(axis)) if is_crowded(axis) => true,
-        // Streams ask for what the first mode takes, and the axis may be in another one.
+        // Streams and callbacks ask for what the first mode takes, and the axis may be in another one.
         (Rule::NoTorqueInMode, Origin::Axis(axis)) => {
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| !axis.other_modes.is_empty())
         }
