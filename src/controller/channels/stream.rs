@@ -14,9 +14,9 @@ use super::ChannelError;
 use super::group_axes::GroupAxes;
 use super::ring::{Consumer, Producer, ring};
 
-/// Points that the real-time thread takes in one cycle: a chunk of 64 is taken within four. The rest waits, so that a flood of them costs
+/// Points that the real-time thread takes in one cycle: a chunk of 64 is taken within eight. The rest waits, so that a flood of them costs
 /// little time in each cycle.
-const POINTS_PER_CYCLE: usize = 16;
+const POINTS_PER_CYCLE: usize = 8;
 /// Points that wait for the next cycle.
 const WAITING_POINTS: usize = 256;
 /// Points that the real-time thread can look ahead.
