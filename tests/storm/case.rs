@@ -26,6 +26,8 @@ pub struct Case {
     pub broken_off: Option<u64>,
     pub hardship: Hardship,
     pub overload: Overload,
+    /// Whether streams command velocities, torques and impedances, too.
+    pub has_every_kind_of_point: bool,
     /// Whether callbacks lead the groups, too.
     pub has_callbacks: bool,
     /// Whether somebody changes modes of operation, too.
@@ -67,6 +69,7 @@ impl Case {
         }
         case.has_trajectories = dice.chance(0.3);
         case.has_callbacks = dice.chance(0.15);
+        case.has_every_kind_of_point = dice.chance(0.2);
         case
     }
 
@@ -137,6 +140,7 @@ impl Case {
             broken_off,
             hardship,
             overload,
+            has_every_kind_of_point: false,
             has_callbacks: false,
             has_mode_changes: false,
             has_trajectories: false,
@@ -162,6 +166,11 @@ impl Case {
         }
         self.config.groups = groups;
         vary_program(dice, &mut self.config, self.clients > 0);
+    }
+
+    /// Whether torques and impedances are commanded.
+    pub const fn are_torques_commanded(&self) -> bool {
+        self.has_callbacks || self.has_every_kind_of_point
     }
 
     fn harden(&mut self, dice: &mut Dice) {

@@ -6,7 +6,7 @@ use takt_rt::{
     Snapshot, StopCategory, StreamPoint,
 };
 
-use crate::client_stream::ClientStream;
+use crate::client_stream::{ClientStream, StreamVariety};
 use crate::dice::Dice;
 
 /// What has been asked of a group up to a cycle, as far as invariants depend on it.
@@ -36,13 +36,13 @@ pub struct Client {
     restlessness: f64,
     /// The last stream of each group.
     streams: [Option<ClientStream>; MAX_GROUPS],
-    are_streams_wild: bool,
+    variety: StreamVariety,
 }
 
 impl Client {
-    pub fn new(mut dice: Dice, are_streams_wild: bool) -> Self {
+    pub fn new(mut dice: Dice, variety: StreamVariety) -> Self {
         let restlessness = dice.pick(&[0.002, 0.01, 0.05, 0.2]);
-        Self { dice, restlessness, streams: Default::default(), are_streams_wild }
+        Self { dice, restlessness, streams: Default::default(), variety }
     }
 
     /// What it wants after a cycle.
@@ -162,7 +162,7 @@ impl Client {
         let axes = numbers.iter().map(|axis| config.axes[*axis].clone()).collect();
         let period_s = config.cycle.period_ns as f64 * 1e-9;
         let begun = (snapshot.at_ns, positions);
-        self.streams[group] = Some(ClientStream::new(dice, axes, period_s, begun, self.are_streams_wild));
+        self.streams[group] = Some(ClientStream::new(dice, axes, period_s, begun, self.variety));
     }
 }
 

@@ -1,6 +1,6 @@
 //! Points that somebody streams: of every kind, rate and disorder.
 
-use takt::config::Axis;
+use takt::config::{Axis, Control};
 use takt_rt::plan::State;
 use takt_rt::{AxisPoint, MAX_AXES, PointRole, StreamPoint};
 
@@ -13,6 +13,48 @@ enum Words {
     Velocity,
     All,
     False,
+}
+
+/// What the points command of an axis.
+#[derive(Clone, Copy)]
+enum Kind {
+    Position,
+    Velocity,
+    /// The rest needs a mode that takes a torque.
+    FedForward,
+    Torque,
+    /// A share of the highest stiffness and damping.
+    Impedance {
+        stiffness: f64,
+        damping: f64,
+    },
+}
+
+impl Kind {
+    /// Any that the mode of the axis allows.
+    fn any(dice: &mut Dice, axis: &Axis) -> Self {
+        let (stiffness, damping) = (dice.between(0.0, 1.0), dice.between(0.0, 1.0));
+        match axis.control {
+            Control::Torque { .. } => dice.pick(&[
+                Self::Position,
+                Self::Velocity,
+                Self::FedForward,
+                Self::Torque,
+                Self::Impedance { stiffness, damping },
+            ]),
+            control if control.is_profile() => Self::Position,
+            _ => dice.pick(&[Self::Position, Self::Velocity]),
+        }
+    }
+}
+
+/// Which streams there are.
+#[derive(Clone, Copy)]
+pub struct StreamVariety {
+    /// Whether they are led near the limits and beyond, and say what they like of their velocity.
+    pub is_wild: bool,
+    /// Whether they command velocities, torques and impedances too, and not positions alone.
+    pub has_every_kind: bool,
 }
 
 /// What is wrong with some of the points.
@@ -42,6 +84,10 @@ pub struct ClientStream {
     /// The share of the limits of velocity and acceleration to which it goes.
     share: f64,
     words: Words,
+    /// Of each axis.
+    kinds: Vec<Kind>,
+    /// How likely an axis is commanded otherwise from the next point on.
+    change: f64,
     badness: Badness,
     /// Of an interval: how unevenly the points are meant, and how unevenly they come.
     stamp_jitter: f64,
@@ -61,7 +107,7 @@ impl ClientStream {
         axes: Vec<Axis>,
         period_s: f64,
         (begun_ns, mut begun): (u64, Vec<f64>),
-        is_wild: bool,
+        StreamVariety { is_wild, has_every_kind }: StreamVariety,
     ) -> Self {
         if dice.chance(0.1) {
             // They have to be led there.
@@ -69,7 +115,7 @@ impl ClientStream {
             begun[0] = dice.between(limits.position_min, limits.position_max);
         }
         let is_chunked = dice.chance(0.3);
-        Self {
+        let mut stream = Self {
             begun_ns,
             begun,
             next_s: 0.0,
@@ -97,9 +143,16 @@ impl ClientStream {
             loss: dice.pick(&[0.0, 0.0, 0.05, 0.3]),
             chunk: if is_chunked { 2 + dice.below(40) } else { 1 },
             on_way: vec![],
+            kinds: vec![Kind::Position; axes.len()],
+            change: 0.0,
             axes,
             dice,
+        };
+        if has_every_kind {
+            stream.kinds = stream.axes.iter().map(|axis| Kind::any(&mut stream.dice, axis)).collect();
+            stream.change = stream.dice.pick(&[0.0, 0.0, 0.01, 0.2]);
         }
+        stream
     }
 
     /// The points that have come up to this time.
@@ -128,6 +181,10 @@ impl ClientStream {
             let uneven_s = self.dice.between(-1.0, 1.0) * self.stamp_jitter * self.interval_s;
             if self.dice.chance(self.loss) {
                 continue;
+            }
+            if self.change > 0.0 && self.dice.chance(self.change) {
+                let index = self.dice.below(self.axes.len());
+                self.kinds[index] = Kind::any(&mut self.dice, &self.axes[index]);
             }
             let stamp_s = if self.chunk == 1 { meant_s + uneven_s } else { meant_s };
             let role = match self.chunk {
@@ -165,7 +222,7 @@ impl ClientStream {
             let position = self.begun[index] + way * ease * (1.0 - phase.cos());
             let velocity = way * ease * rate * phase.sin();
             let acceleration = way * ease * rate * rate * phase.cos();
-            axes[index] = match self.words {
+            let point = match self.words {
                 Words::Nothing => AxisPoint::position(position),
                 Words::Velocity => AxisPoint::moving(position, velocity),
                 Words::All => AxisPoint::from(State { position, velocity, acceleration }),
@@ -174,6 +231,18 @@ impl ClientStream {
                     velocity: -3.0 * velocity,
                     acceleration: 1e3 * velocity,
                 }),
+            };
+            let torque = 0.2 * self.share.min(1.0) * limits.torque * ease * phase.sin();
+            axes[index] = match self.kinds[index] {
+                Kind::Position => point,
+                Kind::Velocity => AxisPoint::Velocity(velocity),
+                Kind::FedForward => point.with_torque(torque),
+                Kind::Torque => AxisPoint::Torque(torque),
+                Kind::Impedance { stiffness, damping } => {
+                    let most = &axis.compliance;
+                    let (stiffness, damping) = (stiffness * most.stiffness_max, damping * most.damping_max);
+                    point.with_impedance(stiffness, damping).with_torque(torque)
+                }
             };
         }
         axes

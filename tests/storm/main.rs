@@ -46,6 +46,8 @@ const CYCLES: u64 = 10_000_000;
 const SHARDS: u64 = 16;
 /// Of storms in which callbacks lead the groups.
 const CALLBACK_CASES: u64 = 120;
+/// Cases of the test whose streams command every kind of point.
+const POINT_CASES: u64 = 240;
 /// Of storms in which modes of operation are changed.
 const MODE_CASES: u64 = 120;
 /// A shard ends after so many failures.
@@ -157,6 +159,23 @@ fn the_invariants_hold_where_callbacks_lead_the_groups_overrun_and_panic() {
     for rule in [Rule::CallbackOverrun, Rule::CallbackPanicked] {
         assert!(stops.contains(rule.key()), "never: {rule:?}");
     }
+}
+
+#[test]
+fn the_invariants_hold_where_streams_command_velocities_torques_and_impedances() {
+    let first = number("TAKT_STORM_FIRST").unwrap_or(0);
+    let mut stale = 0;
+    for seed in first..first + POINT_CASES {
+        let mut case = Case { has_every_kind_of_point: true, is_serving: true, ..Case::of(seed) };
+        case.clients = case.clients.max(1);
+        match play(&case) {
+            Ok(done) => stale += u64::from(done.stops.contains(Rule::StaleCommand.key())),
+            Err(wrong) => {
+                panic!("seed {seed}, every kind of point: {} {wrong}\n{}", case.config.name, case.text)
+            }
+        }
+    }
+    assert!(stale > 0, "never: a torque that is too old");
 }
 
 #[test]

@@ -32,6 +32,7 @@ fn moving(name: &'static str, text: &str) -> Case {
         interrupt: Interrupt::Controlled,
         broken_off: None,
         hardship: Hardship::default(),
+        has_every_kind_of_point: false,
         has_callbacks: false,
         has_mode_changes: false,
         has_trajectories: false,

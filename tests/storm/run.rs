@@ -18,6 +18,7 @@ use crate::case::Case;
 use crate::client::{Client, RecentRequests, are_open};
 use crate::client_callback::CallbackClient;
 use crate::client_mode::ModeClient;
+use crate::client_stream::StreamVariety;
 use crate::client_trajectory::TrajectoryClient;
 use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
@@ -190,7 +191,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
                 troubled_buses: &concerns.by_bus,
                 overloaded_buses: &concerns.is_overloaded,
                 asked: &clients.asked,
-                are_torques_commanded: case.has_callbacks,
+                are_torques_commanded: case.are_torques_commanded(),
                 has_faults: !case.scenario.faults.is_empty(),
             })
         };
@@ -279,9 +280,12 @@ struct Clients {
 
 impl Clients {
     fn new(case: &Case) -> Self {
-        let all = (0..case.clients as u64)
-            .map(|number| Client::new(case.dice.split(number), case.hardship.are_streams_wild))
-            .collect();
+        let variety = StreamVariety {
+            is_wild: case.hardship.are_streams_wild,
+            has_every_kind: case.has_every_kind_of_point,
+        };
+        let all =
+            (0..case.clients as u64).map(|number| Client::new(case.dice.split(number), variety)).collect();
         let callbacks = case.has_callbacks.then(|| CallbackClient::new(case.dice.split(u64::MAX - 3)));
         let modes = case.has_mode_changes.then(|| ModeClient::new(case.dice.split(u64::MAX - 5)));
         let trajectories =

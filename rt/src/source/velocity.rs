@@ -167,4 +167,28 @@ mod tests {
             }
         }
     }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(500))]
+
+        #[test]
+        fn an_axis_beyond_a_position_limit_never_moves_farther_out(
+            wanted in prop::collection::vec(
+                (prop_oneof![-1.0f64..1.0, -1e-4f64..1e-4, -1e-6f64..1e-6], -0.1f64..0.1, prop_oneof![1usize..3, 1usize..40]),
+                1..60,
+            ),
+            out in prop_oneof![0.0f64..1e-5, 0.0f64..0.5],
+            jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
+        ) {
+            let limits = AxisLimits { jerk, ..LIMITS };
+            let mut state = State::rest(2.0 + out);
+            for (velocity, acceleration, cycles) in wanted {
+                for _ in 0..cycles {
+                    let next = follow_velocity(&state, velocity, acceleration, &limits, PERIOD_S).unwrap();
+                    prop_assert!(next.position <= state.position.max(2.0 + 1e-9), "{state:?} {next:?}");
+                    state = next;
+                }
+            }
+        }
+    }
 }

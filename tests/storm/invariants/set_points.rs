@@ -112,7 +112,11 @@ impl SetPoints {
         // What is planned behind a torque or an impedance begins where the joint is.
         let was_streaming = matches!(self.last, Some((Phase::Streaming, _)));
         let may_be_off = seen.are_torques_commanded && matches!(axis.control, Control::Torque { .. });
-        if may_be_off && (was_streaming || phase == Phase::Streaming) {
+        // A stream may begin and be stopped in one cycle.
+        let has_begun =
+            |event: &Event| matches!(event.kind, EventKind::PhaseChanged { to: Phase::Streaming, .. });
+        let has_streamed = was_streaming || seen.events_of(seen.groups[index]).any(has_begun);
+        if may_be_off && (has_streamed || phase == Phase::Streaming) {
             self.points = [None; 3];
         }
         self.last = Some((phase, record.position_set));
