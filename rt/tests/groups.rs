@@ -343,3 +343,31 @@ fn every_axis_is_in_one_group_and_every_name_of_a_group_is_there() {
     let itself = [group(&[0], &[0]), group(&[1], &[])];
     assert_eq!(of(&itself), Some(SetUpError::StopsWith { group: 0, with: 0 }));
 }
+
+#[test]
+fn a_group_that_is_enabled_takes_no_power_from_another_one_that_is_being_enabled() {
+    for delay in 0..80 {
+        let mut parameters = arm_and_gripper();
+        // One drive of the arm is slower than the others.
+        parameters.buses[1].divider = 4;
+        let mut rig = Rig::of(parameters);
+        rig.host.requests.extend([Request::Sync(true), Request::Activate]);
+        rig.run(10);
+        ask(&mut rig, ARM, Request::Enable);
+        rig.run(delay);
+        ask(&mut rig, GRIPPER, Request::Enable);
+        run_until(&mut rig, ARM, Phase::Holding, 200);
+        run_until(&mut rig, GRIPPER, Phase::Holding, 200);
+        rig.run(20);
+        assert_eq!(stops(&rig), [], "{delay} cycles later");
+        let shown = rig.host.events.iter().filter_map(|event| match event.kind {
+            EventKind::DriveState { axis, state, .. } => Some((axis, state)),
+            _ => None,
+        });
+        for axis in 0..4 {
+            let mut states = shown.clone().filter(|(of, _)| *of == axis).map(|(_, state)| state);
+            assert!(states.any(|state| state == DriveState::OperationEnabled));
+            assert_eq!(states.next(), None, "axis {axis} stays enabled, {delay} cycles later");
+        }
+    }
+}

@@ -182,17 +182,21 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             return Goal::QuickStop;
         }
         let may_be_enabled = match self.state {
-            GroupState::Enabling => {
-                shared
-                    .heartbeat
-                    .as_ref()
-                    .is_none_or(|heartbeat| heartbeat.allows_enabling(axis.parameters().bus.into()))
-                    && axis.is_power_granted()
-                    && (axis.is_enabled() || axis.is_on_joint(shared.period_s))
-            }
+            GroupState::Enabling => axis.is_power_granted() && self.may_switch_on(axis, shared),
             _ => axis.is_enabled(),
         };
         if may_be_enabled { Goal::Enabled } else { Goal::Disabled }
+    }
+
+    /// Whether a drive may be led to operation enabled, or is there already. One that has been told to switch on has watched the
+    /// heartbeat before: what another group on its bus begins does not concern it.
+    fn may_switch_on(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> bool {
+        let watches_heartbeat = || {
+            let bus = axis.parameters().bus.into();
+            shared.heartbeat.as_ref().is_none_or(|heartbeat| heartbeat.allows_enabling(bus))
+        };
+        axis.is_enabled()
+            || axis.is_on_joint(shared.period_s) && (axis.may_be_switching_on() || watches_heartbeat())
     }
 
     /// The controlword of a fault reset, for the drives that are at fault. Bit 7 is low first, so that what follows is an edge
