@@ -183,10 +183,10 @@ fn move_limits(leg: &Leg<'_>, velocity_scale: f64, acceleration_scale: f64) -> L
 fn move_jerk(leg: &Leg<'_>, acceleration_scale: f64) -> f64 {
     let (axis, State { velocity, acceleration, .. }) = (leg.limits, leg.start);
     let wanted = axis.jerk * acceleration_scale;
-    let is_along = velocity * acceleration > 0.0;
-    let room = (axis.velocity - velocity.abs()).max(0.0);
+    // In the direction of the acceleration, whether the joint moves there already or is about to turn round.
+    let room = (axis.velocity - velocity * acceleration.signum()).max(0.0);
     let gain = acceleration * acceleration / 2.0;
-    if is_along && gain > room * wanted { axis.jerk.min(gain / room) } else { wanted }
+    if gain > room * wanted { axis.jerk.min(gain / room) } else { wanted }
 }
 
 /// A stop in coordination must not lead an axis that could stop sooner by itself beyond its position limits.
@@ -212,16 +212,19 @@ mod tests {
 
     #[test]
     fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {
-        let start = State { position: 0.0, velocity: 1.9, acceleration: 4.0 };
-        let target = State { position: 2.5, ..State::default() };
-        let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
-        motion
-            .move_to(&mut profiles, [Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0)
-            .unwrap();
-        while !motion.is_finished() {
-            motion.advance(0.001);
-            let velocity = motion.states(&profiles).next().unwrap().velocity;
-            assert!(velocity <= LIMITS.velocity * (1.0 + 1e-9), "{velocity}");
+        // The second one moves the other way, and is about to turn round.
+        for (velocity, acceleration) in [(1.9, 4.0), (-0.1, 8.0)] {
+            let start = State { position: -2.5, velocity, acceleration };
+            let target = State { position: 2.5, ..State::default() };
+            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
+            motion
+                .move_to(&mut profiles, [Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0)
+                .unwrap();
+            while !motion.is_finished() {
+                motion.advance(0.001);
+                let velocity = motion.states(&profiles).next().unwrap().velocity;
+                assert!(velocity <= LIMITS.velocity * (1.0 + 1e-9), "{velocity}");
+            }
         }
     }
 
