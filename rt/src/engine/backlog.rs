@@ -12,8 +12,10 @@ use crate::bit_set::BitSet;
 pub(super) struct Backlog<const BUSES: usize> {
     /// The buses on which own frames of an earlier cycle wait for the wire.
     behind: BitSet,
-    /// The same as it was found in the last slot in which each bus had a cycle.
+    /// The same as it was found in the last slot in which each bus had a cycle, or since.
     found_behind: BitSet,
+    /// Those that were behind when their last cycle began: the frames of the cycle before have not left.
+    cycle_behind: BitSet,
     /// The interfaces that had no room for a frame since their buses' last cycles.
     not_taken: BitSet,
     buses: ArrayVec<BusBacklog, BUSES>,
@@ -35,6 +37,7 @@ impl<const BUSES: usize> Backlog<BUSES> {
         Self {
             behind: BitSet::default(),
             found_behind: BitSet::default(),
+            cycle_behind: BitSet::default(),
             not_taken: BitSet::default(),
             buses,
         }
@@ -44,6 +47,8 @@ impl<const BUSES: usize> Backlog<BUSES> {
     pub(super) fn pass(&mut self, behind: BitSet, in_cycle: BitSet) {
         self.found_behind = behind.union(self.found_behind.without(in_cycle));
         self.behind = self.found_behind;
+        self.cycle_behind =
+            behind.without(behind.without(in_cycle)).union(self.cycle_behind.without(in_cycle));
         for (bus, own) in self.buses.iter_mut().enumerate() {
             let is_behind = self.behind.contains(bus);
             own.behind_cycles = counted(own.behind_cycles, is_behind);
@@ -55,6 +60,7 @@ impl<const BUSES: usize> Backlog<BUSES> {
     /// Takes the buses that have caught up since.
     pub(super) fn clear(&mut self, caught_up: BitSet) {
         self.behind = self.behind.without(caught_up);
+        self.cycle_behind = self.cycle_behind.without(caught_up);
     }
 
     /// Takes the interfaces that had no room for all frames of a slot.
@@ -65,6 +71,12 @@ impl<const BUSES: usize> Backlog<BUSES> {
     /// The buses that are behind.
     pub(super) const fn behind(&self) -> BitSet {
         self.behind
+    }
+
+    /// The buses whose last cycle began while frames of the one before still waited. A slow bus may take the slots between for its
+    /// frames.
+    pub(super) const fn behind_at_cycle(&self) -> BitSet {
+        self.cycle_behind
     }
 
     /// Slots in a row in which a bus was behind.
@@ -110,6 +122,21 @@ mod tests {
         }
         (0..4).for_each(|_| backlog.pass(set(1), ALL));
         assert_eq!((backlog.longest_blocked(ALL), backlog.behind_cycles(1)), ((1, 4), 4));
+    }
+
+    #[test]
+    fn a_slow_bus_may_take_the_slots_between_its_cycles_for_its_frames() {
+        let mut backlog: Backlog<3> = Backlog::new(3);
+        let (slow, fast) = (set(1), ALL.without(set(1)));
+        backlog.pass(BitSet::default(), ALL);
+        backlog.pass(slow, fast);
+        assert_eq!((backlog.behind(), backlog.behind_at_cycle()), (slow, BitSet::default()));
+        backlog.pass(slow, ALL);
+        assert_eq!((backlog.behind(), backlog.behind_at_cycle()), (slow, slow));
+        backlog.pass(BitSet::default(), fast);
+        assert_eq!(backlog.behind_at_cycle(), slow, "none of its frames would leave before its next cycle");
+        backlog.clear(slow);
+        assert_eq!(backlog.behind_at_cycle(), BitSet::default());
     }
 
     #[test]

@@ -68,7 +68,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     #[inline]
     pub(super) fn step(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
         self.group.callback_ns = None;
-        let (own, behind) = (self.group.buses, self.shared.backlog.behind());
+        let (own, behind) = (self.group.buses, self.shared.backlog.behind_at_cycle());
         // A group that stops does not wait for the wire any longer, whatever it stops for.
         let is_over_waiting = self.group.stop.is_some()
             && self.shared.backlog.longest_blocked(own).1 > self.shared.not_transmitted_cycles;

@@ -9,8 +9,9 @@ use super::Seen;
 use crate::bounds;
 use crate::wire::SentValues;
 
-/// How far a drive's own loop may overshoot the velocity limit.
-const OVERSHOOT: f64 = 1.3;
+/// How far a drive's own loop may overshoot the velocity limit. Where slots are missed its set-points stand still, and go on at full speed: the
+/// drive catches up with its highest torque. The largest that was seen in 10^9 cycles is 1.33.
+const OVERSHOOT: f64 = 1.5;
 
 pub fn check(seen: &Seen<'_>) -> Result<(), String> {
     check_deadline(seen)?;
