@@ -240,6 +240,40 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
     ),
 ];
 
+/// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
+const FAILED_WITH_EVERYTHING: [(u64, &str); 3] = [
+    (
+        40_011_225_717,
+        "A gentle move that began while a joint was about to turn round broke the velocity limit",
+    ),
+    (
+        40_011_223_249,
+        "A group paused for a slot in which its slow bus still sent the frames of its last cycle",
+    ),
+    (40_011_226_356, "A drive caught up with more than 1.3 times the velocity limit after many missed slots"),
+];
+
+/// The same of those whose streams command every kind of point.
+const FAILED_WITH_POINTS: [(u64, &str); 3] = [
+    (15_037, "A stream of velocities turned a joint outward again beyond its position limit"),
+    (14_174, "A group that began to enable its drives took the power from those of another one"),
+    (6_095, "A stream that began with an impedance was stopped in its first cycle"),
+];
+
+#[test]
+fn storms_that_have_failed_with_everything_pass() {
+    for (seed, what) in FAILED_WITH_EVERYTHING {
+        let played = play(&Case::of(seed));
+        assert!(played.is_ok(), "{seed}, {what}: {played:?}");
+    }
+    for (seed, what) in FAILED_WITH_POINTS {
+        let mut case = Case { has_every_kind_of_point: true, is_serving: true, ..Case::of(seed) };
+        case.clients = case.clients.max(1);
+        let played = play(&case);
+        assert!(played.is_ok(), "{seed}, {what}: {played:?}");
+    }
+}
+
 #[test]
 fn storms_that_have_failed_in_overload_pass() {
     for (seed, what) in FAILED_IN_OVERLOAD {

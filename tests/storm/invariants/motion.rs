@@ -10,7 +10,7 @@ use crate::bounds;
 use crate::wire::SentValues;
 
 /// How far a drive's own loop may overshoot the velocity limit. Where slots are missed its set-points stand still, and go on at full speed: the
-/// drive catches up with its highest torque. The largest that was seen in 10^9 cycles is 1.33.
+/// drive catches up with its highest torque; 1.33 has been seen.
 const OVERSHOOT: f64 = 1.5;
 
 pub fn check(seen: &Seen<'_>) -> Result<(), String> {
