@@ -32,6 +32,12 @@ impl BitSet {
         Self(self.0 & !other.0)
     }
 
+    /// Those that are in both.
+    #[must_use]
+    pub const fn intersection(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
     /// The numbers of both sets.
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)

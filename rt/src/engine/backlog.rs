@@ -47,8 +47,7 @@ impl<const BUSES: usize> Backlog<BUSES> {
     pub(super) fn pass(&mut self, behind: BitSet, in_cycle: BitSet) {
         self.found_behind = behind.union(self.found_behind.without(in_cycle));
         self.behind = self.found_behind;
-        self.cycle_behind =
-            behind.without(behind.without(in_cycle)).union(self.cycle_behind.without(in_cycle));
+        self.cycle_behind = behind.intersection(in_cycle).union(self.cycle_behind.without(in_cycle));
         for (bus, own) in self.buses.iter_mut().enumerate() {
             let is_behind = self.behind.contains(bus);
             own.behind_cycles = counted(own.behind_cycles, is_behind);

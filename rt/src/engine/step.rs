@@ -64,7 +64,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 }
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus is behind.
+    /// Makes the next set-points, unless those of the last cycles have still to leave, or every bus of the group was behind when its
+    /// cycle began.
     #[inline]
     pub(super) fn step(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
         self.group.callback_ns = None;
