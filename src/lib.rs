@@ -2,12 +2,13 @@
 //!
 //! This is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
 //! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
-//! bounded, lock-free channels ([`controller::channels`]), and nothing else.
+//! bounded, lock-free channels ([`channels`]), and nothing else.
 //!
 //! A tour, in the order in which a run meets the parts:
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
-//! - [`bus`]: what a bus is connected to, how long frames take, and whether everything fits in the worst case.
+//! - [`link`]: what a bus is connected to, and who commands it.
+//! - [`schedule`]: whether everything fits on the buses in the worst case.
 //! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
@@ -23,8 +24,8 @@
 //! each way to move. Every error is readable when `main` returns it: see [`Error`].
 #![deny(unsafe_code)]
 
-pub mod bus;
 pub mod canopen;
+pub mod channels;
 pub mod commission;
 pub mod config;
 pub mod controller;
@@ -32,15 +33,18 @@ pub mod doctor;
 pub mod drive;
 mod error;
 pub mod faults;
+pub mod frame_time;
 pub mod jitter;
+pub mod link;
 pub mod play;
 pub mod printable;
+pub mod schedule;
 pub mod sim;
+pub mod sleep_alignment;
 pub mod telemetry;
 mod text_file;
 pub mod trajectory;
 
-pub use bus::ownership::IfOwned;
 pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
@@ -50,6 +54,7 @@ pub use controller::{
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
+pub use link::ownership::IfOwned;
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 

@@ -2,9 +2,9 @@
 
 use std::sync::OnceLock;
 
-use takt::bus::port::Port;
 use takt::config::Config;
 use takt::faults::{FaultInjector, Scenario};
+use takt::link::port::Port;
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, Phase, ReceiveBatch, Snapshot};
 

@@ -8,10 +8,10 @@ use std::thread;
 
 use clap::Args;
 
-use takt::bus::SocketCanOptions;
-use takt::bus::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
-use takt::bus::port::{OpenError, open_configured};
 use takt::config::{Config, Interface};
+use takt::link::SocketCanOptions;
+use takt::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
+use takt::link::port::{OpenError, open_configured};
 use takt::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};

@@ -37,7 +37,7 @@ use crate::printable::printable_path;
 
 impl Config {
     /// Reads a file and checks it. Whether the buses can carry what it asks for is a question for
-    /// [`crate::bus::schedule::verify`].
+    /// [`crate::schedule::verify`].
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let name = printable_path(path);
         match crate::text_file::read(path) {

@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use crate::bus::schedule::NoCommandPhase;
 use crate::canopen::dcf::DcfError;
+use crate::schedule::NoCommandPhase;
 
 use super::interface::InterfaceError;
 use super::quantity::{self, Quantity};

@@ -10,8 +10,8 @@ use takt_rt::{
     TimingLadder, TorqueLimits,
 };
 
+use crate::channels::{GroupAxes, GroupStream};
 use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
-use crate::controller::channels::{GroupAxes, GroupStream};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
 /// How long the drives may take from the first controlword to operation enabled.

@@ -9,7 +9,7 @@ use super::port::FaultyPort;
 use super::scenario::{Scenario, ScenarioFault};
 use super::trigger::{Trigger, TriggerTimes};
 use super::window::FaultProgress;
-use crate::bus::port::Port;
+use crate::link::port::Port;
 
 /// Injects the faults of a scenario in one run.
 #[derive(Debug)]

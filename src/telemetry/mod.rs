@@ -1,7 +1,7 @@
 //! What a run makes visible: statistics, recordings, reports, and texts about events.
 //!
 //! The real-time thread puts a record of every cycle, and an event for each change, into lock-free rings
-//! ([`crate::controller::channels`]). A [`Logger`] empties them, in a thread of its own that is not real-time
+//! ([`crate::channels`]). A [`Logger`] empties them, in a thread of its own that is not real-time
 //! ([`LoggerThread`]), or step by step in virtual time. A failure in this module never reaches the motion. A full ring
 //! drops records and counts them. A full disk ends the recording with one message. A caller's function that panics is not
 //! called again.

@@ -4,10 +4,10 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use takt::bus::port::Port;
 use takt::config::{Axis, Config, Feedback};
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultEvents, FaultInjector, Scenario};
+use takt::link::port::Port;
 use takt::sim::Observation;
 use takt_rt::{AxisSnapshot, DriveState, EventKind, Phase, StopReason};
 

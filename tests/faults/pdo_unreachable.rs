@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Interrupt, VirtualRun};
 use takt::faults::FaultInjector;
+use takt::link::port::Port;
 use takt::sim::NodeState;
 use takt_rt::Phase;
 

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::FaultInjector;
+use takt::link::port::Port;
 use takt_rt::{Phase, Rule};
 
 use crate::arm::{arm, scenario};

@@ -1,12 +1,12 @@
 //! Whom a fault concerns, from the cycle on in which it begins.
 
-use takt::bus::schedule::analyse;
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config, DriveFamily};
 use takt::faults::{
     Direction, DriveEffect, Effect, FaultInjector, ForeignFrames, FrameEffect, FrameFunction,
     InterfaceEffect, Part, Selection,
 };
+use takt::schedule::analyse;
 use takt::sim::Defect;
 
 use crate::heartbeat::MissedHeartbeat;

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use takt::bus::port::Port;
+use takt::channels::LogSide;
 use takt::config::{Axis, Config};
-use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario, ScenarioFault};
+use takt::link::port::Port;
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{
     Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId,

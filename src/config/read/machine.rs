@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use super::entry::Entry;
 use super::section::Section;
-use crate::bus::schedule::automatic_command_phase;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
 use crate::config::model::{Axis, Config, Cycle, Master, Realtime, Simulation, StreamDelay, Telemetry};
@@ -13,6 +12,7 @@ use crate::config::quantity::Quantity;
 use crate::config::ranges;
 use crate::config::rules;
 use crate::config::spot::Spot;
+use crate::schedule::automatic_command_phase;
 
 /// The cycle, and where the file leaves its command phase to the analysis of the buses.
 pub fn cycle(mut section: Section<'_>) -> (Cycle, Option<Entry<'_>>) {

@@ -37,8 +37,8 @@ use takt_rt::{
     RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
 };
 
-use super::assemble;
 use crate::config::Config;
+use crate::controller::assemble;
 use callbacks::CallbackTaker;
 use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};

@@ -85,7 +85,7 @@ mod tests {
             }
         })));
         let caught = catch(|| panic!("no pose {}", 3)).unwrap_err();
-        assert!(caught.message().starts_with("no pose 3, at src/controller/channels/callback_panic.rs:"));
+        assert!(caught.message().starts_with("no pose 3, at src/channels/callback_panic.rs:"));
         assert_eq!(calls.load(Ordering::Relaxed), 0);
         assert!(catch(|| {}).is_ok());
         assert!(catch_unwind(|| panic!("elsewhere")).is_err());

@@ -26,8 +26,8 @@ pub mod text;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::frame_time::{BitRates, worst_case_bits};
 use crate::config::{Config, Cycle};
+use crate::frame_time::{BitRates, worst_case_bits};
 use bound::Traffic;
 use messages::BusMessage;
 

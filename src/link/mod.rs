@@ -1,10 +1,8 @@
-//! The buses: what they are connected to, who commands them, how long frames take, and whether everything fits.
+//! The buses: what they are connected to, and who commands them.
 
-pub mod frame_time;
 mod interface;
 pub mod ownership;
 pub mod port;
-pub mod schedule;
 mod socketcan;
 pub mod trace;
 
