@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
 use takt::config::Config;
 use takt::controller::VirtualRun;
-use takt::link::port::Port;
+use takt::controller::port::Port;
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingDestination, WallClock};
 
 /// Bytes that all threads together hold on the heap.

@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use takt::channels::{ChannelSizes, channels};
 use takt::config::Config;
+use takt::controller::port::Port;
 use takt::controller::realtime_thread::{self, LoopParts};
 use takt::controller::{Outcome, Supervisor, assemble};
-use takt::link::port::Port;
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, LoggerThread, Machine, WallClock};
 use takt_rt::Frame;
 use takt_rt::linux::MonotonicClock;

@@ -10,10 +10,10 @@ use std::time::Duration;
 
 use takt::channels::{ChannelSizes, HostSide, LogSide, channels};
 use takt::config::Config;
+use takt::controller::port::Port;
 use takt::controller::realtime_thread::{self, Ended, LoopParts};
 use takt::controller::session::{self, Session, SessionOptions};
 use takt::controller::{Outcome, Supervisor, assemble};
-use takt::link::port::Port;
 use takt::link::trace::Trace;
 use takt::telemetry::{
     BlackBoxOptions, Incident, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,

@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use takt::config::Config;
-use takt::link::port::Port;
+use takt::controller::port::Port;
 use takt::link::{
     InterfaceError, InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
 };

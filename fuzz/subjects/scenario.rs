@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 
 use takt::config::Config;
+use takt::controller::port::Port;
 use takt::faults::{FaultInjector, Scenario};
-use takt::link::port::Port;
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, Phase, ReceiveBatch, Snapshot};
 

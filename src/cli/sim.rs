@@ -9,9 +9,9 @@ use std::thread;
 use clap::Args;
 
 use takt::config::{Config, Interface};
-use takt::link::SocketCanOptions;
+use takt::controller::port::open_configured;
 use takt::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
-use takt::link::port::{OpenError, open_configured};
+use takt::link::{OpenError, SocketCanOptions};
 use takt::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};

@@ -29,28 +29,23 @@ pub use interface::InterfaceError;
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
+pub(crate) use read::{CommandPhase, parse};
 pub use warning::{Warning, WarningKind, is_rounded};
 
 use thiserror::Error;
 
 use crate::printable::printable_path;
 
+/// Reads a file and checks it, as [`read::parse`] does its text.
+pub(crate) fn load(path: &Path, command_phase: CommandPhase) -> Result<Config, ConfigError> {
+    let name = printable_path(path);
+    match crate::text_file::read(path) {
+        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, command_phase),
+        Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
+    }
+}
+
 impl Config {
-    /// Reads a file and checks it. Whether the buses can carry what it asks for is a question for
-    /// [`crate::schedule::verify`].
-    pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let name = printable_path(path);
-        match crate::text_file::read(path) {
-            Ok(bytes) => Self::parse(&name, &ConfigError::text_of(&name, bytes)?),
-            Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
-        }
-    }
-
-    /// Reads and checks the text of a configuration. `source_name` is what messages call it.
-    pub fn parse(source_name: &str, text: &str) -> Result<Self, ConfigError> {
-        read::parse(source_name, text)
-    }
-
     /// Connects a bus to another interface than the file says, as `--bus NAME=INTERFACE` does.
     pub fn override_interface(&mut self, name: &str, interface: &str) -> Result<(), OverrideError> {
         let interface: Interface = interface.parse()?;

@@ -10,7 +10,7 @@ use takt_rt::{
     TimingLadder, TorqueLimits,
 };
 
-use crate::channels::{GroupAxes, GroupStream};
+use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
 use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
 use crate::drive::{PdoPlan, ProcessData, yz_aim};
 
@@ -235,5 +235,22 @@ pub fn look_ahead(config: &Config, axes: &[usize]) -> LookAheadParameters {
         limits: limits.take(MAX_AXES).collect(),
         period_ns: config.cycle.period_ns,
         delay: config.stream_delay,
+    }
+}
+
+impl ChannelSizes {
+    /// Sizes for a configuration. The record ring is configured. The others hold a burst of SDO traffic of every node, and
+    /// the events of a second in which the logger is late.
+    pub fn of(config: &Config) -> Self {
+        Self {
+            groups: streams(config),
+            axes: config.axes.len(),
+            buses: config.buses.len(),
+            records: config.telemetry.ring_records,
+            events: 1024,
+            requests: 16,
+            service_out: 256,
+            service_in: 1024,
+        }
     }
 }

@@ -2,9 +2,11 @@
 
 mod arrival;
 pub mod assemble;
+mod buses;
 mod handle;
 mod outcome;
 mod point_check;
+pub mod port;
 mod program;
 pub mod realtime_thread;
 pub mod session;

@@ -10,22 +10,23 @@ use takt_rt::{Clock, Request, SlotPlan, Snapshot, StopCategory};
 
 use super::assemble::{self, AssembleError};
 use super::outcome::{Interrupt, Outcome, Progress};
+use super::port::Port;
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::channels::{
     CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, TrajectoryGiver,
-    channels,
+    channels, panic_message,
 };
 use crate::config::Config;
 use crate::faults::FaultInjector;
+use crate::link::OpenError;
 use crate::link::ownership::{ClaimError, IfOwned, Ownership};
-use crate::link::port::{OpenError, Port};
 use crate::link::trace::Trace;
 use crate::sleep_alignment;
 use crate::telemetry::{
     BlackBoxOptions, EachCycle, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
-    RecordingDestination, WallClock, panic_message,
+    RecordingDestination, WallClock,
 };
 
 /// The pause between two polls of the controller.

@@ -7,12 +7,12 @@ use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, Snapshot, Wake};
 
 use super::assemble::{self, AssembleError};
 use super::outcome::{Interrupt, Outcome};
+use super::port::Port;
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
 use crate::channels::{CallbackClock, ChannelSizes, HostSide, LogSide, RtSide, channels};
 use crate::config::Config;
 use crate::faults::FaultInjector;
-use crate::link::port::Port;
 use crate::sim::SimulatedBus;
 use crate::telemetry::WallClock;
 

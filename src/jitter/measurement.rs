@@ -7,10 +7,11 @@ use takt_rt::{BusHealth, Request, SlotPlan};
 use crate::channels::{ChannelSizes, LogSide, channels};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
+use crate::controller::port::Port;
 use crate::controller::realtime_thread::{self, Begun, LoopParts, StartError};
+use crate::link::OpenError;
 use crate::link::interface_status;
 use crate::link::ownership::{ClaimError, IfOwned, Ownership};
-use crate::link::port::{OpenError, Port};
 use crate::sleep_alignment;
 use crate::telemetry::Statistics;
 

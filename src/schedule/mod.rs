@@ -17,6 +17,7 @@
 
 mod bound;
 mod command_phase;
+mod loading;
 mod messages;
 mod remedy;
 mod response_time;

@@ -31,7 +31,7 @@ pub mod words;
 
 pub use black_box::{BlackBoxOptions, Incident};
 pub use destination::RecordingDestination;
-pub use listener::{Notify, panic_message};
+pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use recorded::{Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, WalkError};

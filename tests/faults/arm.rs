@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use takt::config::{Axis, Config, Feedback};
+use takt::controller::port::Port;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultEvents, FaultInjector, Scenario};
-use takt::link::port::Port;
 use takt::sim::Observation;
 use takt_rt::{AxisSnapshot, DriveState, EventKind, Phase, StopReason};
 

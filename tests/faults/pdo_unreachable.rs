@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use takt::config::Config;
+use takt::controller::port::Port;
 use takt::controller::{Interrupt, VirtualRun};
 use takt::faults::FaultInjector;
-use takt::link::port::Port;
 use takt::sim::NodeState;
 use takt_rt::Phase;
 

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use takt::config::Config;
 use takt::controller::VirtualRun;
+use takt::controller::port::Port;
 use takt::faults::FaultInjector;
-use takt::link::port::Port;
 use takt::sim::SimulatedBus;
 use takt_rt::{Fault, Phase, Request, Rule, StopCause, StopReason};
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use takt::config::Config;
+use takt::controller::port::Port;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::FaultInjector;
-use takt::link::port::Port;
 use takt_rt::{Phase, Rule};
 
 use crate::arm::{arm, scenario};

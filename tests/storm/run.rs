@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use takt::channels::LogSide;
 use takt::config::{Axis, Config};
+use takt::controller::port::Port;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario, ScenarioFault};
-use takt::link::port::Port;
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{
     Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId,

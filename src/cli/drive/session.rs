@@ -5,9 +5,9 @@ use std::sync::atomic::Ordering;
 
 use takt::commission::{Failure, TargetDrive, Task, bus_session, procedure};
 use takt::controller::VirtualClock;
+use takt::controller::port::{Port, open_configured};
 use takt::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
-use takt::link::port::{OpenError, Port, open_configured};
-use takt::link::{InterfaceSettings, SocketCanOptions, open_interface};
+use takt::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
 use takt::sim::SimulatedBus;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, BusState};

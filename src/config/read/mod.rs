@@ -23,9 +23,17 @@ use super::problem_kind::ProblemKind;
 use super::spot::Problems;
 use section::Section;
 
-/// Reads and checks a configuration.
-pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
-    document(source_name, text, read)
+/// Finds what `command_phase = "auto"` stands for in a configuration that is complete otherwise. The error says in words why
+/// there is no such phase. It takes an analysis of the buses, which is not a matter of reading.
+pub(crate) type CommandPhase = fn(&Config) -> Result<u64, String>;
+
+/// Reads and checks the text of a configuration. `source_name` is what messages call it.
+pub(crate) fn parse(
+    source_name: &str,
+    text: &str,
+    command_phase: CommandPhase,
+) -> Result<Config, ConfigError> {
+    document(source_name, text, |document, problems| read(document, problems, command_phase))
 }
 
 /// What `read` makes of a TOML document, or else every problem that it has reported.
@@ -55,7 +63,11 @@ fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
 }
 
 /// Reads every section, even after one has failed.
-fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config> {
+fn read<'a>(
+    document: &'a DeTable<'a>,
+    problems: &'a Problems,
+    command_phase: CommandPhase,
+) -> Option<Config> {
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
@@ -102,8 +114,12 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config>
         telemetry,
         simulation,
     };
+    // Once everything else that counts is known.
     if let Some(automatic_phase) = automatic_phase.filter(|_| problems.is_empty()) {
-        machine::resolve_command_phase(&mut config, &automatic_phase);
+        match command_phase(&config) {
+            Ok(command_phase_ns) => config.cycle.command_phase_ns = command_phase_ns,
+            Err(cause) => automatic_phase.report(ProblemKind::NoCommandPhase { cause }),
+        }
     }
     Some(config)
 }
