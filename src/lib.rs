@@ -4,6 +4,22 @@
 //! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
 //! bounded, lock-free channels ([`channels`]), and nothing else.
 //!
+//! Each folder uses only what stands below it in this picture (`tests/arrows.rs` proves it):
+//!
+//! ```text
+//! cli                                 the program `takt`
+//! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
+//! error                               one error for a program that embeds takt
+//! controller                          the engine of a configuration, its life, its ports, the handles
+//! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
+//! drive                               the families of drives: bring-up, facts, words
+//! faults link sim                     faults on purpose; sockets; simulated buses and drives
+//! config                              TOML to checked plain data in SI units
+//! canopen                             the protocols of CiA 301, 305 and 306, without I/O
+//! channels                            the lock-free door to the real-time thread
+//! trajectory frame_time printable sleep_alignment text_file
+//! ```
+//!
 //! A tour, in the order in which a run meets the parts:
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
