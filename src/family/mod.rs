@@ -6,7 +6,6 @@
 
 pub mod erob_canopen;
 mod error_words;
-mod reading;
 mod registry;
 mod simulated_bus;
 mod warning;

@@ -17,6 +17,7 @@
 
 mod bound;
 mod command_phase;
+mod loading;
 mod messages;
 mod remedy;
 mod response_time;
@@ -26,8 +27,8 @@ pub mod text;
 use serde::Serialize;
 use thiserror::Error;
 
-use super::frame_time::{BitRates, worst_case_bits};
 use crate::config::{Config, Cycle};
+use crate::frame_time::{BitRates, worst_case_bits};
 use bound::Traffic;
 use messages::BusMessage;
 

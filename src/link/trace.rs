@@ -7,7 +7,7 @@
 use arrayvec::ArrayVec;
 use takt_rt::{BusHealth, BusPort, Frame, FrameKind, Id, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
-use crate::controller::channels::{Consumer, Producer, ring};
+use crate::channels::{Consumer, Producer, ring};
 
 /// A frame that passed a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,7 +14,7 @@ use takt_rt::linux::MonotonicClock;
 use takt_rt::{Clock, Nanoseconds};
 
 /// The start of the first slot at or after `earliest_ns`.
-pub(super) fn first_slot_after(earliest_ns: Nanoseconds, period_ns: Nanoseconds) -> Nanoseconds {
+pub(crate) fn first_slot_after(earliest_ns: Nanoseconds, period_ns: Nanoseconds) -> Nanoseconds {
     let phase_ns = period_ns / 4;
     earliest_ns.saturating_sub(phase_ns).div_ceil(period_ns) * period_ns + phase_ns
 }

@@ -16,8 +16,8 @@
 use serde::Serialize;
 
 use super::messages::{BusMessage, MessageKind};
-use crate::bus::frame_time::{BitRates, worst_case_bits};
 use crate::config::Cycle;
+use crate::frame_time::{BitRates, worst_case_bits};
 
 /// The worst slot of a bus. All times are counted from the start of the slot or are lengths, in ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -5,11 +5,11 @@ use takt_rt::Frame;
 use takt_rt::linux::SocketCanPort;
 use takt_rt::{BusHealth, BusPort, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
-use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
-use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
-use super::trace::{Trace, TracedPort, traced};
+use super::buses::socket_options;
 use crate::config::{Config, Interface};
 use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
+use crate::link::trace::{Trace, TracedPort, traced};
+use crate::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
 use crate::sim::SimulatedBus;
 
 /// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
@@ -27,36 +27,13 @@ pub enum Port {
     Faulty(Box<FaultyPort<Port>>),
 }
 
-/// A bus that cannot be opened.
-#[derive(Debug, thiserror::Error)]
-pub enum OpenError {
-    /// The interface is missing, down or set up differently.
-    #[error("bus `{bus}`: {error}")]
-    Interface {
-        /// The name of the bus.
-        bus: String,
-        /// The reason.
-        #[source]
-        error: InterfaceError,
-    },
-    /// No socket could be opened on the interface.
-    #[error("bus `{bus}`: {error}")]
-    Socket {
-        /// The name of the bus.
-        bus: String,
-        /// The reason.
-        #[source]
-        error: SocketCanError,
-    },
-}
-
 impl Port {
     /// Opens bus number `bus` of a configuration.
     ///
     /// # Errors
     /// See [`OpenError`].
     pub fn open(config: &Config, bus: usize) -> Result<Self, OpenError> {
-        let options = SocketCanOptions::of_master(config, bus);
+        let options = socket_options(config, bus);
         match open_configured(config, bus, &options)? {
             Some(port) => Ok(Self::SocketCan(Box::new(port))),
             None => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
@@ -95,34 +72,10 @@ pub fn open_configured(
     open_interface(&bus.name, interface, &InterfaceSettings::of(bus), options).map(Some)
 }
 
-/// Prepares an interface and opens a socket on it, for the bus of this name.
-///
-/// # Errors
-/// See [`OpenError`].
-pub fn open_interface(
-    bus: &str,
-    interface: &str,
-    settings: &InterfaceSettings,
-    options: &SocketCanOptions,
-) -> Result<SocketCanPort, OpenError> {
-    prepare(bus, interface, settings)?;
-    open_socket(bus, interface, options)
-}
-
-/// Brings an interface up with these settings, or checks that it has them.
-pub(super) fn prepare(bus: &str, interface: &str, settings: &InterfaceSettings) -> Result<(), OpenError> {
-    match prepare_interface(interface, settings) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(OpenError::Interface { bus: bus.to_owned(), error }),
+impl From<FaultyPort<Port>> for Port {
+    fn from(port: FaultyPort<Self>) -> Self {
+        Self::Faulty(Box::new(port))
     }
-}
-
-pub(super) fn open_socket(
-    bus: &str,
-    interface: &str,
-    options: &SocketCanOptions,
-) -> Result<SocketCanPort, OpenError> {
-    open_socketcan(interface, options).map_err(|error| OpenError::Socket { bus: bus.to_owned(), error })
 }
 
 impl BusPort for Port {

@@ -1,10 +1,8 @@
-//! The buses: what they are connected to, who commands them, how long frames take, and whether everything fits.
+//! The buses: what they are connected to, and who commands them.
 
-pub mod frame_time;
 mod interface;
+mod open;
 pub mod ownership;
-pub mod port;
-pub mod schedule;
 mod socketcan;
 pub mod trace;
 
@@ -12,5 +10,5 @@ pub use interface::{
     ControllerTiming, InterfaceError, InterfaceSettings, InterfaceStatus, interface_status,
     prepare_interface, transmit_queue_length,
 };
-pub use port::open_interface;
+pub use open::{OpenError, open_interface};
 pub use socketcan::{SocketCanError, SocketCanOptions, open_socketcan};

@@ -8,10 +8,6 @@ use takt_rt::Id;
 use takt_rt::linux::SocketCanPort;
 use thiserror::Error;
 
-use crate::canopen::function_code;
-use crate::config::Config;
-use crate::family::identifiers;
-
 /// Bytes that the kernel reserves for one frame that waits in the buffer of a socket. The frame with its bookkeeping takes 768 bytes
 /// on Linux 6.1, and up to 960 since 6.3.
 const BYTES_PER_FRAME: usize = 1_024;
@@ -37,32 +33,6 @@ pub struct SocketCanOptions {
     pub receive_frames: usize,
 }
 
-impl SocketCanOptions {
-    /// The options of the master on bus number `bus` of a configuration. They let pass every identifier that the drives on this
-    /// bus use, in both directions.
-    pub fn of_master(config: &Config, bus: usize) -> Self {
-        let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-        let of_drives = axes.flat_map(|axis| identifiers(&axis.drive, axis.node));
-        let broadcast = [function_code::NMT, function_code::SYNC, function_code::TIME];
-        let broadcast = broadcast.map(|function| Id::canopen(function, 0));
-        let own = Id::canopen(function_code::ERROR_CONTROL, config.master.node);
-        let settings = config.buses.get(bus);
-        Self {
-            identifiers: of_drives.chain(broadcast).chain([own]).collect(),
-            bit_rate: settings.map_or(1_000_000, |bus| bus.bit_rate),
-            data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
-            // The frames of all buses: the kernel may charge one socket with frames that others send in the same call, and
-            // on a bus that is stuck they stay there.
-            transmit_frames: config.axes.len() * COMMANDS_PER_AXIS + config.buses.len() * SERVICE_FRAMES,
-            receive_frames: RECEIVE_FRAMES,
-        }
-    }
-}
-
-/// The most set-point frames of an axis in a cycle: a drive has four receive PDOs.
-const COMMANDS_PER_AXIS: usize = 4;
-/// The most SYNC and service frames of a bus in a cycle.
-const SERVICE_FRAMES: usize = 8;
 /// Enough for a reader that stalls for 30 ms on a fully loaded bus.
 const RECEIVE_FRAMES: usize = 1_024;
 
@@ -145,8 +115,6 @@ fn set_buffers(socket: &CanFdSocket, options: &SocketCanOptions) -> io::Result<(
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
 
     #[test]
@@ -157,25 +125,6 @@ mod tests {
         let extended = filter(Id::extended(0x181).unwrap());
         assert_eq!(extended.as_ref().can_id, 0x8000_0181);
         assert_eq!(extended.as_ref().can_mask, 0xDFFF_FFFF);
-    }
-
-    #[test]
-    fn a_master_receives_every_identifier_of_its_nodes_and_its_own() {
-        let config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
-        let options = SocketCanOptions::of_master(&config, 0);
-        let node = config.axes.iter().find(|axis| axis.bus == 0).map(|axis| axis.node).unwrap();
-        for function in [0x080, 0x180, 0x200, 0x480, 0x500, 0x580, 0x600, 0x700] {
-            assert!(options.identifiers.contains(&Id::canopen(function, node)), "{function:X}");
-        }
-        // The request and the reply of the probe for the vendor's own protocol.
-        let other = [0x640, 0x5C0].map(|base| Id::base(base + u32::from(node)).unwrap());
-        let own = Id::canopen(0x700, config.master.node);
-        for id in [Id::canopen(0x000, 0), Id::canopen(0x080, 0), own].into_iter().chain(other) {
-            assert!(options.identifiers.contains(&id), "{id:?}");
-        }
-        let elsewhere = config.axes.iter().find(|axis| axis.bus == 1).map(|axis| axis.node).unwrap();
-        assert!(!options.identifiers.contains(&Id::canopen(0x180, elsewhere)));
-        assert!(options.identifiers.len() <= FILTER_LIMIT);
     }
 
     #[test]

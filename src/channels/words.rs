@@ -350,7 +350,7 @@ fn unpack(word: u64) -> [u8; 4] {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::controller::channels::latest::{Attempt, latest};
+    use crate::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
     use takt_rt::{MotionReport, MotionState};
 

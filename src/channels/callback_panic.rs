@@ -10,8 +10,6 @@ use std::panic::{self, AssertUnwindSafe, PanicHookInfo, catch_unwind};
 use std::sync::Once;
 use std::thread;
 
-use crate::telemetry::panic_message;
-
 type Hook = Box<dyn Fn(&PanicHookInfo<'_>) + Send + Sync>;
 
 thread_local! {
@@ -31,6 +29,12 @@ impl CaughtPanic {
         let message = panic_message(&*self.payload);
         self.place.as_ref().map_or_else(|| message.clone(), |place| format!("{message}, at {place}"))
     }
+}
+
+/// The message of a panic.
+pub(crate) fn panic_message(payload: &(dyn Any + Send)) -> String {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message").to_owned()
 }
 
 /// Puts a hook before the present one that keeps the place of the panics of callbacks, and hands all others on. A hook that is set later
@@ -85,7 +89,7 @@ mod tests {
             }
         })));
         let caught = catch(|| panic!("no pose {}", 3)).unwrap_err();
-        assert!(caught.message().starts_with("no pose 3, at src/controller/channels/callback_panic.rs:"));
+        assert!(caught.message().starts_with("no pose 3, at src/channels/callback_panic.rs:"));
         assert_eq!(calls.load(Ordering::Relaxed), 0);
         assert!(catch(|| {}).is_ok());
         assert!(catch_unwind(|| panic!("elsewhere")).is_err());

@@ -107,8 +107,8 @@ const NO_REJECTION: RequestError = RequestError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::channels::latest::latest;
-    use crate::controller::channels::words::tests::{rejections, stop_reasons};
+    use crate::channels::latest::latest;
+    use crate::channels::words::tests::{rejections, stop_reasons};
     use proptest::prelude::*;
     use takt_rt::{DriveState, MAX_GROUPS};
 

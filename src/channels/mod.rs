@@ -37,8 +37,6 @@ use takt_rt::{
     RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
 };
 
-use super::assemble;
-use crate::config::Config;
 use callbacks::CallbackTaker;
 use client_requests::{TakenRequests, client_requests};
 use latest::{Attempt, Reader, Writer};
@@ -47,6 +45,7 @@ use records::{RecordConsumer, RecordProducer};
 use stream::{StreamReceiver, stream_channels};
 use trajectories::TrajectoryTaker;
 
+pub(crate) use callback_panic::panic_message;
 pub use callback_record::{CallbackRecord, CallbackTimes};
 pub use callbacks::{
     CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
@@ -78,23 +77,6 @@ pub struct ChannelSizes {
     pub service_out: usize,
     /// Received service frames that wait for the host, of all buses together.
     pub service_in: usize,
-}
-
-impl ChannelSizes {
-    /// Sizes for a configuration. The record ring is configured. The others hold a burst of SDO traffic of every node, and
-    /// the events of a second in which the logger is late.
-    pub fn of(config: &Config) -> Self {
-        Self {
-            groups: assemble::streams(config),
-            axes: config.axes.len(),
-            buses: config.buses.len(),
-            records: config.telemetry.ring_records,
-            events: 1024,
-            requests: 16,
-            service_out: 256,
-            service_in: 1024,
-        }
-    }
 }
 
 /// Why a request or frame was not accepted.

@@ -13,11 +13,10 @@ use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::interface::{InterfaceSettings, interface_index};
-use super::port::{OpenError, open_socket, prepare};
+use super::open::{OpenError, open_socket, prepare};
 use super::socketcan::SocketCanOptions;
-use crate::config::{Config, Interface};
 
-pub use listening::{HeardMaster, Listening, MasterActivity, MasterTraffic, Verdict};
+pub use listening::{CommandedDrive, HeardMaster, Listening, MasterActivity, MasterTraffic, Verdict};
 pub use lock::{InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError};
 
 /// The pause between two polls of the buses. At most about forty frames pass a bus of 1 Mbit/s in it.
@@ -45,20 +44,6 @@ pub struct BusClaim {
     pub settings: InterfaceSettings,
     /// How another master is recognised on it.
     pub traffic: MasterTraffic,
-}
-
-impl BusClaim {
-    /// Bus number `bus` of a configuration; `None` when it is a simulated one.
-    pub fn of(config: &Config, bus: usize) -> Option<Self> {
-        let settings = config.buses.get(bus)?;
-        let Interface::SocketCan(interface) = &settings.interface else { return None };
-        Some(Self {
-            bus: settings.name.clone(),
-            interface: interface.clone(),
-            settings: InterfaceSettings::of(settings),
-            traffic: MasterTraffic::of(config, bus),
-        })
-    }
 }
 
 /// Why this process may not command a bus. Nothing has been sent then.
@@ -133,15 +118,6 @@ pub struct Ownership {
 }
 
 impl Ownership {
-    /// Of every real interface of a configuration.
-    ///
-    /// # Errors
-    /// See [`ClaimError`].
-    pub fn of(config: &Config, if_owned: IfOwned) -> Result<Self, ClaimError> {
-        let claims = (0..config.buses.len()).filter_map(|bus| BusClaim::of(config, bus));
-        Self::claim(claims.collect(), if_owned)
-    }
-
     /// Takes the locks of these interfaces, and listens on all of them at once.
     ///
     /// # Errors
@@ -268,23 +244,43 @@ const BATCHES: usize = 32;
 mod tests {
     use std::os::fd::AsRawFd;
     use std::os::unix::net::UnixDatagram;
-    use std::path::Path;
 
     use takt_rt::linux::SocketCanPort;
     use takt_rt::{Frame, Id};
 
     use super::*;
-    use crate::controller::VirtualClock;
+    use takt_rt::Wake;
+
+    /// Jumps to the end of every wait.
+    #[derive(Default)]
+    struct JumpingClock {
+        now_ns: Nanoseconds,
+    }
+
+    impl Clock for JumpingClock {
+        fn now_ns(&mut self) -> Nanoseconds {
+            self.now_ns
+        }
+
+        fn wait_until(&mut self, deadline_ns: Nanoseconds) -> Wake {
+            self.now_ns = deadline_ns;
+            Wake { now_ns: deadline_ns, timer_latency_ns: 0 }
+        }
+
+        fn wait_to_send(&mut self, deadline_ns: Nanoseconds) -> Wake {
+            self.wait_until(deadline_ns)
+        }
+    }
 
     /// Two buses that are listened to, and the other ends of them.
     fn listened() -> (Vec<(SocketCanPort, Listening)>, Vec<SocketCanPort>) {
-        let config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
         let port = |socket: &UnixDatagram| SocketCanPort::new(socket.as_raw_fd(), 1_000_000, None).unwrap();
-        let pairs = (0..2).map(|bus| {
+        let pairs = [1, 4].map(|node| {
             let (ours, theirs) = UnixDatagram::pair().unwrap();
-            ((port(&ours), Listening::new(MasterTraffic::of(&config, bus), 0)), port(&theirs))
+            let traffic = MasterTraffic::without_configuration(Some(node));
+            ((port(&ours), Listening::new(traffic, 0)), port(&theirs))
         });
-        pairs.unzip()
+        pairs.into_iter().unzip()
     }
 
     #[test]
@@ -292,7 +288,7 @@ mod tests {
         let (mut ours, mut theirs) = listened();
         let feedback = Frame::of(Id::canopen(0x180, 4), [0; 8]);
         assert_eq!(theirs[1].send(0, &[feedback; 100]), 100);
-        let mut clock = VirtualClock::default();
+        let mut clock = JumpingClock::default();
         assert_eq!(listen(&mut ours, &mut clock), None);
         assert_eq!(clock.now_ns(), 300_000_000);
     }
@@ -303,24 +299,9 @@ mod tests {
         let feedback = Frame::of(Id::canopen(0x180, 4), [0; 8]);
         assert_eq!(theirs[1].send(0, &[feedback; 100]), 100);
         assert_eq!(theirs[1].send(0, &[Frame::of(Id::canopen(0x080, 0), [])]), 1);
-        let mut clock = VirtualClock::default();
+        let mut clock = JumpingClock::default();
         let (bus, heard) = listen(&mut ours, &mut clock).expect("there is a master");
         assert_eq!((bus, heard.activity), (1, MasterActivity::Sync));
         assert_eq!(clock.now_ns(), 0);
-    }
-
-    #[test]
-    fn simulated_buses_belong_to_nobody_and_take_no_time() {
-        let config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
-        let ownership = Ownership::of(&config, IfOwned::Refuse).unwrap();
-        assert!(ownership.locks.is_empty());
-    }
-
-    #[test]
-    fn an_interface_that_does_not_exist_is_named_with_its_bus() {
-        let mut config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
-        config.buses[1].interface = Interface::SocketCan("takt-none".to_owned());
-        let error = Ownership::of(&config, IfOwned::TakeOver).unwrap_err().to_string();
-        assert!(error.starts_with("bus `wrist`: there is no interface takt-none"), "{error}");
     }
 }

@@ -7,8 +7,7 @@ use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use crate::canopen::function_code;
 use crate::canopen::nmt::{NmtCommand, NmtTarget};
-use crate::config::{Config, defaults};
-use crate::drive::ProcessData;
+use crate::config::defaults;
 
 /// Requests of an LSS master (CiA 305).
 const LSS_REQUEST: u32 = 0x7E5;
@@ -20,6 +19,17 @@ const SHORTEST_NS: Nanoseconds = 300_000_000;
 const LONGEST_NS: Nanoseconds = 2_000_000_000;
 /// The listening time covers this many SYNC periods of the own configuration, and one and a half heartbeat periods.
 const SYNC_PERIODS: u64 = 3;
+
+/// A drive that the own configuration commands.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CommandedDrive {
+    /// Its node ID.
+    pub node: u8,
+    /// The identifiers of its set-points.
+    pub commands: Vec<Id>,
+    /// The identifiers of its feedback, and of process data that it sends and nobody reads.
+    pub feedback: Vec<Id>,
+}
 
 /// The traffic by which another master is recognised on a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -35,22 +45,24 @@ pub struct MasterTraffic {
 }
 
 impl MasterTraffic {
-    /// Of bus number `bus` of a configuration.
-    pub fn of(config: &Config, bus: usize) -> Self {
-        let axes = || config.axes.iter().filter(|axis| axis.bus == bus);
-        let mut set_points: Vec<(Id, u8)> = axes().flat_map(|axis| rpdos(axis.node)).collect();
-        for axis in axes() {
-            let data = ProcessData::of(axis);
+    /// Of a master with this node ID and these periods, and these drives.
+    pub fn new(
+        master: u8,
+        sync_period_ns: Nanoseconds,
+        heartbeat_ns: Option<Nanoseconds>,
+        drives: &[CommandedDrive],
+    ) -> Self {
+        let mut set_points: Vec<(Id, u8)> = drives.iter().flat_map(|drive| rpdos(drive.node)).collect();
+        for drive in drives {
             // A drive may send its feedback with an identifier that the pre-defined connection set gives to an RPDO.
-            let sent: Vec<Id> = data.feedback.iter().chain(&data.unused).map(|pdo| pdo.id).collect();
-            set_points.retain(|(id, _)| !sent.contains(id));
-            set_points.extend(data.commands.iter().map(|pdo| (pdo.id, axis.node)));
+            set_points.retain(|(id, _)| !drive.feedback.contains(id));
+            set_points.extend(drive.commands.iter().map(|id| (*id, drive.node)));
         }
-        let sync_ns = config.bus_cycle(bus).period_ns.saturating_mul(SYNC_PERIODS);
-        let heartbeat_ns = config.master.heartbeat_ns.map_or(0, |period_ns| period_ns.saturating_mul(3) / 2);
+        let sync_ns = sync_period_ns.saturating_mul(SYNC_PERIODS);
+        let heartbeat_ns = heartbeat_ns.map_or(0, |period_ns| period_ns.saturating_mul(3) / 2);
         Self {
-            master: config.master.node,
-            drives: axes().map(|axis| axis.node).collect(),
+            master,
+            drives: drives.iter().map(|drive| drive.node).collect(),
             set_points,
             duration_ns: sync_ns.max(heartbeat_ns).clamp(SHORTEST_NS, LONGEST_NS),
         }
@@ -141,9 +153,9 @@ impl fmt::Display for HeardMaster {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.activity {
             MasterActivity::Sync => write!(f, "SYNC")?,
-            MasterActivity::Nmt(None) => write!(f, "an function_code::NMT command")?,
+            MasterActivity::Nmt(None) => write!(f, "an NMT command")?,
             MasterActivity::Nmt(Some((command, target))) => {
-                write!(f, "the function_code::NMT command `{}` to ", command_name(command))?;
+                write!(f, "the NMT command `{}` to ", command_name(command))?;
                 match target {
                     NmtTarget::All => write!(f, "all nodes")?,
                     NmtTarget::Node(node) => write!(f, "node {node}")?,
@@ -213,12 +225,19 @@ impl Listening {
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
 
-    fn arm() -> Config {
-        Config::load(Path::new("configs/arm6-erob.toml")).unwrap()
+    const MS: Nanoseconds = 1_000_000;
+
+    /// A drive with one PDO in each direction, with the identifiers that CiA 301 gives them.
+    fn drive(node: u8) -> CommandedDrive {
+        let (commands, feedback) = (vec![Id::canopen(0x200, node)], vec![Id::canopen(0x180, node)]);
+        CommandedDrive { node, commands, feedback }
+    }
+
+    /// Drives 1 to 3, commanded by this master.
+    fn arm(master: u8) -> MasterTraffic {
+        MasterTraffic::new(master, MS, Some(100 * MS), &[1, 2, 3].map(drive))
     }
 
     fn frame(id: u32, bytes: &[u8]) -> Frame {
@@ -226,7 +245,7 @@ mod tests {
     }
 
     fn heard(id: u32, bytes: &[u8]) -> Option<String> {
-        MasterTraffic::of(&arm(), 0).judge(&frame(id, bytes)).map(|heard| heard.to_string())
+        arm(127).judge(&frame(id, bytes)).map(|heard| heard.to_string())
     }
 
     #[track_caller]
@@ -238,13 +257,9 @@ mod tests {
     fn what_only_a_master_sends_is_recognised_with_its_meaning() {
         is_a_master(0x080, &[], "SYNC (identifier 080)");
         is_a_master(0x080, &[7], "SYNC (identifier 080)");
-        is_a_master(
-            0x000,
-            &[0x81, 0],
-            "the function_code::NMT command `reset node` to all nodes (identifier 000)",
-        );
-        is_a_master(0x000, &[0x01, 3], "the function_code::NMT command `start` to node 3 (identifier 000)");
-        is_a_master(0x000, &[9], "an function_code::NMT command (identifier 000)");
+        is_a_master(0x000, &[0x81, 0], "the NMT command `reset node` to all nodes (identifier 000)");
+        is_a_master(0x000, &[0x01, 3], "the NMT command `start` to node 3 (identifier 000)");
+        is_a_master(0x000, &[9], "an NMT command (identifier 000)");
         is_a_master(
             0x77F,
             &[5],
@@ -274,7 +289,7 @@ mod tests {
         ] {
             assert_eq!(heard(id, bytes), None, "{id:03X}");
         }
-        let traffic = MasterTraffic::of(&arm(), 0);
+        let traffic = arm(127);
         let sync = Id::base(0x080).unwrap();
         for other_kind in [
             Frame::remote(sync, 0).unwrap(),
@@ -287,10 +302,18 @@ mod tests {
 
     #[test]
     fn the_axis_that_has_the_node_id_of_the_master_is_no_master() {
-        let mut config = arm();
-        config.master.node = config.axes[0].node;
-        let boot_up = Frame::of(Id::canopen(0x700, config.master.node), [0]);
-        assert_eq!(MasterTraffic::of(&config, 0).judge(&boot_up), None);
+        let boot_up = Frame::of(Id::canopen(0x700, 1), [0]);
+        assert_eq!(arm(1).judge(&boot_up), None);
+    }
+
+    #[test]
+    fn feedback_on_the_identifier_of_an_rpdo_is_no_set_point_and_set_points_may_have_any_identifier() {
+        let own = Id::base(0x1F0).unwrap();
+        let unusual = CommandedDrive { node: 4, commands: vec![own], feedback: vec![Id::canopen(0x200, 4)] };
+        let traffic = MasterTraffic::new(127, MS, None, &[unusual]);
+        assert_eq!(traffic.judge(&frame(0x204, &[0; 8])), None);
+        let activity = MasterActivity::SetPoints { node: 4 };
+        assert_eq!(traffic.judge(&frame(0x1F0, &[0; 8])), Some(HeardMaster { id: own, activity }));
     }
 
     #[test]
@@ -305,12 +328,8 @@ mod tests {
     #[test]
     fn it_is_listened_long_enough_for_three_sync_and_one_heartbeat_but_not_for_a_minute() {
         let duration_ns = |period_ns, heartbeat_ns| {
-            let mut config = arm();
-            config.cycle.period_ns = period_ns;
-            config.master.heartbeat_ns = heartbeat_ns;
-            MasterTraffic::of(&config, 0).duration_ns
+            MasterTraffic::new(127, period_ns, heartbeat_ns, &[drive(1)]).duration_ns
         };
-        const MS: u64 = 1_000_000;
         assert_eq!(duration_ns(MS, Some(100 * MS)), 300 * MS);
         assert_eq!(duration_ns(MS, None), 300 * MS);
         assert_eq!(duration_ns(200 * MS, Some(100 * MS)), 600 * MS);
@@ -320,7 +339,7 @@ mod tests {
 
     #[test]
     fn the_verdict_comes_with_the_first_frame_of_a_master_or_at_the_end_of_the_silence() {
-        let begin = || Listening::new(MasterTraffic::of(&arm(), 0), 5_000);
+        let begin = || Listening::new(arm(127), 5_000);
         let mut listening = begin();
         listening.receive(&frame(0x181, &[0; 8]));
         assert_eq!(listening.verdict(300_004_999), Verdict::Undecided);

@@ -9,7 +9,7 @@
 
 use super::messages::{BusMessage, MessageKind};
 use super::response_time::{Message, response_time};
-use crate::bus::frame_time::{BitRates, worst_case_bits};
+use crate::frame_time::{BitRates, worst_case_bits};
 
 /// The messages that are analysed together, highest priority first.
 #[derive(Clone, Copy)]

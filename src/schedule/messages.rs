@@ -3,10 +3,10 @@
 use serde::Serialize;
 use takt_rt::{Id, TIME_ID, TransmissionType};
 
-use crate::bus::frame_time::FrameShape;
 use crate::canopen::function_code;
 use crate::config::{Axis, Config, Master};
 use crate::drive::{PdoPlan, ProcessData, Reply};
+use crate::frame_time::FrameShape;
 
 /// What a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
