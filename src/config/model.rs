@@ -11,12 +11,13 @@ pub use takt_rt::AxisLimits as Limits;
 /// How an axis is commanded. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
 pub use takt_rt::ControlLaw as Control;
-use takt_rt::{Dialect, ModeCondition};
+use takt_rt::{Cia402Codec, ModeCondition};
 
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use crate::canopen::dcf::DeviceConfiguration;
+use crate::drive::yz_aim;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -299,11 +300,11 @@ impl DriveFamily {
         }
     }
 
-    /// How its drives speak through controlword and statusword.
-    pub const fn dialect(self) -> Dialect {
+    /// How its drives use controlword and statusword.
+    pub fn codec(self) -> Cia402Codec {
         match self {
-            Self::ErobCanopen => Dialect::Cia402,
-            Self::YzAim => Dialect::YzAim,
+            Self::ErobCanopen => Cia402Codec::default(),
+            Self::YzAim => yz_aim::CODEC,
         }
     }
 

@@ -152,7 +152,7 @@ fn axis_parameters(
             _ => feedback_since(&data.feedback),
         },
         unused: data.unused.iter().map(|plan| plan.id).collect(),
-        dialect: axis.drive.dialect(),
+        codec: axis.drive.codec(),
         controlword_spacing_cycles: u32::try_from(
             spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
         )

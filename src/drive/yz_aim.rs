@@ -6,7 +6,10 @@
 
 mod alarm;
 
-use takt_rt::{Nanoseconds, controlword};
+use takt_rt::{
+    Cia402Codec, Nanoseconds, ProfileRamps, SetPointTransfer, ShownStates, StopCommand, StoppedHeartbeat,
+    controlword,
+};
 
 use super::bring_up::BringUpTiming;
 use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, ValueSource};
@@ -18,6 +21,17 @@ use crate::config::{Axis, Config, Control};
 
 pub use alarm::{Alarm, Clearing};
 
+/// How it uses controlword and statusword (manual v1.62, 5.04): bits 6, 7, 9, 11, 14 and 15 of the statusword are absent, bits 0, 1,
+/// 2, 4 and 5 show that it is enabled, bit 3 alone is an alarm, and nothing shows the states before it is enabled. Set-points are
+/// not acknowledged; bit 5 of the controlword makes every target effective at once. It has no quick stop, and its halt keeps the
+/// shaft locked. A stopped one says nothing, and one with an alarm says "stopped" (5.11.1).
+pub const CODEC: Cia402Codec = Cia402Codec {
+    states: ShownStates::EnabledAndFault { enabled: 0x37, fault: 0x08 },
+    set_points: SetPointTransfer::Immediate,
+    stop: StopCommand::Halt,
+    ramps: ProfileRamps::Common,
+    stopped_heartbeat: StoppedHeartbeat::Alarm,
+};
 /// Pause between controlwords while enabling; a drive that has just booted ignores controlwords that follow sooner.
 pub const CONTROLWORD_SPACING_NS: Nanoseconds = 20_000_000;
 /// The only period of interpolated position mode (manual, 5.10.3).
@@ -188,4 +202,27 @@ pub fn answers_sync(axis: &Axis) -> bool {
 /// Whether this drive has the mode.
 pub fn has_mode(control: &Control) -> bool {
     matches!(control, Control::Interpolated | Control::ProfilePosition | Control::ProfileVelocity)
+}
+
+#[cfg(test)]
+mod tests {
+    use takt_rt::DriveState;
+
+    use super::*;
+
+    #[test]
+    fn statuswords_of_the_manual_decode_bit_by_bit() {
+        let seen = [
+            (0x0037, DriveState::OperationEnabled),
+            (0x0437, DriveState::OperationEnabled),
+            (0x0404, DriveState::SwitchOnDisabled),
+            (0x0014, DriveState::SwitchOnDisabled),
+            (0x1414, DriveState::SwitchOnDisabled),
+            (0x043F, DriveState::Fault),
+            (0x0008, DriveState::Fault),
+        ];
+        for (word, state) in seen {
+            assert_eq!(CODEC.state(word), state, "{word:#06x}");
+        }
+    }
 }

@@ -2,7 +2,6 @@
 
 use super::Axis;
 use crate::cia402::controlword;
-use crate::dialect::Dialect;
 use crate::frame::{Frame, Id};
 use crate::watch::{NmtState, nmt_command, node_state};
 
@@ -106,11 +105,10 @@ impl Axis {
 
     /// The controlword that stops a drive which process data do not reach.
     pub fn sdo_stop_word(&self) -> u16 {
-        match self.parameters.dialect {
-            _ if !self.drive_state().has_torque() => controlword::DISABLE_VOLTAGE,
-            Dialect::Cia402 => controlword::QUICK_STOP,
-            // It has no quick stop; its halt keeps the shaft locked.
-            Dialect::YzAim => controlword::ENABLE_OPERATION | controlword::HALT,
+        if self.drive_state().has_torque() {
+            self.parameters.codec.stop_word()
+        } else {
+            controlword::DISABLE_VOLTAGE
         }
     }
 
@@ -139,8 +137,7 @@ impl Axis {
     /// Takes the state in a boot-up message or heartbeat.
     pub fn receive_error_control(&mut self, state: u8) {
         self.node_monitor.receive(state);
-        // A stopped YZ-AIM says nothing, and one with an alarm says "stopped" (manual, 5.11.1).
-        if state == node_state::STOPPED && self.parameters.dialect == Dialect::Cia402 {
+        if state == node_state::STOPPED && self.parameters.codec.is_stopped_by_heartbeat() {
             self.node_monitor.receive_foreign_nmt(nmt_command::STOP);
         }
     }

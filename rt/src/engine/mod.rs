@@ -131,7 +131,7 @@ pub enum Deadline {
 ///     feedback: [pdo(0x180, feedback)].into_iter().collect(),
 ///     feedback_since: FeedbackSince::Sync,
 ///     unused: Default::default(),
-///     dialect: Dialect::Cia402,
+///     codec: Cia402Codec::default(),
 ///     controlword_spacing_cycles: 0,
 ///     law: ControlLaw::Position,
 ///     mode_changes: ModeChanges::default(),

@@ -13,8 +13,8 @@ use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 /// How long an SDO server may take: a drive answers within a millisecond, one that has just been reset is there within
 /// another.
 const ANSWER_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 100;
-/// How long drives that receive PDOs take to obey the controlwords of disabling, and to show it: a YZ-AIM is told
-/// again after 20 ms.
+/// How long drives that receive PDOs take to obey the controlwords of disabling, and to show it: those whose controlwords are
+/// spaced are told again after 20 ms.
 const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {

@@ -1,6 +1,6 @@
 //! Evaluates the drive's SDO responses: checks and stores values, verifies writes, and classifies missing answers.
 
-use takt_rt::{Dialect, Nanoseconds};
+use takt_rt::Nanoseconds;
 
 use super::{AWAIT_PAUSE_NS, AxisRun, StepPhase, StepResult};
 use crate::canopen::dcf::Download;
@@ -8,6 +8,7 @@ use crate::canopen::object::Object;
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::pdo_reader::PdoReader;
 use crate::canopen::sdo::{AbortCode, Completed, SdoError, Transfer};
+use crate::config::DriveFamily;
 use crate::drive::failure::{Content, FailureCause, ProbeResult};
 use crate::drive::process_data::ProcessData;
 use crate::drive::step::{Access, Action, Check, Fact, ReadBack};
@@ -113,7 +114,7 @@ impl AxisRun {
     fn means_absent(&self, error: SdoError) -> bool {
         match error {
             SdoError::Aborted(code) => code.means_absent(),
-            SdoError::NoReply { .. } => self.facts.dialect == Dialect::YzAim,
+            SdoError::NoReply { .. } => self.axis.drive == DriveFamily::YzAim,
             _ => false,
         }
     }
@@ -245,7 +246,7 @@ impl AxisRun {
                 // The manual of a YZ-AIM gives 606C two lengths (A27), so the length of its response counts.
                 let of_other_length = || {
                     let data_type = object.data_type.of_length(received)?;
-                    uploaded.number(data_type).filter(|_| self.facts.dialect == Dialect::YzAim)
+                    uploaded.number(data_type).filter(|_| self.axis.drive == DriveFamily::YzAim)
                 };
                 uploaded
                     .number(object.data_type)

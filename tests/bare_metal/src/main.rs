@@ -6,8 +6,8 @@
 use core::f64::consts::TAU;
 
 use takt_rt::{
-    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CommandPdo, ControlLaw, CycleInput,
-    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
+    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, Cia402Codec, CommandPdo, ControlLaw, CycleInput,
+    CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
     HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope,
     RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
 };
@@ -66,7 +66,7 @@ fn axis() -> Option<AxisParameters> {
             .into_iter()
             .collect(),
         feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
-        dialect: Dialect::Cia402,
+        codec: Cia402Codec::default(),
         controlword_spacing_cycles: 0,
         feedback_since: FeedbackSince::Sync,
         unused: Default::default(),
