@@ -74,8 +74,8 @@ pub use cia402_codec::{
 pub use control::{ControlLaw, Gain, GainError, LoopInput, TorqueDemand};
 pub use cycle::{Cycle, Flow, SlotPlan};
 pub use engine::{
-    BusParameters, CycleCount, CycleInput, Deadline, Engine, EngineParameters, GroupParameters, Heartbeat,
-    Receiver, SEND_BATCH, SendBatch, SetUpError,
+    BusParameters, CanopenNetwork, CycleCount, CycleInput, Deadline, Engine, EngineParameters,
+    GroupParameters, Heartbeat, Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};

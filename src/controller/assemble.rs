@@ -4,10 +4,10 @@ use std::fmt;
 
 use arrayvec::ArrayVec;
 use takt_rt::{
-    AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
-    GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError,
-    ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan,
-    TimingLadder, TorqueLimits,
+    AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
+    FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
+    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters,
+    SetUpError, SlotPlan, TimingLadder, TorqueLimits,
 };
 
 use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
@@ -82,7 +82,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         .map(|(index, axis)| axis_parameters(index, axis, config, &cycles))
         .collect::<Result<_, _>>()?;
     let buses = config.buses.iter().map(|bus| BusParameters {
-        sync_id: Id::canopen(0x080, 0),
+        canopen: Some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
         divider: bus.divider,
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),

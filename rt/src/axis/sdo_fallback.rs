@@ -1,8 +1,9 @@
 //! The drive's controlword by SDO: what is left for a drive that takes no process data any more.
 
-use super::Axis;
+use super::{Axis, CommandPdo, Pdo};
 use crate::cia402::controlword;
 use crate::frame::{Frame, Id};
+use crate::pdo::CommandSlot;
 use crate::watch::{NmtState, nmt_command, node_state};
 
 /// Function codes of an SDO request and of its answer (CiA 301, 7.3.3).
@@ -51,6 +52,13 @@ impl SdoFallback {
         } else if let Self::Writing { wait_slots, .. } = self {
             *wait_slots = wait_slots.saturating_sub(1);
         }
+    }
+
+    /// The controlword that is due, on a bus without SDO. It is due again after so many slots.
+    fn take_due_word(&mut self, repeat_slots: u32) -> Option<u16> {
+        let Self::Writing { word, wait_slots: wait_slots @ 0, .. } = self else { return None };
+        *wait_slots = repeat_slots;
+        Some(*word)
     }
 
     /// The frame that is due, if one is. It is due again after so many slots, unless it is confirmed before.
@@ -122,6 +130,15 @@ impl Axis {
     /// confirms it before.
     pub fn service_frame(&mut self, repeat_slots: u32) -> Option<Frame> {
         self.sdo_fallback.frame(self.parameters.node, self.node_monitor.nmt_state(), repeat_slots)
+    }
+
+    /// The frame with that controlword, if it is due, for a drive that has no SDO.
+    pub fn stop_frame(&mut self, repeat_slots: u32) -> Option<Frame> {
+        let word = self.sdo_fallback.take_due_word(repeat_slots)?;
+        self.command.set(CommandSlot::Controlword, word.into());
+        let carries_it = |command: &&CommandPdo| command.pdo.mapping.sends(CommandSlot::Controlword);
+        let Pdo { id, mapping } = &self.parameters.commands.iter().find(carries_it)?.pdo;
+        Some(Frame::packed(*id, mapping.pack(&self.command), mapping.length()))
     }
 
     /// Takes a frame that may confirm a controlword that was written by SDO.

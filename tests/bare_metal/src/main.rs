@@ -6,7 +6,7 @@
 use core::f64::consts::TAU;
 
 use takt_rt::{
-    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, Cia402Codec, CommandPdo, ControlLaw, CycleInput,
+    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CanopenNetwork, Cia402Codec, CommandPdo, ControlLaw, CycleInput,
     CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
     HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope,
     RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
@@ -95,7 +95,7 @@ fn axis() -> Option<AxisParameters> {
 
 fn cycles() -> Option<Phase> {
     let bus = BusParameters {
-        sync_id: Id::canopen(0x080, 0),
+        canopen: Some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
         divider: 1,
         service_frames_active: 1,
         service_frames_passive: 6,
