@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 3] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 4] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -251,6 +251,10 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 3] = [
         "A group paused for a slot in which its slow bus still sent the frames of its last cycle",
     ),
     (40_011_226_356, "A drive caught up with more than 1.3 times the velocity limit after many missed slots"),
+    (
+        50_011_237_121,
+        "A disabled group was asked for two stops in one cycle, and the group that stops with it got the weaker one",
+    ),
 ];
 
 /// The same of those whose streams command every kind of point.
