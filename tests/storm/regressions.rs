@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 4] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 6] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -254,6 +254,14 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 4] = [
     (
         50_011_237_121,
         "A disabled group was asked for two stops in one cycle, and the group that stops with it got the weaker one",
+    ),
+    (
+        50_011_257_648,
+        "A joint in cyclic torque turned round to its set-point, and its power was taken on the way",
+    ),
+    (
+        50_011_261_201,
+        "A joint in cyclic velocity turned round to its set-point, and its power was taken on the way",
     ),
 ];
 
