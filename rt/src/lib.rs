@@ -51,6 +51,7 @@ pub mod plan;
 mod port;
 mod profile;
 mod record;
+mod rejection;
 mod request;
 mod source;
 mod stop;
@@ -93,9 +94,10 @@ pub use record::{
     AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, MAX_AXES, MAX_BUSES, MAX_GROUPS,
     RecordedStop,
 };
+pub use rejection::{RejectReason, RequestError};
 pub use request::{
-    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, RejectReason, Request,
-    RequestEnvelope, RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
+    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
+    RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
