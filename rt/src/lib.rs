@@ -53,6 +53,7 @@ mod profile;
 mod record;
 mod rejection;
 mod request;
+mod rule;
 mod source;
 mod stop;
 mod stop_category;
@@ -76,7 +77,7 @@ pub use engine::{
     BusParameters, CycleCount, CycleInput, Deadline, Engine, EngineParameters, GroupParameters, Heartbeat,
     Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
-pub use fault::{Fault, Rule};
+pub use fault::Fault;
 pub use frame::{Frame, FrameError, FrameKind, Id};
 pub use guard::{AxisLimits, LimitError, braking_distance};
 pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
@@ -97,6 +98,7 @@ pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
     RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
+pub use rule::Rule;
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
     LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,
