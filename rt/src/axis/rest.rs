@@ -3,7 +3,6 @@
 use super::Axis;
 use crate::cia402::DriveState;
 use crate::control::ControlLaw;
-use crate::dialect::Dialect;
 
 impl Axis {
     /// Begins to come to rest: from now on it counts for how long the joint has stood.
@@ -37,8 +36,7 @@ impl Axis {
             DriveState::QuickStopActive => self.feedback_age() <= self.parameters.missed_feedback_cycles,
             _ => false,
         };
-        let has_quick_stop = self.parameters.dialect == Dialect::Cia402;
-        has_quick_stop && !self.is_profile() && is_moving && !self.joint.is_settled()
+        self.parameters.codec.has_quick_stop() && !self.is_profile() && is_moving && !self.joint.is_settled()
     }
 
     /// Whether the drive reports and is enabled, and the joint is near its set-point, as far as a following error is allowed.

@@ -42,9 +42,9 @@ use std::time::Duration;
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Phase, Snapshot, StopCategory};
 
-use super::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, RemoteHandles, Session, SessionError, SessionOptions};
+use crate::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use crate::config::{Axis, Config, Group};
 use crate::telemetry::{Machine, Notice};
 use in_loop::Callbacks;
