@@ -31,6 +31,7 @@ pub mod controller;
 pub mod doctor;
 pub mod drive;
 mod error;
+pub mod family;
 pub mod faults;
 pub mod jitter;
 pub mod play;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use takt::config::DriveFamily;
+use takt::family;
 use takt_rt::{OperationMode, Phase, Rule};
 
 #[path = "../fuzz/subjects/mod.rs"]
@@ -67,7 +68,7 @@ fn the_kept_inputs_lead_the_group_through_every_phase_and_move_it_in_every_mode(
         assert!(journeys.iter().any(|journey| journey.phases.contains(&phase)), "{phase:?}");
     }
     let moved = |mode: OperationMode, family: DriveFamily| {
-        journeys.iter().any(|journey| journey.modes_in_motion.contains(&(mode, family)))
+        journeys.iter().any(|journey| journey.modes_in_motion.contains(&(mode, family.clone())))
     };
     for mode in [
         OperationMode::CyclicSynchronousPosition,
@@ -78,12 +79,12 @@ fn the_kept_inputs_lead_the_group_through_every_phase_and_move_it_in_every_mode(
         OperationMode::ProfileVelocity,
         OperationMode::ProfileTorque,
     ] {
-        assert!(moved(mode, DriveFamily::ErobCanopen), "{mode:?}");
+        assert!(moved(mode, family::EROB_CANOPEN), "{mode:?}");
     }
     for mode in
         [OperationMode::InterpolatedPosition, OperationMode::ProfilePosition, OperationMode::ProfileVelocity]
     {
-        assert!(moved(mode, DriveFamily::YzAim), "{mode:?} of a YZ-AIM");
+        assert!(moved(mode, family::YZ_AIM), "{mode:?} of a YZ-AIM");
     }
     assert!(journeys.iter().any(|journey| journey.refused > 0 && journey.refused < journey.taken));
     assert!(journeys.iter().any(|journey| journey.calls > 100), "a callback is called");

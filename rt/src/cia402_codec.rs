@@ -74,6 +74,15 @@ pub enum StoppedHeartbeat {
 }
 
 impl Cia402Codec {
+    /// As CiA 402 says, which is the default.
+    pub const STANDARD: Self = Self {
+        states: ShownStates::All,
+        set_points: SetPointTransfer::Acknowledged,
+        stop: StopCommand::QuickStop,
+        ramps: ProfileRamps::Separate,
+        stopped_heartbeat: StoppedHeartbeat::Stopped,
+    };
+
     /// The state that a statusword shows.
     pub const fn state(&self, word: u16) -> DriveState {
         match self.states {
@@ -166,6 +175,7 @@ mod tests {
     #[test]
     fn the_standard_is_followed_where_a_drive_follows_it() {
         let standard = Cia402Codec::default();
+        assert_eq!(standard, Cia402Codec::STANDARD);
         for state in DriveState::ALL {
             for goal in [Goal::NoVoltage, Goal::Disabled, Goal::Enabled, Goal::QuickStop] {
                 assert_eq!(standard.controlword(state, goal, 0x07), state.controlword_towards(goal));

@@ -10,7 +10,7 @@ use thiserror::Error;
 
 use crate::canopen::function_code;
 use crate::config::Config;
-use crate::drive::identifiers;
+use crate::family::identifiers;
 
 /// Bytes that the kernel reserves for one frame that waits in the buffer of a socket. The frame with its bookkeeping takes 768 bytes
 /// on Linux 6.1, and up to 960 since 6.3.
@@ -42,7 +42,7 @@ impl SocketCanOptions {
     /// bus use, in both directions.
     pub fn of_master(config: &Config, bus: usize) -> Self {
         let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-        let of_drives = axes.flat_map(|axis| identifiers(axis.drive, axis.node));
+        let of_drives = axes.flat_map(|axis| identifiers(&axis.drive, axis.node));
         let broadcast = [function_code::NMT, function_code::SYNC, function_code::TIME];
         let broadcast = broadcast.map(|function| Id::canopen(function, 0));
         let own = Id::canopen(function_code::ERROR_CONTROL, config.master.node);

@@ -2,7 +2,8 @@
 
 use takt::bus::schedule::analyse;
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
-use takt::config::{Axis, Config, DriveFamily};
+use takt::config::{Axis, Config};
+use takt::family;
 use takt::faults::{
     Direction, DriveEffect, Effect, FaultInjector, ForeignFrames, FrameEffect, FrameFunction,
     InterfaceEffect, Part, Selection,
@@ -183,7 +184,7 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
         _ => false,
     };
     // A servo holds its shaft before anybody has commanded it, and follows an encoder that slips.
-    let is_led_astray = fault.kind == "encoder-jump" && axis.drive == DriveFamily::YzAim;
+    let is_led_astray = fault.kind == "encoder-jump" && axis.drive == family::YZ_AIM;
     Concern {
         is_present,
         is_misled,

@@ -102,7 +102,7 @@ impl ObedientDrive {
 
     fn statusword(&self) -> u16 {
         let is_enabled = self.state == DriveState::OperationEnabled;
-        match self.axis.drive.codec().states {
+        match self.axis.drive.codec.states {
             ShownStates::EnabledAndFault { enabled, fault } => match self.state {
                 DriveState::Fault | DriveState::FaultReactionActive => fault,
                 _ if is_enabled => enabled | self.target_reached(),
@@ -149,7 +149,7 @@ impl ObedientDrive {
                 word & controlword::FAULT_RESET != 0 && self.controlword & controlword::FAULT_RESET == 0;
             self.state = self.state.after(Command::decode(word), is_edge);
             let is_offered =
-                word & controlword::BIT_4 != 0 || !self.axis.drive.codec().acknowledges_set_points();
+                word & controlword::BIT_4 != 0 || !self.axis.drive.codec.acknowledges_set_points();
             if is_offered {
                 self.taken = self.target_position;
             }

@@ -391,7 +391,7 @@ impl Machine {
         journey.stops.extend(stops.map(|stop| stop.rule().key()));
         for axis in self.engine.axes() {
             let phase = phases[self.config.group_of_axis(axis.number().into())];
-            let family = self.config.axes[usize::from(axis.number())].drive;
+            let family = self.config.axes[usize::from(axis.number())].drive.clone();
             let mode = (axis.parameters().law.operation_mode(), family);
             let is_moved = matches!(phase, Phase::Moving | Phase::Streaming) && axis.is_enabled();
             if is_moved && !journey.modes_in_motion.contains(&mode) {

@@ -17,6 +17,7 @@ mod travel;
 
 use toml::de::DeTable;
 
+use super::drive_family::ConfiguredFamily;
 use super::error::{ConfigError, Location, Problem};
 use super::model::Config;
 use super::problem_kind::ProblemKind;
@@ -24,8 +25,12 @@ use super::spot::Problems;
 use section::Section;
 
 /// Reads and checks a configuration.
-pub fn parse(source_name: &str, text: &str) -> Result<Config, ConfigError> {
-    document(source_name, text, read)
+pub fn parse(
+    source_name: &str,
+    text: &str,
+    families: &[&'static dyn ConfiguredFamily],
+) -> Result<Config, ConfigError> {
+    document(source_name, text, |document, problems| read(document, problems, families))
 }
 
 /// What `read` makes of a TOML document, or else every problem that it has reported.
@@ -55,7 +60,11 @@ fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
 }
 
 /// Reads every section, even after one has failed.
-fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config> {
+fn read<'a>(
+    document: &'a DeTable<'a>,
+    problems: &'a Problems,
+    families: &[&'static dyn ConfiguredFamily],
+) -> Option<Config> {
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
@@ -78,7 +87,8 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems) -> Option<Config>
     root.require("axis", "at least one [[axis]]");
     let axes =
         root.sections("axis").into_iter().map(|section| section.with_defaults(axis_defaults)).collect();
-    let machine = axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node };
+    let machine =
+        axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node, families };
     let axes = axis::axes(axes, &machine);
 
     let groups = group::groups(root.sections("group"), &axes, problems);

@@ -8,7 +8,6 @@ use crate::canopen::object::Object;
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::pdo_reader::PdoReader;
 use crate::canopen::sdo::{AbortCode, Completed, SdoError, Transfer};
-use crate::config::DriveFamily;
 use crate::drive::failure::{Content, FailureCause, ProbeResult};
 use crate::drive::process_data::ProcessData;
 use crate::drive::step::{Access, Action, Check, Fact, ReadBack};
@@ -110,11 +109,11 @@ impl AxisRun {
         Ok(())
     }
 
-    /// Whether an error means that the object does not exist. A YZ-AIM does not answer then.
+    /// Whether an error means that the object does not exist. Some SDO servers do not answer then.
     fn means_absent(&self, error: SdoError) -> bool {
         match error {
             SdoError::Aborted(code) => code.means_absent(),
-            SdoError::NoReply { .. } => self.axis.drive == DriveFamily::YzAim,
+            SdoError::NoReply { .. } => self.axis.drive.has_lax_sdo_server,
             _ => false,
         }
     }
@@ -243,10 +242,10 @@ impl AxisRun {
         match outcome {
             Ok(Completed::Uploaded(uploaded)) => {
                 let received = uploaded.bytes.len();
-                // The manual of a YZ-AIM gives 606C two lengths (A27), so the length of its response counts.
+                // Where a manual gives an object two lengths, that of the response counts.
                 let of_other_length = || {
                     let data_type = object.data_type.of_length(received)?;
-                    uploaded.number(data_type).filter(|_| self.axis.drive == DriveFamily::YzAim)
+                    uploaded.number(data_type).filter(|_| self.axis.drive.has_lax_sdo_server)
                 };
                 uploaded
                     .number(object.data_type)
