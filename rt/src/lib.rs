@@ -66,7 +66,7 @@ mod wire;
 pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
-    ModeCondition, Pdo, TorqueLimits,
+    ModeCondition, Pdo, SenderByte, TorqueLimits,
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
@@ -80,7 +80,7 @@ pub use engine::{
     GroupParameters, Heartbeat, Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
 pub use fault::Fault;
-pub use frame::{Frame, FrameError, FrameKind, Id};
+pub use frame::{Frame, FrameError, FrameFormat, FrameKind, Id};
 pub use guard::{AxisLimits, LimitError, braking_distance};
 pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
