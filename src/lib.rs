@@ -12,7 +12,8 @@
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
-//! drive                               the families of drives: bring-up, facts, words
+//! family                              one folder a family of drives: facts, process data, words, what simulates it
+//! drive                               bring-up and shutdown over the services of CiA 301, without I/O
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! canopen                             the protocols of CiA 301, 305 and 306, without I/O
@@ -48,6 +49,7 @@ pub mod controller;
 pub mod doctor;
 pub mod drive;
 mod error;
+pub mod family;
 pub mod faults;
 pub mod frame_time;
 pub mod jitter;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 21] = [
+const ORDER: [&str; 22] = [
     "cli",
     "doctor",
     "jitter",
@@ -15,6 +15,7 @@ const ORDER: [&str; 21] = [
     "controller",
     "telemetry",
     "schedule",
+    "family",
     "drive",
     "faults",
     "link",
@@ -30,9 +31,11 @@ const ORDER: [&str; 21] = [
 ];
 
 /// Arrows that still point back.
-const KNOWN: [(&str, &str); 1] = [
-    // The reader of the configuration and its warnings ask the families of drives for their defaults and limits.
-    ("config", "drive"),
+const KNOWN: [(&str, &str); 2] = [
+    // Bring-up asks the families of drives for their steps and their process data.
+    ("drive", "family"),
+    // The families carry out the tasks of commissioning.
+    ("family", "commission"),
 ];
 
 /// One use of a folder by another.

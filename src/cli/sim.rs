@@ -10,6 +10,7 @@ use clap::Args;
 
 use takt::config::{Config, Interface};
 use takt::controller::port::open_configured;
+use takt::family::simulated_drives;
 use takt::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
 use takt::link::{OpenError, SocketCanOptions};
 use takt::sim::LiveDrives;
@@ -134,7 +135,7 @@ fn open(config: &Config) -> Result<Vec<(String, LiveDrives)>, OpenError> {
             ..SocketCanOptions::default()
         };
         if let Some(port) = open_configured(config, index, &options)? {
-            all.push((bus.name.clone(), LiveDrives::new(config, index, port)));
+            all.push((bus.name.clone(), LiveDrives::new(simulated_drives(config, index), port)));
         }
     }
     Ok(all)

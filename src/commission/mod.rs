@@ -5,7 +5,7 @@
 //!            │
 //!       sdo_session ── transfers, pauses and conditions to await
 //!            │
-//!   erob_canopen, yz_aim ── one folder a family: objects, alarms, motions
+//!         family ── one folder a family: objects, alarms, motions
 //!            │
 //!     target, motion_profile ── units and limits of the axis
 //! ```
@@ -20,7 +20,6 @@ pub mod dictionary;
 pub mod erob_canopen;
 mod event;
 mod failure;
-mod family;
 mod guarded;
 pub mod layer_settings;
 pub mod meaning;
@@ -38,7 +37,6 @@ pub mod yz_aim;
 
 pub use event::{AxisReading, ProcedureEvent};
 pub use failure::Failure;
-pub use family::Family;
 pub use motion_profile::{DEFAULT_SHARE, DriveProfile, MotionProfile};
 pub use procedure::{Procedure, ProcedureError};
 pub use report::{Report, ReportItem};
@@ -49,17 +47,14 @@ pub use task::{MoveKind, ReadObject, Task};
 
 /// The procedure that carries out a task with this drive.
 pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
-    let (node, sdo_quirks) = (target.node, target.family.sdo_quirks());
+    let (node, sdo_quirks) = (target.node, target.family().sdo_quirks());
     Procedure::new(node, sdo_quirks, move |session| async move {
         match task {
             Task::Read { objects } => objects::read(&session, &target, &objects).await,
             Task::Write { object, value, entry } => {
                 objects::write(&session, &target, object, value, entry).await
             }
-            task => match target.family {
-                Family::ErobCanopen => erob_canopen::carry_out(&session, &target, task).await,
-                Family::YzAim => yz_aim::carry_out(&session, &target, task).await,
-            },
+            task => target.family().carry_out(&session, &target, task).await,
         }
     })
 }

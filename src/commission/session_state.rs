@@ -21,6 +21,14 @@ pub struct SdoQuirks {
     pub has_short_replies: bool,
 }
 
+impl SdoQuirks {
+    /// A server that keeps to CiA 301.
+    pub const fn standard() -> Self {
+        let timing = SdoTiming { reply_timeout_ns: 100_000_000, retries: 2 };
+        Self { timing, gap_ns: 0, has_short_replies: false }
+    }
+}
+
 /// The heartbeat that this program sends while a procedure runs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnHeartbeat {

@@ -6,41 +6,47 @@
 
 pub(crate) mod bounds;
 pub(crate) mod defaults;
+mod drive_family;
 mod error;
 mod in_code;
 mod interface;
 mod model;
 mod problem_kind;
-mod quantities;
-mod quantity;
+pub(crate) mod quantities;
+pub(crate) mod quantity;
 mod ranges;
 pub(crate) mod read;
 mod rules;
 mod source_view;
 mod spelling;
 pub(crate) mod spot;
-mod warning;
 
 use std::fmt;
 use std::path::Path;
 
+pub use drive_family::{
+    ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, ModeChangeRule, ModeSet, Plausible, VelocityUnit,
+};
 pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
 pub(crate) use read::{CommandPhase, parse};
-pub use warning::{Warning, WarningKind, is_rounded};
 
 use thiserror::Error;
 
 use crate::printable::printable_path;
 
-/// Reads a file and checks it, as [`read::parse`] does its text.
-pub(crate) fn load(path: &Path, command_phase: CommandPhase) -> Result<Config, ConfigError> {
+/// Reads a file and checks it, as [`parse`] does its text.
+pub(crate) fn load(
+    path: &Path,
+    families: &[&'static dyn ConfiguredFamily],
+    command_phase: CommandPhase,
+) -> Result<Config, ConfigError> {
     let name = printable_path(path);
     match crate::text_file::read(path) {
-        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, command_phase),
+        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, families, command_phase),
         Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
     }
 }

@@ -11,8 +11,8 @@ use takt_rt::{
 };
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
-use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
-use crate::drive::{PdoPlan, ProcessData, yz_aim};
+use crate::config::{Axis, Compliance, Config, ConfigError, Interface};
+use crate::drive::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
@@ -138,29 +138,22 @@ fn axis_parameters(
         Ok(CommandPdo { pdo, transmission: plan.transmission })
     };
     let feedback = |plan: &PdoPlan| Ok(Pdo { id: plan.id, mapping: Mapping::feedback(&plan.objects)? });
-    let spacing_ns = match axis.drive {
-        DriveFamily::ErobCanopen => 0,
-        DriveFamily::YzAim => yz_aim::CONTROLWORD_SPACING_NS,
-    };
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,
         commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
-        feedback_since: match axis.drive {
-            DriveFamily::YzAim if yz_aim::answers_set_points(axis) => FeedbackSince::SetPoint,
-            _ => feedback_since(&data.feedback),
-        },
+        feedback_since: feedback_since(&data.feedback),
         unused: data.unused.iter().map(|plan| plan.id).collect(),
-        dialect: axis.drive.dialect(),
+        dialect: axis.drive.dialect,
         controlword_spacing_cycles: u32::try_from(
-            spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
+            axis.drive.controlword_spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
         )
         .unwrap_or(u32::MAX),
         law: axis.control,
         mode_changes: ModeChanges {
             laws: axis.other_modes.iter().take(ModeChanges::MOST).copied().collect(),
-            condition: axis.drive.mode_condition().unwrap_or_default(),
+            condition: axis.drive.mode_changes.condition().unwrap_or_default(),
             timeout_cycles: cycles(MODE_TIMEOUT_NS),
         },
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
@@ -191,7 +184,9 @@ const LAST_SYNCHRONOUS: u8 = 240;
 
 /// Since when the feedback of a drive is expected.
 fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
-    if feedback.iter().all(|pdo| pdo.transmission_type <= LAST_SYNCHRONOUS) {
+    if feedback.iter().all(|pdo| pdo.reply == Reply::ToCommandsOnly) {
+        FeedbackSince::SetPoint
+    } else if feedback.iter().all(|pdo| pdo.transmission_type <= LAST_SYNCHRONOUS) {
         FeedbackSince::Sync
     } else {
         FeedbackSince::CommandPhase

@@ -5,7 +5,8 @@ use takt_rt::Id;
 
 use crate::canopen::function_code;
 use crate::config::{Config, Interface};
-use crate::drive::{ProcessData, identifiers};
+use crate::drive::ProcessData;
+use crate::family::identifiers;
 use crate::link::ownership::{BusClaim, ClaimError, CommandedDrive, IfOwned, MasterTraffic, Ownership};
 use crate::link::{InterfaceSettings, SocketCanOptions};
 
@@ -18,7 +19,7 @@ const SERVICE_FRAMES: usize = 8;
 /// bus use, in both directions.
 pub(super) fn socket_options(config: &Config, bus: usize) -> SocketCanOptions {
     let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-    let of_drives = axes.flat_map(|axis| identifiers(axis.drive, axis.node));
+    let of_drives = axes.flat_map(|axis| identifiers(&axis.drive, axis.node));
     let broadcast = [function_code::NMT, function_code::SYNC, function_code::TIME];
     let broadcast = broadcast.map(|function| Id::canopen(function, 0));
     let own = Id::canopen(function_code::ERROR_CONTROL, config.master.node);

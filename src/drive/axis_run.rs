@@ -7,7 +7,6 @@ use takt_rt::{Frame, Nanoseconds};
 
 use super::facts::AxisFacts;
 use super::failure::FailureCause;
-use super::identifiers::OtherProtocol;
 use super::step::{Action, Condition, ProcedureStep, ValueSource};
 use crate::canopen::dcf::Download;
 use crate::canopen::emcy::Emergency;
@@ -16,6 +15,7 @@ use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::pdo_reader::PdoReader;
 use crate::canopen::sdo::{SdoClient, SdoTiming, Transfer};
 use crate::config::Axis;
+use crate::family::OtherProtocol;
 
 /// Pause between two reads of a polled object.
 const AWAIT_PAUSE_NS: Nanoseconds = 5_000_000;
@@ -95,7 +95,7 @@ impl AxisRun {
             axis: axis.clone(),
             pdo_reader: None,
             reported: None,
-            facts: AxisFacts { dialect: axis.drive.dialect(), ..AxisFacts::default() },
+            facts: AxisFacts { dialect: axis.drive.dialect, ..AxisFacts::default() },
             failure: None,
         }
     }

@@ -13,15 +13,13 @@
 use takt_rt::{Frame, Nanoseconds};
 
 use super::axis_run::{AxisRun, Policy};
-use super::erob_canopen;
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError};
-use super::identifiers::other_protocol;
 use super::step::{Action, ProcedureStep, ValueSource};
-use super::yz_aim;
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
-use crate::config::{Axis, Config, DriveFamily};
+use crate::config::{Axis, Config};
+use crate::family;
 
 /// The timeouts of bring-up and shutdown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -83,10 +81,7 @@ pub struct NotConfigured;
 
 /// The steps from any state to configured, without torque.
 fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-    match axis.drive {
-        DriveFamily::ErobCanopen => erob_canopen::configure(config, axis, timing),
-        DriveFamily::YzAim => yz_aim::configure(config, axis, timing),
-    }
+    family::of(&axis.drive).configure(config, axis, timing)
 }
 
 /// The objects to which bring-up writes another value than the configuration file of an axis (`dcf`) has for them.
@@ -122,14 +117,11 @@ impl BringUp {
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
         let group = Group::new(config, |axis| {
             let steps = configure(config, axis, &timing);
-            let other_protocol = other_protocol(axis.drive, axis.node);
+            let other_protocol = family::of(&axis.drive).other_protocol(axis.node);
             // The first step is the reset; a drive that has restarted does not need it again.
             AxisRun::new(axis, timing.sdo, steps, Policy::RestartFrom(1), other_protocol)
         });
-        let start_steps = config.axes.iter().map(|axis| match axis.drive {
-            DriveFamily::ErobCanopen => erob_canopen::start(axis, &timing),
-            DriveFamily::YzAim => yz_aim::start(axis, &timing),
-        });
+        let start_steps = config.axes.iter().map(|axis| family::of(&axis.drive).start(axis, &timing));
         Self { group, start_steps: start_steps.collect(), stage: Stage::Configure }
     }
 
@@ -190,10 +182,7 @@ impl Shutdown {
     /// As [`Shutdown::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
         let group = Group::new(config, |axis| {
-            let steps = match axis.drive {
-                DriveFamily::ErobCanopen => erob_canopen::shut_down(axis, &timing),
-                DriveFamily::YzAim => yz_aim::shut_down(axis, &timing),
-            };
+            let steps = family::of(&axis.drive).shut_down(axis, &timing);
             AxisRun::new(axis, timing.sdo, steps, Policy::BestEffort, None)
         });
         Self { group }

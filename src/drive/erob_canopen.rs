@@ -1,60 +1,24 @@
 //! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and field experience): the steps of bring-up,
-//! start and shutdown, and the vendor's error codes.
+//! start and shutdown.
 
-use takt_rt::{CommandSlot, Frame, Id, Nanoseconds, controlword};
+use takt_rt::{CommandSlot, Nanoseconds, controlword};
 
 use super::bring_up::BringUpTiming;
-use super::identifiers::OtherProtocol;
 use super::process_data::{PdoPlan, ProcessData, pdo_id};
 use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, TextFact, ValueSource};
 use super::step_list::{StepList, counts, rounded_up, watched_heartbeat};
-use crate::canopen::emcy::ErrorCode;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::{self, PDO_INVALID, PdoDirection, PdoParameters, error_behaviour};
 use crate::config::{Axis, Config, Control, PdoMapping};
-
-/// The fault of a drive whose multi-turn battery is empty or was disconnected.
-pub const MULTI_TURN_BATTERY: ErrorCode = ErrorCode(0x730F);
 
 /// Number of RPDOs, and of TPDOs.
 const PDO_COUNT: u8 = 4;
 /// INTEGER32 on this drive; the standard has UNSIGNED32.
 const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::I32, "following error window");
 
-/// The name of an error code, with this drive's own codes.
-pub fn error_words(code: ErrorCode) -> &'static str {
-    if code == MULTI_TURN_BATTERY { "battery voltage of the multi-turn encoder low" } else { code.words() }
-}
-
-/// An error code with its name.
-pub fn error_text(code: ErrorCode) -> String {
-    format!("0x{:04X} ({})", code.0, error_words(code))
-}
-
-/// The cure of an error that is this drive's own.
-pub fn error_advice(code: ErrorCode) -> Option<&'static str> {
-    (code == MULTI_TURN_BATTERY).then_some(
-        "replace the battery, then use `clear-fault --yes`; this also clears the turn count, so the joint's zero \
-         must be set again",
-    )
-}
-
-/// The vendor's own protocol of firmware without CANopen. The request 0x0002 reads the position and changes nothing.
-/// Above node ID 63 its identifiers are those of other nodes' SDO.
-pub(super) fn other_protocol(node: u8) -> Option<OtherProtocol> {
-    let name = "vendor's custom CAN protocol";
-    let id = |base: u32| Id::base(base + u32::from(node)).ok();
-    let (request, answer) = (id(0x640)?, id(0x5C0)?);
-    (1..=63).contains(&node).then(|| OtherProtocol {
-        name,
-        request: Frame::of(request, [0x00, 0x02]),
-        answer,
-    })
-}
-
 /// From any state to pre-operational, configured, without torque.
-pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
+pub fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
     let mut list = StepList::new(
         "restart of its communication",
         "check that the drive is powered (it needs 8 s), the wiring and the termination of the bus, its bit rate \
@@ -83,7 +47,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
 }
 
 /// From configured to operational.
-pub(super) fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
+pub fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
     let mut list = StepList::new("start", "check that no other master commands this node");
     list.nmt_reported(NmtCommand::Start, NmtState::Operational, axis, timing);
     list.read(objects::STATUSWORD, Check::Any, Fact::Statusword);
@@ -93,7 +57,7 @@ pub(super) fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
 }
 
 /// From operational to pre-operational, without torque, heartbeat watchdog off.
-pub(super) fn shut_down(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
+pub fn shut_down(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
     let mut list = StepList::new("shut down", "power-cycle the drive before the next run");
     list.wake_up(NmtCommand::EnterPreOperational);
     list.nmt_reported(NmtCommand::EnterPreOperational, NmtState::PreOperational, axis, timing);
@@ -329,22 +293,8 @@ mod tests {
     }
 
     #[test]
-    fn the_probe_in_the_vendors_protocol_reads_the_position_and_uses_no_other_nodes_identifiers() {
-        let request = other_protocol(2).unwrap();
-        assert_eq!(format!("{:?}", request.request), "642#0002");
-        assert_eq!(request.answer.value(), 0x5C2);
-        assert_eq!(other_protocol(64), None);
-    }
-
-    #[test]
     fn an_unused_pdo_keeps_its_identifier_and_is_invalid() {
         assert_eq!(unused_id(PdoDirection::Receive, 4, 2), 0x8000_0502);
         assert_eq!(unused_id(PdoDirection::Transmit, 2, 2), 0x8000_0282);
-    }
-
-    #[test]
-    fn the_battery_fault_has_a_name() {
-        assert_eq!(error_words(MULTI_TURN_BATTERY), "battery voltage of the multi-turn encoder low");
-        assert_eq!(error_words(ErrorCode(0x8611)), "following error");
     }
 }

@@ -8,21 +8,19 @@
 mod axis_run;
 mod bring_up;
 pub mod erob_canopen;
-mod error_words;
 mod facts;
 mod failure;
-mod identifiers;
+pub(crate) mod mapped_objects;
 mod process_data;
 mod reported_mapping;
-mod step;
+pub(crate) mod step;
 mod step_list;
 pub mod yz_aim;
 
 pub use bring_up::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage, overwritten};
-pub use error_words::{error_cure, error_words};
 pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
 pub use failure::{AxisFailure, BringUpError, Content, FailureCause, ProbeResult};
-pub use identifiers::{OtherProtocol, identifiers, other_protocol};
-pub use process_data::{PdoPlan, ProcessData};
+pub use process_data::{PdoPlan, ProcessData, Reply};
 pub use reported_mapping::MappingProblem;
+pub use step::ProcedureStep;
 pub use step::{Access, Check};

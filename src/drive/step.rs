@@ -8,7 +8,7 @@ use crate::canopen::object::{Object, ObjectAddress};
 
 /// One step.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct ProcedureStep {
+pub struct ProcedureStep {
     /// Its name, for progress and failures.
     pub name: &'static str,
     /// The remedy when it fails.
@@ -21,7 +21,7 @@ pub(super) struct ProcedureStep {
 
 /// The condition under which a step is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Condition {
+pub enum Condition {
     /// In any case.
     Always,
     /// Condition the last statusword shows torque on the motor.
@@ -30,7 +30,7 @@ pub(super) enum Condition {
 
 /// What a step does.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Action {
+pub enum Action {
     /// Commands an NMT state and waits until the node reports it.
     Nmt {
         command: NmtCommand,
@@ -72,7 +72,7 @@ pub(super) enum Action {
 
 /// The source of a number to write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ValueSource {
+pub enum ValueSource {
     Value(i64),
     /// The last position that was read.
     ActualPosition,
@@ -80,7 +80,7 @@ pub(super) enum ValueSource {
 
 /// Whether a written number is read back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ReadBack {
+pub enum ReadBack {
     No,
     /// It must match in these bits.
     Masked(u32),
@@ -93,7 +93,7 @@ impl ReadBack {
 
 /// The fact that a number is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Fact {
+pub enum Fact {
     DeviceType,
     VendorId,
     ProductCode,
@@ -110,7 +110,7 @@ pub(super) enum Fact {
 
 /// The fact that a text is stored as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum TextFact {
+pub enum TextFact {
     DeviceName,
     HardwareVersion,
     SoftwareVersion,

@@ -1,12 +1,10 @@
 //! YZ-AIM integrated servos, CANopen edition (manual v1.62, and field experience): the steps of bring-up, start and
-//! shutdown, and the names of the alarms.
+//! shutdown.
 //!
 //! The PDO mapping is fixed. The drive has no mode display (6061) and no emergency messages, and it does not answer SDO
 //! requests for unknown objects.
 
-mod alarm;
-
-use takt_rt::{Nanoseconds, controlword};
+use takt_rt::controlword;
 
 use super::bring_up::BringUpTiming;
 use super::step::{Action, Check, Condition, Fact, ProcedureStep, ReadBack, ValueSource};
@@ -14,16 +12,9 @@ use super::step_list::{StepList, rounded_up, turns, watched_heartbeat};
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::{self, PdoDirection, PdoParameters};
-use crate::config::{Axis, Config, Control};
+use crate::config::{Axis, Config};
+use crate::family::yz_aim::{HIGHEST_SPEED_RPM, answers_sync};
 
-pub use alarm::{Alarm, Clearing};
-
-/// Pause between controlwords while enabling; a drive that has just booted ignores controlwords that follow sooner.
-pub const CONTROLWORD_SPACING_NS: Nanoseconds = 20_000_000;
-/// The only period of interpolated position mode (manual, 5.10.3).
-pub const INTERPOLATION_PERIOD_NS: Nanoseconds = 2_000_000;
-/// The highest value of 6081 and 60FF, in r/min.
-pub const HIGHEST_SPEED_RPM: f64 = 3000.0;
 /// At this value of 6083 and above the drive uses no ramp (4.3).
 pub const NO_RAMP: i64 = 60_000;
 /// Below this speed the drive counts as standing: 1 r/min, in the 0.1 r/min of object 606C by SDO (A27).
@@ -38,7 +29,7 @@ const SPECIAL_FUNCTION: Object = Object::new(0x2619, 0, DataType::U16, "special 
 const ACCELERATION: Object = Object::new(0x6083, 0, DataType::U32, "acceleration");
 
 /// From any state to pre-operational, configured, without torque.
-pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
+pub fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
     let mut list = StepList::new(
         "restart of its communication",
         "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID",
@@ -62,7 +53,7 @@ pub(super) fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) ->
 }
 
 /// From configured to operational.
-pub(super) fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
+pub fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
     let mut list = StepList::new("start", "check that no other master commands this node");
     list.nmt_reported(NmtCommand::Start, NmtState::Operational, axis, timing);
     list.read(objects::STATUSWORD, Check::Any, Fact::Statusword);
@@ -72,7 +63,7 @@ pub(super) fn start(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
 }
 
 /// From operational to pre-operational, without torque, heartbeat watchdog off.
-pub(super) fn shut_down(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
+pub fn shut_down(axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
     let mut list = StepList::new("shut down", "power-cycle the drive before the next run");
     list.wake_up(NmtCommand::EnterPreOperational);
     list.nmt_reported(NmtCommand::EnterPreOperational, NmtState::PreOperational, axis, timing);
@@ -172,20 +163,4 @@ fn target_at_actual_position(list: &mut StepList, axis: &Axis) {
 /// The heartbeat period; 0 if none is configured, because the feedback of every cycle shows the drive's state.
 fn own_heartbeat_ms(axis: &Axis) -> i64 {
     axis.heartbeat_ns.map_or(0, |period_ns| rounded_up(period_ns, 1_000_000))
-}
-
-/// Whether the drive sends its feedback in reply to a set-point, and only then. TPDO 1, the reply in profile position,
-/// may also be sent by its event timer (manual, 5.08.3).
-pub fn answers_set_points(axis: &Axis) -> bool {
-    !answers_sync(axis) && axis.control == Control::Interpolated
-}
-
-/// Whether the drive sends its feedback at SYNC. In profile velocity it must: its reply to a command has no statusword.
-pub fn answers_sync(axis: &Axis) -> bool {
-    axis.answers_sync || axis.control == Control::ProfileVelocity
-}
-
-/// Whether this drive has the mode.
-pub fn has_mode(control: &Control) -> bool {
-    matches!(control, Control::Interpolated | Control::ProfilePosition | Control::ProfileVelocity)
 }

@@ -4,8 +4,8 @@ use serde::Serialize;
 use takt_rt::{Id, TIME_ID, TransmissionType};
 
 use crate::canopen::function_code;
-use crate::config::{Axis, Config, DriveFamily, Master};
-use crate::drive::{PdoPlan, ProcessData};
+use crate::config::{Axis, Config, Master};
+use crate::drive::{PdoPlan, ProcessData, Reply};
 use crate::frame_time::FrameShape;
 
 /// What a message is.
@@ -134,14 +134,13 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     let of_axis =
         |kind, pdo: &PdoPlan, period_ns| message(kind, Some(index), pdo.id, pdo.length(), period_ns);
     let mut messages = vec![];
-    // A YZ-AIM has no emergency object.
-    if axis.drive != DriveFamily::YzAim {
+    if axis.drive.sends_emergencies {
         let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
         messages.push(message(kind, Some(index), id, EMERGENCY_BYTES, EMERGENCY_INTERVAL_NS));
     }
     messages.extend(data.feedback.iter().map(|pdo| {
         let is_asynchronous = pdo.transmission_type > LAST_SYNCHRONOUS_TYPE;
-        let answers_set_points = axis.drive == DriveFamily::YzAim && is_asynchronous;
+        let answers_set_points = pdo.reply != Reply::No && is_asynchronous;
         // Which SYNCs a drive answers that answers every second one cannot be known: the slot counts its feedback
         // always.
         let syncs = if is_asynchronous { 1 } else { u64::from(pdo.transmission_type.max(1)) };

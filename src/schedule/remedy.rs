@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use super::{BusSchedule, analyse_bus, command_phase};
-use crate::config::{Axis, Config, DriveFamily, Feedback};
+use crate::config::{Axis, Config, Feedback};
 
 /// One change that makes a bus fit without any other.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -152,7 +152,7 @@ impl Trial<'_> {
     }
 
     fn no_answers_to_sync(self) -> Option<Remedy> {
-        let has_any = self.axes().any(|axis| axis.drive == DriveFamily::YzAim && axis.answers_sync);
+        let has_any = self.axes().any(|axis| axis.drive.may_ignore_sync && axis.answers_sync);
         let fits =
             || self.fits_with(|config| config.axes.iter_mut().for_each(|axis| axis.answers_sync = false));
         (has_any && fits()).then_some(Remedy::NoAnswersToSync)

@@ -102,7 +102,7 @@ impl ObedientDrive {
 
     fn statusword(&self) -> u16 {
         let is_enabled = self.state == DriveState::OperationEnabled;
-        match self.axis.drive.dialect() {
+        match self.axis.drive.dialect {
             Dialect::YzAim => match self.state {
                 DriveState::Fault | DriveState::FaultReactionActive => 0x0008,
                 _ if is_enabled => 0x0037 | self.target_reached(),
@@ -148,7 +148,7 @@ impl ObedientDrive {
             let is_edge =
                 word & controlword::FAULT_RESET != 0 && self.controlword & controlword::FAULT_RESET == 0;
             self.state = self.state.after(Command::decode(word), is_edge);
-            let is_offered = word & controlword::BIT_4 != 0 || self.axis.drive.dialect() == Dialect::YzAim;
+            let is_offered = word & controlword::BIT_4 != 0 || self.axis.drive.dialect == Dialect::YzAim;
             if is_offered {
                 self.taken = self.target_position;
             }

@@ -17,6 +17,7 @@ mod travel;
 
 use toml::de::DeTable;
 
+use super::drive_family::ConfiguredFamily;
 use super::error::{ConfigError, Location, Problem};
 use super::model::Config;
 use super::problem_kind::ProblemKind;
@@ -27,13 +28,14 @@ use section::Section;
 /// there is no such phase. It takes an analysis of the buses, which is not a matter of reading.
 pub(crate) type CommandPhase = fn(&Config) -> Result<u64, String>;
 
-/// Reads and checks the text of a configuration. `source_name` is what messages call it.
+/// Reads and checks the text of a configuration whose drives are of these families. `source_name` is what messages call it.
 pub(crate) fn parse(
     source_name: &str,
     text: &str,
+    families: &[&'static dyn ConfiguredFamily],
     command_phase: CommandPhase,
 ) -> Result<Config, ConfigError> {
-    document(source_name, text, |document, problems| read(document, problems, command_phase))
+    document(source_name, text, |document, problems| read(document, problems, families, command_phase))
 }
 
 /// What `read` makes of a TOML document, or else every problem that it has reported.
@@ -66,6 +68,7 @@ fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
 fn read<'a>(
     document: &'a DeTable<'a>,
     problems: &'a Problems,
+    families: &[&'static dyn ConfiguredFamily],
     command_phase: CommandPhase,
 ) -> Option<Config> {
     let mut root = Section::new("", 0..0, document, problems);
@@ -90,7 +93,8 @@ fn read<'a>(
     root.require("axis", "at least one [[axis]]");
     let axes =
         root.sections("axis").into_iter().map(|section| section.with_defaults(axis_defaults)).collect();
-    let machine = axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node };
+    let machine =
+        axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node, families };
     let axes = axis::axes(axes, &machine);
 
     let groups = group::groups(root.sections("group"), &axes, problems);

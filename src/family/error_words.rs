@@ -1,13 +1,13 @@
 //! The error codes of drives in words, each with its cure. What a code means depends on the family of the drive.
 
-use super::{erob_canopen, yz_aim};
+use super::registry::named;
 use crate::canopen::emcy::ErrorCode;
-use crate::config::DriveFamily;
 
 /// A drive that reports a fault without a code.
 const NO_CODE: &str = "`takt drive … info` reads what the drive knows of it, and `clear-fault` clears it";
 /// A code without a cure of its own.
-const UNKNOWN: &str = "remove its cause, then `takt drive … clear-fault`; if it stays, power-cycle the drive";
+pub(super) const UNKNOWN: &str =
+    "remove its cause, then `takt drive … clear-fault`; if it stays, power-cycle the drive";
 
 /// The cures of standard codes: mask, code, cure. The first that matches holds.
 const CURES: [(u16, u16, &str); 17] = [
@@ -58,25 +58,23 @@ fn standard_cure(code: ErrorCode) -> &'static str {
     }
 }
 
-/// The code of a drive in words; the family is unknown in recordings of earlier versions.
-pub fn error_words(family: Option<DriveFamily>, code: u16) -> String {
-    match family {
-        Some(DriveFamily::ErobCanopen) => erob_canopen::error_text(ErrorCode(code)),
-        Some(DriveFamily::YzAim) => format!("alarm {}", yz_aim::Alarm::of(code)),
+/// The code of a drive in words. Recordings of earlier versions do not name the family.
+pub fn error_words(family: Option<&str>, code: u16) -> String {
+    match family.and_then(named) {
+        Some(family) => family.error_words(code),
         None => ErrorCode(code).to_string(),
     }
 }
 
 /// What clears the fault and its cause.
-pub fn error_cure(family: Option<DriveFamily>, code: u16) -> &'static str {
-    match family {
-        _ if code == 0 => NO_CODE,
-        Some(DriveFamily::ErobCanopen) => {
-            erob_canopen::error_advice(ErrorCode(code)).unwrap_or_else(|| standard_cure(ErrorCode(code)))
-        }
-        Some(DriveFamily::YzAim) => yz_aim::Alarm::of(code).advice().unwrap_or(UNKNOWN),
-        None => standard_cure(ErrorCode(code)),
+pub fn error_cure(family: Option<&str>, code: u16) -> &'static str {
+    if code == 0 {
+        return NO_CODE;
     }
+    family
+        .and_then(named)
+        .and_then(|family| family.error_cure(code))
+        .unwrap_or_else(|| standard_cure(ErrorCode(code)))
 }
 
 #[cfg(test)]
@@ -85,7 +83,7 @@ mod tests {
 
     #[test]
     fn each_family_has_its_own_words_and_cures_for_a_code() {
-        let (erob, yz_aim) = (Some(DriveFamily::ErobCanopen), Some(DriveFamily::YzAim));
+        let (erob, yz_aim) = (Some("erob-canopen"), Some("yz-aim"));
         assert_eq!(error_words(erob, 0x730F), "0x730F (battery voltage of the multi-turn encoder low)");
         assert!(error_cure(erob, 0x730F).contains("replace the battery"));
         assert_eq!(error_words(yz_aim, 0x12), "alarm 12h (blocked rotor)");
@@ -96,7 +94,8 @@ mod tests {
 
     #[test]
     fn every_code_has_a_cure_and_no_cure_is_out_of_reach() {
-        for family in [None, Some(DriveFamily::ErobCanopen), Some(DriveFamily::YzAim)] {
+        let families = crate::family::all().into_iter().map(|family| Some(family.word()));
+        for family in families.chain([None]) {
             assert!((0..=u16::MAX).all(|code| !error_cure(family, code).is_empty()));
         }
         for (_, _, cure) in CURES {

@@ -4,10 +4,10 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use super::model::{Axis, Config, Control, DriveFamily, ProgramTarget, Travel};
-use super::quantities::{Counting, Quantities};
-use super::quantity::Short;
 use crate::canopen::object::ObjectAddress;
+use crate::config::quantities::{Counting, Quantities};
+use crate::config::quantity::Short;
+use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Travel};
 use crate::drive;
 
 /// A rotary axis that goes round more often than this is unusual.
@@ -127,39 +127,6 @@ impl fmt::Display for WarningKind {
     }
 }
 
-impl DriveFamily {
-    /// The fastest that drives of the family turn, in turns per second of the position that they report.
-    pub const fn fastest_turns_per_s(self) -> f64 {
-        match self {
-            Self::ErobCanopen => 25.0,
-            // 3000 r/min
-            Self::YzAim => 50.0,
-        }
-    }
-
-    /// The fastest that the joint of a drive without a further transmission usually turns, in rad/s.
-    const fn usual_velocity(self) -> f64 {
-        match self {
-            // The fastest module of an eRob turns at 6.3 rad/s.
-            Self::ErobCanopen => 2.0 * TAU,
-            Self::YzAim => 50.0 * TAU,
-        }
-    }
-
-    /// Whether the drive reports turns of its output, behind its own gear.
-    pub const fn counts_output(self) -> bool {
-        match self {
-            Self::ErobCanopen => true,
-            Self::YzAim => false,
-        }
-    }
-
-    /// Whether a gear of this ratio is most likely the one inside the drive. The gears of an eRob are 50:1 to 160:1.
-    fn is_inner_gear(self, gear_ratio: f64) -> bool {
-        self.counts_output() && gear_ratio >= 30.0
-    }
-}
-
 impl Config {
     /// What is possible and implausible: `takt check` and `takt run` say it, and go on.
     pub fn warnings(&self) -> Vec<Warning> {
@@ -212,11 +179,11 @@ fn of_axis(axis: &Axis) -> Vec<WarningKind> {
     let Axis { drive, limits, gear_ratio, travel, .. } = axis;
     let mut kinds = vec![];
     let turns_per_s = limits.velocity * Counting::of(axis).turns_per_unit();
-    let fastest = drive.fastest_turns_per_s();
+    let Plausible { fastest_turns_per_s: fastest, usual_velocity, inner_gear_from } = drive.plausible;
     if turns_per_s > fastest {
-        let (gear_ratio, counts_output) = (*gear_ratio, drive.counts_output());
+        let (gear_ratio, counts_output) = (*gear_ratio, inner_gear_from.is_some());
         kinds.push(WarningKind::DriveSpeed { turns_per_s, fastest, gear_ratio, counts_output });
-    } else if drive.is_inner_gear(*gear_ratio) {
+    } else if inner_gear_from.is_some_and(|from| *gear_ratio >= from) {
         kinds.push(WarningKind::GearInDrive { gear_ratio: *gear_ratio });
     }
     if *travel != Travel::Rotary {
@@ -228,7 +195,7 @@ fn of_axis(axis: &Axis) -> Vec<WarningKind> {
         let degrees = (turns <= 360.0 && both.iter().all(|limit| limit.fract() == 0.0)).then_some(both);
         kinds.push(WarningKind::Range { turns, degrees });
     }
-    if limits.velocity > drive.usual_velocity() && limits.velocity.fract() == 0.0 {
+    if limits.velocity > usual_velocity && limits.velocity.fract() == 0.0 {
         kinds.push(WarningKind::VelocityInDegrees { velocity: limits.velocity });
     }
     kinds

@@ -1,0 +1,54 @@
+//! What is known of a YZ-AIM.
+
+use std::f64::consts::TAU;
+
+use takt_rt::{Dialect, OperationMode};
+
+use crate::config::{Control, DriveFacts, Identity, ModeChangeRule, ModeSet, Plausible, VelocityUnit};
+
+/// The only period of interpolated position mode (manual, 5.10.3).
+pub const INTERPOLATION_PERIOD_NS: u64 = 2_000_000;
+/// The highest value of 6081 and 60FF, in r/min.
+pub const HIGHEST_SPEED_RPM: f64 = 3000.0;
+
+/// The facts.
+pub static FACTS: DriveFacts = DriveFacts {
+    identity: Identity {
+        device_type: Some(0x0002_0192),
+        vendor: Some(0x331),
+        product: Some(1),
+        revision: None,
+    },
+    // 15 bits on the motor side.
+    counts_per_turn: 32_768.0,
+    velocity_unit: VelocityUnit::RevolutionsPerMinute,
+    modes: ModeSet::of(&[
+        OperationMode::InterpolatedPosition,
+        OperationMode::ProfilePosition,
+        OperationMode::ProfileVelocity,
+    ]),
+    usual_mode: Control::Interpolated,
+    mode_changes: ModeChangeRule::Never {
+        because: "no object 6061 shows its mode, and it interpolates only with 2619h = 7 stored",
+    },
+    interpolation_period_ns: Some(INTERPOLATION_PERIOD_NS),
+    highest_speed_rpm: Some(HIGHEST_SPEED_RPM),
+    // Manual, 5.13.
+    bit_rates: &[125_000, 250_000, 500_000, 1_000_000],
+    has_fixed_process_data: true,
+    may_ignore_sync: true,
+    sends_emergencies: false,
+    shows_alarm_as_stopped: true,
+    // The manual does not say which NMT state real units have after power-up.
+    may_power_up_operational: true,
+    dialect: Dialect::YzAim,
+    // A drive that has just booted ignores controlwords that follow sooner.
+    controlword_spacing_ns: 20_000_000,
+    plausible: Plausible {
+        // 3000 r/min
+        fastest_turns_per_s: 50.0,
+        usual_velocity: 50.0 * TAU,
+        inner_gear_from: None,
+    },
+    ..DriveFacts::standard("yz-aim", "YZ-AIM")
+};
