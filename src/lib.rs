@@ -12,8 +12,7 @@
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
-//! family                              one folder a family of drives: facts, process data, words, what simulates it
-//! drive                               bring-up and shutdown over the services of CiA 301, without I/O
+//! drive                               the families of drives: bring-up, facts, words
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! canopen                             the protocols of CiA 301, 305 and 306, without I/O

@@ -9,13 +9,13 @@ const ORDER: [&str; 22] = [
     "cli",
     "doctor",
     "jitter",
-    "commission",
     "play",
     "error",
     "controller",
     "telemetry",
     "schedule",
     "family",
+    "commission",
     "drive",
     "faults",
     "link",
@@ -31,12 +31,7 @@ const ORDER: [&str; 22] = [
 ];
 
 /// Arrows that still point back.
-const KNOWN: [(&str, &str); 2] = [
-    // Bring-up asks the families of drives for their steps and their process data.
-    ("drive", "family"),
-    // The families carry out the tasks of commissioning.
-    ("family", "commission"),
-];
+const KNOWN: [(&str, &str); 0] = [];
 
 /// One use of a folder by another.
 #[derive(Clone, Debug, PartialEq, Eq)]

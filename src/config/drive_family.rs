@@ -25,7 +25,12 @@ enum Facts {
     /// Every drive of the family is alike.
     OfFamily(&'static DriveFacts),
     /// They were read from the description of one drive, which the family keeps beside them.
-    OfDrive { facts: DriveFacts, description: Arc<dyn Any + Send + Sync> },
+    OfDrive(Arc<Described>),
+}
+
+struct Described {
+    facts: DriveFacts,
+    description: Box<dyn Any + Send + Sync>,
 }
 
 /// What is known of the drives of a family.
@@ -199,15 +204,15 @@ impl DriveFamily {
 
     /// One drive of a family, with the facts that its description gives. The family finds the description again by
     /// [`description`](Self::description).
-    pub fn of_drive(facts: DriveFacts, description: Arc<dyn Any + Send + Sync>) -> Self {
-        Self { facts: Facts::OfDrive { facts, description } }
+    pub fn of_drive(facts: DriveFacts, description: impl Any + Send + Sync) -> Self {
+        Self { facts: Facts::OfDrive(Arc::new(Described { facts, description: Box::new(description) })) }
     }
 
     /// What the family has read of this drive, if it has read anything, and it is of this type.
     pub fn description<T: Any>(&self) -> Option<&T> {
         match &self.facts {
             Facts::OfFamily(_) => None,
-            Facts::OfDrive { description, .. } => description.downcast_ref(),
+            Facts::OfDrive(drive) => drive.description.downcast_ref(),
         }
     }
 }
@@ -218,7 +223,7 @@ impl Deref for DriveFamily {
     fn deref(&self) -> &DriveFacts {
         match &self.facts {
             Facts::OfFamily(facts) => facts,
-            Facts::OfDrive { facts, .. } => facts,
+            Facts::OfDrive(drive) => &drive.facts,
         }
     }
 }

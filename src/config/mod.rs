@@ -32,21 +32,17 @@ pub use interface::InterfaceError;
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
-pub(crate) use read::{CommandPhase, parse};
+pub(crate) use read::{Knowledge, parse};
 
 use thiserror::Error;
 
 use crate::printable::printable_path;
 
-/// Reads a file and checks it, as [`parse`] does its text.
-pub(crate) fn load(
-    path: &Path,
-    families: &[&'static dyn ConfiguredFamily],
-    command_phase: CommandPhase,
-) -> Result<Config, ConfigError> {
+/// Reads a file and checks it, as [`read::parse`] does its text.
+pub(crate) fn load(path: &Path, knowledge: &Knowledge<'_>) -> Result<Config, ConfigError> {
     let name = printable_path(path);
     match crate::text_file::read(path) {
-        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, families, command_phase),
+        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, knowledge),
         Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
     }
 }

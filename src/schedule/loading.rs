@@ -1,10 +1,10 @@
-//! A configuration from a file or a text. Reading it is a matter of [`config`], except for what is known here alone: the
-//! families of drives, and what the buses carry, on which `command_phase = "auto"` depends.
+//! A configuration from a file or a text. Reading it is a matter of [`config`], except for two things that are known here:
+//! the families of drives, and `command_phase = "auto"`, which depends on what the buses carry.
 
 use std::path::Path;
 
 use super::automatic_command_phase;
-use crate::config::{self, Config, ConfigError, ConfiguredFamily};
+use crate::config::{self, Config, ConfigError, ConfiguredFamily, Knowledge};
 use crate::family;
 
 impl Config {
@@ -12,22 +12,24 @@ impl Config {
     /// [`schedule::verify`](super::verify).
     ///
     /// # Errors
-    /// Every problem of the file, each with its line and a way out.
+    /// Every problem of the file, each with its line.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        config::load(path, &families(), command_phase)
+        with_knowledge(|knowledge| config::load(path, knowledge))
     }
 
     /// Reads and checks the text of a configuration. `source_name` is what messages call it.
     ///
     /// # Errors
-    /// Every problem of the text, each with its line and a way out.
+    /// Every problem of the text, each with its line.
     pub fn parse(source_name: &str, text: &str) -> Result<Self, ConfigError> {
-        config::parse(source_name, text, &families(), command_phase)
+        with_knowledge(|knowledge| config::parse(source_name, text, knowledge))
     }
 }
 
-fn families() -> Vec<&'static dyn ConfiguredFamily> {
-    family::all().into_iter().map(|family| -> &'static dyn ConfiguredFamily { family }).collect()
+fn with_knowledge<T>(read: impl FnOnce(&Knowledge<'_>) -> T) -> T {
+    let families: Vec<&'static dyn ConfiguredFamily> =
+        family::all().into_iter().map(|family| -> &'static dyn ConfiguredFamily { family }).collect();
+    read(&Knowledge { command_phase, families: &families })
 }
 
 fn command_phase(config: &Config) -> Result<u64, String> {

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use takt::config::*;
 use takt::drive::{AxisFacts, BringUp, BringUpError, Shutdown};
-use takt::family;
 use takt_rt::Frame;
 
 use super::scripted_drive::ScriptedDrive;
@@ -144,7 +143,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         name: format!("joint{}", number + 1),
         bus,
         node,
-        drive: family::EROB_CANOPEN,
+        drive: takt::family::EROB_CANOPEN,
         control: Control::Position,
         other_modes: vec![],
         travel: Travel::Rotary,

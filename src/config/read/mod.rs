@@ -24,18 +24,18 @@ use super::problem_kind::ProblemKind;
 use super::spot::Problems;
 use section::Section;
 
-/// Finds what `command_phase = "auto"` stands for in a configuration that is complete otherwise. The error says in words why
-/// there is no such phase. It takes an analysis of the buses, which is not a matter of reading.
-pub(crate) type CommandPhase = fn(&Config) -> Result<u64, String>;
+/// What the reader needs to know that is not a matter of reading.
+pub(crate) struct Knowledge<'a> {
+    /// Finds what `command_phase = "auto"` stands for in a configuration that is complete otherwise, by an analysis of the buses.
+    /// The error says in words why there is no such phase.
+    pub command_phase: fn(&Config) -> Result<u64, String>,
+    /// The families that a drive may be of.
+    pub families: &'a [&'static dyn ConfiguredFamily],
+}
 
-/// Reads and checks the text of a configuration whose drives are of these families. `source_name` is what messages call it.
-pub(crate) fn parse(
-    source_name: &str,
-    text: &str,
-    families: &[&'static dyn ConfiguredFamily],
-    command_phase: CommandPhase,
-) -> Result<Config, ConfigError> {
-    document(source_name, text, |document, problems| read(document, problems, families, command_phase))
+/// Reads and checks the text of a configuration. `source_name` is what messages call it.
+pub(crate) fn parse(source_name: &str, text: &str, knowledge: &Knowledge<'_>) -> Result<Config, ConfigError> {
+    document(source_name, text, |document, problems| read(document, problems, knowledge))
 }
 
 /// What `read` makes of a TOML document, or else every problem that it has reported.
@@ -65,12 +65,7 @@ fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
 }
 
 /// Reads every section, even after one has failed.
-fn read<'a>(
-    document: &'a DeTable<'a>,
-    problems: &'a Problems,
-    families: &[&'static dyn ConfiguredFamily],
-    command_phase: CommandPhase,
-) -> Option<Config> {
+fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowledge<'_>) -> Option<Config> {
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
@@ -93,8 +88,12 @@ fn read<'a>(
     root.require("axis", "at least one [[axis]]");
     let axes =
         root.sections("axis").into_iter().map(|section| section.with_defaults(axis_defaults)).collect();
-    let machine =
-        axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node, families };
+    let machine = axis::Machine {
+        buses: &buses,
+        cycle_ns: cycle.period_ns,
+        master_node: master.node,
+        families: knowledge.families,
+    };
     let axes = axis::axes(axes, &machine);
 
     let groups = group::groups(root.sections("group"), &axes, problems);
@@ -120,7 +119,7 @@ fn read<'a>(
     };
     // Once everything else that counts is known.
     if let Some(automatic_phase) = automatic_phase.filter(|_| problems.is_empty()) {
-        match command_phase(&config) {
+        match (knowledge.command_phase)(&config) {
             Ok(command_phase_ns) => config.cycle.command_phase_ns = command_phase_ns,
             Err(cause) => automatic_phase.report(ProblemKind::NoCommandPhase { cause }),
         }

@@ -342,7 +342,7 @@ impl Decoder {
                     name: name(text("name")),
                     bus: metadata.get("bus").map(|bus| name(bus)),
                     group: text("group").parse().unwrap_or(0),
-                    family: family::named(&text("drive")).map(|family| family.word().to_owned()),
+                    family: family::named(text("drive")).map(|family| family.word().to_owned()),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
                     // Recordings of earlier versions do not have it.
                     plans_own_profile: text("plans_own_profile") == "true",
