@@ -110,7 +110,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (observed_in, observed_out) = observed_events(sizes.events);
     let numbers = RequestNumbers::default();
     let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups.len());
-    let rt = RtSide {
+    let mut rt = RtSide {
         requests: request_out,
         clients: taken,
         is_client_next: true,
@@ -124,6 +124,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         observed: observed_in,
         snapshot: snapshot_in,
     };
+    rt.publish(&snapshot_before_first_cycle(sizes));
     let host = HostSide {
         requests: request_in,
         trajectories: giver,
@@ -137,6 +138,16 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         observer: Observer { snapshot: snapshot_out },
     };
     (rt, host, LogSide { records: record_out, events: event_out })
+}
+
+/// A passive controller of so many groups, axes and buses, whose drives have reported nothing.
+fn snapshot_before_first_cycle(sizes: &ChannelSizes) -> Snapshot {
+    Snapshot {
+        group_count: sizes.groups.len() as u8,
+        axis_count: sizes.axes as u8,
+        bus_count: sizes.buses as u8,
+        ..words::NO_SNAPSHOT
+    }
 }
 
 /// The real-time thread's side.
@@ -381,14 +392,13 @@ pub struct Observer {
 }
 
 impl Observer {
-    /// The state after the newest complete cycle. Before the first one, it is a passive controller without axes.
+    /// The state after the newest complete cycle. Before the first one, it is a passive controller whose drives have reported nothing.
     pub fn snapshot(&self) -> Snapshot {
         loop {
             match self.snapshot.attempt(0, words::take_snapshot) {
                 Attempt::Whole(snapshot, _) => return snapshot,
-                Attempt::Nothing => return words::NO_SNAPSHOT,
-                // Three cycles have passed during the read, because this thread was preempted.
-                Attempt::Torn => std::hint::spin_loop(),
+                // Three cycles have passed during the read, because this thread was preempted. There is one from the beginning.
+                Attempt::Torn | Attempt::Nothing => std::hint::spin_loop(),
             }
         }
     }
@@ -493,10 +503,22 @@ mod tests {
     }
 
     #[test]
+    fn the_state_before_the_first_cycle_has_every_group_axis_and_bus() {
+        let group = |axis| GroupStream {
+            axes: GroupAxes::new(vec![axis]),
+            look_ahead: LookAheadParameters::default(),
+        };
+        let sizes = ChannelSizes { groups: (0..3).map(group).collect(), axes: 3, ..sizes() };
+        let (_rt, host, _log) = channels(&sizes);
+        let first = host.snapshot();
+        assert_eq!((first.groups().len(), first.axis_count, first.bus_count), (3, 3, 2));
+        assert!(first.groups().iter().all(|group| group.phase == Phase::Passive));
+    }
+
+    #[test]
     fn every_observer_sees_the_newest_snapshot() {
         let (mut rt, host, _log) = channels(&sizes());
         let observer = host.observer();
-        assert_eq!(observer.snapshot(), words::NO_SNAPSHOT);
         let mut snapshot = Snapshot { slot: 9, axis_count: 2, ..words::NO_SNAPSHOT };
         snapshot.groups[0].phase = Phase::Holding;
         rt.publish(&snapshot);

@@ -9,7 +9,7 @@ use std::ops::Deref;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use takt_rt::{Dialect, ModeCondition, OperationMode};
+use takt_rt::{Cia402Codec, ModeCondition, OperationMode};
 
 use super::model::{Control, Identity};
 use super::read::section::Section;
@@ -64,12 +64,10 @@ pub struct DriveFacts {
     pub may_ignore_sync: bool,
     /// Whether the drives have emergency objects.
     pub sends_emergencies: bool,
-    /// Whether a drive with an alarm shows the NMT state "stopped" in its heartbeat.
-    pub shows_alarm_as_stopped: bool,
     /// Whether the drives may be operational after power-up, without an NMT command.
     pub may_power_up_operational: bool,
-    /// How they speak through controlword and statusword.
-    pub dialect: Dialect,
+    /// How they use controlword and statusword.
+    pub codec: Cia402Codec,
     /// The pause that they need between two controlwords.
     pub controlword_spacing_ns: u64,
     /// What is plausible for such a drive.
@@ -177,9 +175,8 @@ impl DriveFacts {
             has_fixed_process_data: false,
             may_ignore_sync: false,
             sends_emergencies: true,
-            shows_alarm_as_stopped: false,
             may_power_up_operational: false,
-            dialect: Dialect::Cia402,
+            codec: Cia402Codec::STANDARD,
             controlword_spacing_ns: 0,
             plausible: Plausible::ANYTHING,
         }

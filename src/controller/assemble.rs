@@ -4,10 +4,10 @@ use std::fmt;
 
 use arrayvec::ArrayVec;
 use takt_rt::{
-    AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
-    GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError,
-    ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan,
-    TimingLadder, TorqueLimits,
+    AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
+    FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
+    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters,
+    SetUpError, SlotPlan, TimingLadder, TorqueLimits,
 };
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
@@ -82,7 +82,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         .map(|(index, axis)| axis_parameters(index, axis, config, &cycles))
         .collect::<Result<_, _>>()?;
     let buses = config.buses.iter().map(|bus| BusParameters {
-        sync_id: Id::canopen(0x080, 0),
+        canopen: Some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
         divider: bus.divider,
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
@@ -145,7 +145,7 @@ fn axis_parameters(
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback_since: feedback_since(&data.feedback),
         unused: data.unused.iter().map(|plan| plan.id).collect(),
-        dialect: axis.drive.dialect,
+        codec: axis.drive.codec,
         controlword_spacing_cycles: u32::try_from(
             axis.drive.controlword_spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
         )

@@ -95,7 +95,7 @@ impl AxisRun {
             axis: axis.clone(),
             pdo_reader: None,
             reported: None,
-            facts: AxisFacts { dialect: axis.drive.dialect, ..AxisFacts::default() },
+            facts: AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() },
             failure: None,
         }
     }

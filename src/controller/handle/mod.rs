@@ -216,7 +216,7 @@ impl Handle {
         &self.0.realtime
     }
 
-    /// The state after the newest complete cycle; after the end, the last one. It says of each axis from when its feedback is:
+    /// The state after the newest complete cycle; after the end, the last one. Before the first one, no drive has reported. It says of each axis from when its feedback is:
     /// [`is_stale`](takt_rt::AxisSnapshot::is_stale), [`feedback_age_ns`](takt_rt::AxisSnapshot::feedback_age_ns).
     pub fn state(&self) -> Snapshot {
         self.0.observer.snapshot()

@@ -1,6 +1,6 @@
 //! Evaluates the drive's SDO responses: checks and stores values, verifies writes, and classifies missing answers.
 
-use takt_rt::{Dialect, Nanoseconds};
+use takt_rt::Nanoseconds;
 
 use super::{AWAIT_PAUSE_NS, AxisRun, StepPhase, StepResult};
 use crate::canopen::dcf::Download;
@@ -11,6 +11,7 @@ use crate::canopen::sdo::{AbortCode, Completed, SdoError, Transfer};
 use crate::drive::failure::{Content, FailureCause, ProbeResult};
 use crate::drive::process_data::ProcessData;
 use crate::drive::step::{Access, Action, Check, Fact, ReadBack};
+use crate::family;
 
 impl AxisRun {
     /// Evaluates a finished transfer.
@@ -113,7 +114,7 @@ impl AxisRun {
     fn means_absent(&self, error: SdoError) -> bool {
         match error {
             SdoError::Aborted(code) => code.means_absent(),
-            SdoError::NoReply { .. } => self.facts.dialect == Dialect::YzAim,
+            SdoError::NoReply { .. } => family::of(&self.axis.drive).sdo_quirks().has_short_replies,
             _ => false,
         }
     }
@@ -245,7 +246,9 @@ impl AxisRun {
                 // The manual of a YZ-AIM gives 606C two lengths (A27), so the length of its response counts.
                 let of_other_length = || {
                     let data_type = object.data_type.of_length(received)?;
-                    uploaded.number(data_type).filter(|_| self.facts.dialect == Dialect::YzAim)
+                    uploaded
+                        .number(data_type)
+                        .filter(|_| family::of(&self.axis.drive).sdo_quirks().has_short_replies)
                 };
                 uploaded
                     .number(object.data_type)
