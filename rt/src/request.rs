@@ -3,7 +3,6 @@
 use crate::cia402::OperationMode;
 use crate::frame::Id;
 use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, TransmissionType};
-use crate::phase::Phase;
 use crate::profile::ProfileTarget;
 use crate::record::MAX_AXES;
 use crate::source::CallbackRun;
