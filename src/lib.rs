@@ -9,6 +9,7 @@
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`bus`]: what a bus is connected to, how long frames take, and whether everything fits in the worst case.
 //! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
+//! - [`procedure`]: the engine of procedures on drives, for bring-up, shutdown and [`commission`]ing.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
 //! - [`commission`]: what a single drive is set up, moved and looked at with, apart from any run.
@@ -35,6 +36,7 @@ pub mod faults;
 pub mod jitter;
 pub mod play;
 pub mod printable;
+pub mod procedure;
 pub mod sim;
 pub mod telemetry;
 mod text_file;

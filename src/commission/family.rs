@@ -3,11 +3,9 @@
 use takt_rt::Frame;
 
 use super::dictionary::ObjectEntry;
-use super::session_state::SdoQuirks;
 use super::target::TargetDrive;
 use super::{erob_canopen, yz_aim};
 use crate::canopen::object::Object;
-use crate::canopen::sdo::SdoTiming;
 
 pub use crate::config::DriveFamily as Family;
 
@@ -17,15 +15,6 @@ impl Family {
         match self {
             Self::ErobCanopen => 0x5A65_726F,
             Self::YzAim => 0x331,
-        }
-    }
-
-    /// Timing and quirks of the SDO server. A YZ-AIM drops requests that overlap or follow too soon.
-    pub const fn sdo_quirks(self) -> SdoQuirks {
-        let timing = SdoTiming { reply_timeout_ns: 100_000_000, retries: 2 };
-        match self {
-            Self::ErobCanopen => SdoQuirks { timing, gap_ns: 0, has_short_replies: false },
-            Self::YzAim => SdoQuirks { timing, gap_ns: 2_000_000, has_short_replies: true },
         }
     }
 
