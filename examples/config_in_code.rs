@@ -6,7 +6,8 @@
 
 use std::time::Duration;
 
-use takt::config::{Axis, Bus, DriveFamily, Interface, Limits};
+use takt::config::{Axis, Bus, Interface, Limits};
+use takt::family;
 use takt::{Config, Controller, SessionOptions};
 
 fn main() -> takt::Result {
@@ -24,8 +25,8 @@ pub fn config() -> Config {
         jerk: 100.0,
         torque: 87.0,
     };
-    let shoulder = Axis::new("shoulder", 0, 1, DriveFamily::ErobCanopen, limits);
-    let elbow = Axis { reversed: true, ..Axis::new("elbow", 0, 2, DriveFamily::ErobCanopen, limits) };
+    let shoulder = Axis::new("shoulder", 0, 1, family::EROB_CANOPEN, limits);
+    let elbow = Axis { reversed: true, ..Axis::new("elbow", 0, 2, family::EROB_CANOPEN, limits) };
     // On the machine: Interface::SocketCan("can0".to_owned())
     let bus = Bus::new("can", Interface::Simulated);
     let mut config = Config::new("two-joints", vec![bus], vec![shoulder, elbow]);

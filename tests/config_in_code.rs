@@ -8,6 +8,7 @@ use takt::config::{
 };
 use takt::controller::session::SessionOptions;
 use takt::controller::{Controller, VirtualRun, assemble};
+use takt::family;
 
 fn sound() -> Config {
     Config::parse("arm6-erob.toml", include_str!("../configs/arm6-erob.toml")).unwrap()
@@ -151,12 +152,11 @@ const CASES: &[Case] = &[
     ("feedback", |c| axis(c).feedback = vec![Feedback::Torque; 2], &[AXIS, "is in `axis.feedback` twice"]),
     ("feedback delay", |c| axis(c).feedback_delay_ns = u64::MAX, &[AXIS, "`axis.feedback_delay`"]),
     ("own heartbeat", |c| axis(c).heartbeat_ns = Some(0), &[AXIS, "`axis.heartbeat` cannot be 0 s"]),
-    ("interpolation", |c| axis(c).drive = DriveFamily::YzAim, &[AXIS, "`axis.mode` cannot be"]),
+    ("interpolation", |c| axis(c).drive = family::YZ_AIM, &[AXIS, "`axis.mode` cannot be"]),
     (
         "other modes of a YZ-AIM",
         |c| {
-            let yz_aim =
-                Axis::new("joint2", c.axes[1].bus, c.axes[1].node, DriveFamily::YzAim, c.axes[1].limits);
+            let yz_aim = Axis::new("joint2", c.axes[1].bus, c.axes[1].node, family::YZ_AIM, c.axes[1].limits);
             c.axes[1] = yz_aim.with_other_modes(vec![Control::ProfilePosition]);
         },
         &[AXIS, "`axis.modes` cannot be given for a YZ-AIM", "no object 6061"],
@@ -384,7 +384,7 @@ fn made_and_read(drive: DriveFamily, axis: &str, period: &str, change: fn(Axis) 
         "name = \"m\"\n[cycle]\nperiod = \"{period}\"\n[[bus]]\nname = \"can\"\n[[axis]]\nname = \"j\"\nbus = \"can\"\n\
          node = 3\ndrive = \"{}\"\n{axis}\n\
          limits = {{ position = [0.1, 0.9], velocity = 0.5, acceleration = 2.0, torque = 20 }}\n",
-        drive.word()
+        drive.word
     );
     let read = Config::parse("m.toml", &text).unwrap();
     let axis = change(Axis::new("j", 0, 3, drive, limits()));
@@ -396,20 +396,20 @@ fn made_and_read(drive: DriveFamily, axis: &str, period: &str, change: fn(Axis) 
 
 #[test]
 fn a_configuration_made_in_code_has_the_defaults_of_a_file() {
-    use DriveFamily::{ErobCanopen, YzAim};
-    made_and_read(ErobCanopen, "", "1 ms", |axis| axis, 1_000_000);
-    made_and_read(ErobCanopen, "", "4 ms", |axis| axis, 4_000_000);
-    made_and_read(YzAim, "", "2 ms", |axis| axis, 2_000_000);
+    use family::{EROB_CANOPEN, YZ_AIM};
+    made_and_read(EROB_CANOPEN, "", "1 ms", |axis| axis, 1_000_000);
+    made_and_read(EROB_CANOPEN, "", "4 ms", |axis| axis, 4_000_000);
+    made_and_read(YZ_AIM, "", "2 ms", |axis| axis, 2_000_000);
     let linear = |axis: Axis| Axis { gear_ratio: 2.0, ..axis.linear(0.01) };
     made_and_read(
-        ErobCanopen,
+        EROB_CANOPEN,
         "travel = \"linear\"\nlead = \"10 mm\"\ngear_ratio = 2",
         "1 ms",
         linear,
         1_000_000,
     );
     let csv = |axis: Axis| axis.with_control(Control::Velocity { position_gain: 20.0 });
-    made_and_read(ErobCanopen, "mode = \"csv\"", "1 ms", csv, 1_000_000);
+    made_and_read(EROB_CANOPEN, "mode = \"csv\"", "1 ms", csv, 1_000_000);
     let cst = |axis: Axis| {
         axis.with_control(Control::Torque {
             stiffness: 1600.0,
@@ -419,7 +419,7 @@ fn a_configuration_made_in_code_has_the_defaults_of_a_file() {
             coulomb_friction: 0.5,
         })
     };
-    made_and_read(ErobCanopen, "mode = \"cst\"", "1 ms", cst, 1_000_000);
+    made_and_read(EROB_CANOPEN, "mode = \"cst\"", "1 ms", cst, 1_000_000);
     let changing = |axis: Axis| {
         let torque = Control::Torque {
             stiffness: 1600.0,
@@ -431,12 +431,12 @@ fn a_configuration_made_in_code_has_the_defaults_of_a_file() {
         axis.with_other_modes(vec![Control::Velocity { position_gain: 20.0 }, torque])
     };
     let modes = "modes = [\"csp\", \"csv\", \"cst\"]";
-    made_and_read(ErobCanopen, modes, "1 ms", changing, 1_000_000);
+    made_and_read(EROB_CANOPEN, modes, "1 ms", changing, 1_000_000);
 }
 
 #[test]
 fn a_configuration_made_in_code_moves_an_arm() {
-    let joint = |name: &str, node| Axis::new(name, 0, node, DriveFamily::ErobCanopen, limits());
+    let joint = |name: &str, node| Axis::new(name, 0, node, family::EROB_CANOPEN, limits());
     let mut config = Config::new(
         "arm",
         vec![Bus::new("can", Interface::Simulated)],

@@ -4,7 +4,9 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use takt_rt::{Dialect, OperationMode, Phase, Rule};
+use takt::config::DriveFamily;
+use takt::family::{EROB_CANOPEN, YZ_AIM};
+use takt_rt::{OperationMode, Phase, Rule};
 
 #[path = "../fuzz/subjects/mod.rs"]
 mod subjects;
@@ -65,8 +67,8 @@ fn the_kept_inputs_lead_the_group_through_every_phase_and_move_it_in_every_mode(
     for phase in Phase::ALL {
         assert!(journeys.iter().any(|journey| journey.phases.contains(&phase)), "{phase:?}");
     }
-    let moved = |mode: OperationMode, dialect| {
-        journeys.iter().any(|journey| journey.modes_in_motion.contains(&(mode, dialect)))
+    let moved = |mode: OperationMode, family: DriveFamily| {
+        journeys.iter().any(|journey| journey.modes_in_motion.contains(&(mode, family.clone())))
     };
     for mode in [
         OperationMode::CyclicSynchronousPosition,
@@ -77,12 +79,12 @@ fn the_kept_inputs_lead_the_group_through_every_phase_and_move_it_in_every_mode(
         OperationMode::ProfileVelocity,
         OperationMode::ProfileTorque,
     ] {
-        assert!(moved(mode, Dialect::Cia402), "{mode:?}");
+        assert!(moved(mode, EROB_CANOPEN), "{mode:?}");
     }
     for mode in
         [OperationMode::InterpolatedPosition, OperationMode::ProfilePosition, OperationMode::ProfileVelocity]
     {
-        assert!(moved(mode, Dialect::YzAim), "{mode:?} of a YZ-AIM");
+        assert!(moved(mode, YZ_AIM), "{mode:?} of a YZ-AIM");
     }
     assert!(journeys.iter().any(|journey| journey.refused > 0 && journey.refused < journey.taken));
     assert!(journeys.iter().any(|journey| journey.calls > 100), "a callback is called");

@@ -15,8 +15,8 @@
 //! 4. `axis`: [`Axis`] is one joint: its set-points, where the joint is, the power of its drive.
 //! 5. `guard`: the last check of every set-point; [`AxisLimits`] is what it checks against.
 //! 6. [`plan`]: the trajectory planner, of use by itself; `group_trajectory` is what the engine makes of it.
-//! 7. `cia402`, `dialect`, `profile`, `control`, `units`, `pdo`: how a drive is spoken to: its state machine ([`DriveState`]),
-//!    deviations of a family ([`Dialect`]), the handshake of profile position, the loops closed here ([`ControlLaw`]), SI to
+//! 7. `cia402`, `cia402_codec`, `profile`, `control`, `units`, `pdo`: how a drive is spoken to: its state machine ([`DriveState`]),
+//!    deviations of a drive ([`Cia402Codec`]), the handshake of profile position, the loops closed here ([`ControlLaw`]), SI to
 //!    drive units ([`Scale`]), and PDO mappings compiled to shifts and masks ([`Mapping`]).
 //!
 //! What crosses the border of the real-time thread:
@@ -32,9 +32,9 @@ mod answers;
 mod axis;
 mod bit_set;
 mod cia402;
+mod cia402_codec;
 mod control;
 mod cycle;
-mod dialect;
 mod dispatch;
 mod engine;
 mod fault;
@@ -51,6 +51,7 @@ pub mod plan;
 mod port;
 mod profile;
 mod record;
+mod rejection;
 mod request;
 mod source;
 mod stop;
@@ -68,12 +69,14 @@ pub use axis::{
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
+pub use cia402_codec::{
+    Cia402Codec, ProfileRamps, SetPointTransfer, ShownStates, StopCommand, StoppedHeartbeat,
+};
 pub use control::{ControlLaw, Gain, GainError, LoopInput, TorqueDemand};
 pub use cycle::{Cycle, Flow, SlotPlan};
-pub use dialect::Dialect;
 pub use engine::{
-    BusParameters, CycleCount, CycleInput, Deadline, Engine, EngineParameters, GroupParameters, Heartbeat,
-    Receiver, SEND_BATCH, SendBatch, SetUpError,
+    BusParameters, CanopenNetwork, CycleCount, CycleInput, Deadline, Engine, EngineParameters,
+    GroupParameters, Heartbeat, Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
 pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameKind, Id};
@@ -91,9 +94,10 @@ pub use record::{
     AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, MAX_AXES, MAX_BUSES, MAX_GROUPS,
     RecordedStop,
 };
+pub use rejection::{RejectReason, RequestError};
 pub use request::{
-    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, RejectReason, Request,
-    RequestEnvelope, RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
+    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
+    RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,

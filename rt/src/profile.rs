@@ -2,7 +2,6 @@
 //! over and when it has been reached.
 
 use crate::cia402::{controlword, statusword};
-use crate::dialect::Dialect;
 
 /// A target of a profile mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,8 +104,9 @@ impl ProfileCommand {
     }
 
     /// Whether the drive has the target and says that it has reached it.
-    pub fn is_reached(&self, dialect: Dialect, word: u16) -> bool {
-        self.handshake == Handshake::Idle && self.cycles >= STALE_CYCLES && dialect.is_target_reached(word)
+    pub fn is_reached(&self, word: u16) -> bool {
+        let is_shown = word & statusword::TARGET_REACHED != 0;
+        self.handshake == Handshake::Idle && self.cycles >= STALE_CYCLES && is_shown
     }
 }
 
@@ -161,12 +161,12 @@ mod tests {
     fn target_reached_counts_only_once_it_can_be_about_this_target() {
         let mut command = ProfileCommand::default();
         command.set(7, false);
-        assert!(!command.is_reached(Dialect::YzAim, statusword::TARGET_REACHED));
+        assert!(!command.is_reached(statusword::TARGET_REACHED));
         for _ in 0..STALE_CYCLES {
             command.pass();
         }
-        assert!(command.is_reached(Dialect::YzAim, statusword::TARGET_REACHED));
-        assert!(!command.is_reached(Dialect::YzAim, 0));
+        assert!(command.is_reached(statusword::TARGET_REACHED));
+        assert!(!command.is_reached(0));
     }
 
     #[test]

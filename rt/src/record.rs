@@ -3,7 +3,8 @@
 use crate::cia402::{self, OperationMode};
 use crate::fault::Rule;
 use crate::phase::Phase;
-use crate::request::{RequestError, RequestId};
+use crate::rejection::RequestError;
+use crate::request::RequestId;
 use crate::source::StreamState;
 use crate::stop::StopReason;
 use crate::stop_category::StopCategory;

@@ -172,7 +172,7 @@ mod tests {
     use core::f64::consts::TAU;
     use proptest::prelude::*;
 
-    const EROB: ScaleParameters = ScaleParameters {
+    const DRIVE: ScaleParameters = ScaleParameters {
         counts_per_turn: 524_288.0,
         velocity_units_per_turn: 524_288.0,
         gear_ratio: 1.0,
@@ -183,8 +183,8 @@ mod tests {
     };
 
     #[test]
-    fn an_erob_counts_83443_027_a_radian() {
-        let scale = Scale::new(EROB).unwrap();
+    fn a_turn_of_524288_counts_has_83443_027_a_radian() {
+        let scale = Scale::new(DRIVE).unwrap();
         assert_eq!(libm::rint(scale.resolution() * 1000.0) as i64, 83_443_027);
         assert_eq!(scale.position_to_counts(1.0), 83_443);
         assert_eq!(scale.position_to_counts(TAU), 524_288);
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn a_reversed_joint_turns_position_velocity_and_torque_round() {
-        let scale = Scale::new(ScaleParameters { reversed: true, ..EROB }).unwrap();
+        let scale = Scale::new(ScaleParameters { reversed: true, ..DRIVE }).unwrap();
         assert_eq!(scale.position_to_counts(TAU), -524_288);
         assert_eq!(scale.velocity_to_drive(TAU), -524_288);
         assert_eq!(scale.torque_to_per_mille(31.0), -1000);
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn torque_beyond_16_bits_and_positions_beyond_32_saturate() {
-        let scale = Scale::new(EROB).unwrap();
+        let scale = Scale::new(DRIVE).unwrap();
         assert_eq!(scale.torque_to_per_mille(1e9), 32_767);
         assert_eq!(scale.position_to_counts(-1e9), i32::MIN);
     }
@@ -209,16 +209,16 @@ mod tests {
     #[test]
     fn impossible_parameters_are_named() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert_eq!(Scale::new(ScaleParameters { gear_ratio: bad, ..EROB }), Err(ScaleError::GearRatio));
+            assert_eq!(Scale::new(ScaleParameters { gear_ratio: bad, ..DRIVE }), Err(ScaleError::GearRatio));
             assert_eq!(
-                Scale::new(ScaleParameters { rated_torque: bad, ..EROB }),
+                Scale::new(ScaleParameters { rated_torque: bad, ..DRIVE }),
                 Err(ScaleError::RatedTorque)
             );
         }
-        let fine = ScaleParameters { counts_per_turn: 1e300, gear_ratio: 1e300, ..EROB };
+        let fine = ScaleParameters { counts_per_turn: 1e300, gear_ratio: 1e300, ..DRIVE };
         assert_eq!(Scale::new(fine), Err(ScaleError::Resolution));
         assert_eq!(
-            Scale::new(ScaleParameters { zero_counts: f64::NAN, ..EROB }),
+            Scale::new(ScaleParameters { zero_counts: f64::NAN, ..DRIVE }),
             Err(ScaleError::ZeroCounts)
         );
     }
@@ -229,7 +229,7 @@ mod tests {
             counts: i32, turns in 1.0f64..1e7, gear in 0.01f64..200.0, zero in -1_000_000i32..1_000_000, reversed: bool,
         ) {
             let scale = Scale::new(ScaleParameters {
-                counts_per_turn: turns, gear_ratio: gear, reversed, zero_counts: zero.into(), ..EROB
+                counts_per_turn: turns, gear_ratio: gear, reversed, zero_counts: zero.into(), ..DRIVE
             }).unwrap();
             prop_assert_eq!(scale.position_to_counts(scale.position_from_counts(counts)), counts);
             prop_assert_eq!(scale.velocity_to_drive(scale.velocity_from_drive(counts)), counts);
@@ -237,7 +237,7 @@ mod tests {
 
         #[test]
         fn a_sum_of_small_steps_never_leaves_the_nearest_count(step in 1e-9f64..1e-4, steps in 1usize..20_000) {
-            let scale = Scale::new(EROB).unwrap();
+            let scale = Scale::new(DRIVE).unwrap();
             let position = step * steps as f64;
             let exact = position * scale.resolution();
             prop_assert!((f64::from(scale.position_to_counts(position)) - exact).abs() <= 0.5);

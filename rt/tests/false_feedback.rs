@@ -6,8 +6,8 @@ use std::f64::consts::TAU;
 
 use fixture::{COUNTS_PER_TURN, LIMITS, PERIOD_NS, Rig, axis, axis_in, parameters, scale};
 use takt_rt::{
-    Axis, AxisParameters, CommandPdo, ControlLaw, Dialect, DriveState, Goal, Id, Phase, Request, Rule,
-    TransmissionType,
+    Axis, AxisParameters, Cia402Codec, CommandPdo, ControlLaw, DriveState, Goal, Id, Phase, Request, Rule,
+    ShownStates, TransmissionType,
 };
 
 fn counts(radians: f64) -> i32 {
@@ -166,7 +166,10 @@ fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_di
     let mut drive = Axis::new(
         0,
         AxisParameters {
-            dialect: Dialect::YzAim,
+            codec: Cia402Codec {
+                states: ShownStates::EnabledAndFault { enabled: 0x37, fault: 0x08 },
+                ..Cia402Codec::default()
+            },
             controlword_spacing_cycles: 10,
             commands: usual.commands.iter().cloned().map(rare).collect(),
             ..usual

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use takt::bus::schedule::{self, BusSchedule};
 use takt::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel};
 use takt::rt::ModeCondition;
+use takt::schedule::{self, BusSchedule};
 
 use super::exit::Exit;
 use super::print;
@@ -182,12 +182,13 @@ impl AxisCheck {
             node: axis.node,
             mode: mode(&axis.control),
             other_modes: axis.other_modes.iter().map(mode).collect(),
-            mode_change: (!axis.other_modes.is_empty()).then(|| axis.drive.mode_condition()).flatten().map(
-                |condition| match condition {
+            mode_change: (!axis.other_modes.is_empty())
+                .then(|| axis.drive.mode_changes.condition())
+                .flatten()
+                .map(|condition| match condition {
                     ModeCondition::Disabled => "while disabled",
                     ModeCondition::AtRest => "at rest",
-                },
-            ),
+                }),
             is_linear: axis.travel != Travel::Rotary,
             position_min: axis.limits.position_min,
             position_max: axis.limits.position_max,

@@ -8,10 +8,11 @@ use std::thread;
 
 use clap::Args;
 
-use takt::bus::SocketCanOptions;
-use takt::bus::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
-use takt::bus::port::{OpenError, open_configured};
 use takt::config::{Config, Interface};
+use takt::controller::port::open_configured;
+use takt::family::simulated_drives;
+use takt::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
+use takt::link::{OpenError, SocketCanOptions};
 use takt::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};
@@ -134,7 +135,7 @@ fn open(config: &Config) -> Result<Vec<(String, LiveDrives)>, OpenError> {
             ..SocketCanOptions::default()
         };
         if let Some(port) = open_configured(config, index, &options)? {
-            all.push((bus.name.clone(), LiveDrives::new(config, index, port)));
+            all.push((bus.name.clone(), LiveDrives::new(simulated_drives(config, index), port)));
         }
     }
     Ok(all)

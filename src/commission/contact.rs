@@ -6,7 +6,6 @@ use super::target::TargetDrive;
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::objects::{DEVICE_TYPE, VENDOR_ID};
 use crate::canopen::sdo::SdoError;
-use crate::drive;
 use crate::procedure::Access;
 
 /// How long to wait for an answer in the vendor's own protocol.
@@ -48,13 +47,16 @@ pub async fn connect_family(c: &SdoSession, target: &TargetDrive) -> Result<(), 
     connect(c, target).await?;
     c.step("identity");
     let received = c.read(&VENDOR_ID).await? as u32;
-    let (family, expected) = (target.family.word(), target.family.vendor_id());
-    if received == expected { Ok(()) } else { Err(Failure::OtherDrive { family, expected, received }) }
+    let (family, expected) = (target.drive.word, target.drive.identity.vendor);
+    match expected.filter(|expected| *expected != received) {
+        None => Ok(()),
+        Some(expected) => Err(Failure::OtherDrive { family, expected, received }),
+    }
 }
 
 /// Checks for firmware without CANopen, by a request in the vendor's own protocol that changes nothing.
 async fn other_protocol(c: &SdoSession, target: &TargetDrive) -> Result<Option<&'static str>, Failure> {
-    let Some(other) = drive::other_protocol(target.family, target.node) else { return Ok(None) };
+    let Some(other) = target.family().other_protocol(target.node) else { return Ok(None) };
     c.send(other.request);
     let collected = c.collect_frames(OTHER_PROTOCOL_NS).await?;
     let has_answered = collected.iter().any(|frame| frame.id() == other.answer);

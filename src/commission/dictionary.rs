@@ -1,10 +1,10 @@
 //! A family's object dictionary for the operator: names, access, units.
 
 use crate::canopen::object::{DataType, Object, ObjectAddress};
-use crate::config::Quantity;
+use crate::config::{DriveFamily, Quantity};
+use crate::family;
 
 use super::failure::Failure;
-use super::family::Family;
 use super::target::TargetDrive;
 
 /// Access to an object.
@@ -139,8 +139,8 @@ pub enum SelectedObject {
 ///
 /// # Errors
 /// [`Failure::Unsuitable`] when nothing matches, or when several names begin like this.
-pub fn find(family: Family, text: &str) -> Result<SelectedObject, Failure> {
-    let entries = family.objects();
+pub fn find(drive: &DriveFamily, text: &str) -> Result<SelectedObject, Failure> {
+    let entries = family::of(drive).objects();
     if let Some(address) = address(text) {
         let known = entries.iter().find(|entry| entry.object.address == address);
         return Ok(known.map_or(SelectedObject::Unknown(address), |entry| SelectedObject::Known(*entry)));
@@ -210,7 +210,7 @@ mod tests {
     use super::*;
 
     fn address_of(text: &str) -> Option<ObjectAddress> {
-        match find(Family::ErobCanopen, text) {
+        match find(&family::EROB_CANOPEN, text) {
             Ok(SelectedObject::Known(entry)) => Some(entry.object.address),
             Ok(SelectedObject::Unknown(address)) => Some(address),
             Err(_) => None,
@@ -231,9 +231,9 @@ mod tests {
     fn objects_are_found_by_their_name_or_its_beginning() {
         assert_eq!(address_of("position actual value"), Some(ObjectAddress::new(0x6064, 0)));
         assert_eq!(address_of("Position-Actual"), Some(ObjectAddress::new(0x6064, 0)));
-        let ambiguous = find(Family::ErobCanopen, "profile").unwrap_err().to_string();
+        let ambiguous = find(&family::EROB_CANOPEN, "profile").unwrap_err().to_string();
         assert!(ambiguous.contains("6081:00 (profile velocity)"), "{ambiguous}");
-        assert!(find(Family::ErobCanopen, "no such thing").is_err());
+        assert!(find(&family::EROB_CANOPEN, "no such thing").is_err());
     }
 
     #[test]

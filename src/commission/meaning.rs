@@ -1,15 +1,13 @@
 //! Describes frames in words, for the trace of a procedure.
 
-use takt_rt::Frame;
+use takt_rt::{Frame, StoppedHeartbeat};
 
 use super::dictionary::ObjectEntry;
-use super::family::Family;
 use super::target::TargetDrive;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::canopen::sdo::{SdoRequest, SdoResponse};
-use crate::drive;
 
 /// Describes a frame on the bus of `target`.
 pub fn of(target: &TargetDrive, frame: &Frame) -> String {
@@ -17,7 +15,7 @@ pub fn of(target: &TargetDrive, frame: &Frame) -> String {
         return nmt(command, target);
     }
     // Its identifiers are those of the SDO of another node, but SDO frames have eight bytes.
-    if let Some(other) = drive::other_protocol(target.family, target.node)
+    if let Some(other) = target.family().other_protocol(target.node)
         && frame.payload().len() < 8
     {
         if frame.id() == other.request.id() {
@@ -37,8 +35,10 @@ pub fn of(target: &TargetDrive, frame: &Frame) -> String {
     if let Some(message) = ErrorControl::decode(frame) {
         let words = match message.state {
             NmtState::BootUp => "boot-up".to_owned(),
-            // A YZ-AIM with an alarm sends the state "stopped" in its heartbeat.
-            NmtState::Stopped if target.family == Family::YzAim && message.node == target.node => {
+            NmtState::Stopped
+                if target.drive.codec.stopped_heartbeat == StoppedHeartbeat::Alarm
+                    && message.node == target.node =>
+            {
                 "heartbeat: alarm".to_owned()
             }
             state => format!("heartbeat: {state}"),
@@ -97,7 +97,7 @@ fn answered(target: &TargetDrive, response: &SdoResponse) -> String {
 }
 
 fn entry(target: &TargetDrive, address: ObjectAddress) -> Option<&'static ObjectEntry> {
-    target.family.objects().iter().find(|entry| entry.object.address == address)
+    target.family().objects().iter().find(|entry| entry.object.address == address)
 }
 
 fn named(target: &TargetDrive, address: ObjectAddress) -> String {
@@ -110,7 +110,7 @@ fn value(target: &TargetDrive, address: ObjectAddress, bytes: &[u8]) -> String {
     // A value of another length than in the table is shown as bytes.
     let Some(number) = object.data_type.decode(bytes) else { return format!("{bytes:02X?}") };
     let shown = object.show(number);
-    if let Some(meaning) = target.family.meaning(&object, number) {
+    if let Some(meaning) = target.family().meaning(&object, number) {
         return format!("{shown}: {meaning}");
     }
     match entry.and_then(|entry| entry.physical(target, number)) {
@@ -144,7 +144,7 @@ fn other(target: &TargetDrive, frame: &Frame) -> String {
         0x500 => "RPDO4",
         _ => "unknown",
     };
-    let words = target.family.process_data_words(target, frame).unwrap_or_else(|| kind.to_owned());
+    let words = target.family().process_data_words(target, frame).unwrap_or_else(|| kind.to_owned());
     if node == u32::from(target.node) { words } else { format!("node {node}: {kind}") }
 }
 
@@ -156,7 +156,7 @@ mod tests {
 
     #[test]
     fn frames_of_the_vendors_own_protocol_are_named_as_such() {
-        let target = TargetDrive::unconfigured(2, Family::ErobCanopen).unwrap();
+        let target = TargetDrive::unconfigured(2, crate::family::EROB_CANOPEN).unwrap();
         let words = |id: u32, bytes: &[u8]| of(&target, &Frame::data(Id::base(id).unwrap(), bytes).unwrap());
         assert_eq!(words(0x642, &[0, 2]), "request in the vendor's custom CAN protocol");
         assert_eq!(words(0x5C2, &[0, 0, 1, 2, 0x3E]), "reply in the vendor's custom CAN protocol");

@@ -5,7 +5,7 @@
 //!            │
 //!       sdo_session ── transfers, pauses and conditions to await
 //!            │
-//!   erob_canopen, yz_aim ── one folder a family: objects, alarms, motions
+//!         family ── one folder a family: objects, alarms, motions
 //!            │
 //!     target, motion_profile ── units and limits of the axis
 //! ```
@@ -19,7 +19,6 @@ mod contact;
 pub mod dictionary;
 pub mod erob_canopen;
 mod failure;
-mod family;
 mod guarded;
 pub mod layer_settings;
 pub mod meaning;
@@ -37,7 +36,6 @@ use crate::procedure::{self, CanopenClient, CanopenSession};
 
 pub use crate::procedure::{AxisReading, ProcedureEvent, SdoQuirks};
 pub use failure::Failure;
-pub use family::Family;
 pub use motion_profile::{DEFAULT_SHARE, DriveProfile, MotionProfile};
 pub use report::{Report, ReportItem};
 pub use sdo_session::SdoSession;
@@ -52,16 +50,13 @@ pub type ProcedureError = procedure::ProcedureError<Failure>;
 
 /// The procedure that carries out a task with this drive.
 pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
-    let session = CanopenSession::new(CanopenClient::new(target.node, target.family.sdo_quirks()));
+    let session = CanopenSession::new(CanopenClient::new(target.node, target.family().sdo_quirks()));
     let c = SdoSession::new(session.clone());
     Procedure::new(session, async move {
         match task {
             Task::Read { objects } => objects::read(&c, &target, &objects).await,
             Task::Write { object, value, entry } => objects::write(&c, &target, object, value, entry).await,
-            task => match target.family {
-                Family::ErobCanopen => erob_canopen::carry_out(&c, &target, task).await,
-                Family::YzAim => yz_aim::carry_out(&c, &target, task).await,
-            },
+            task => target.family().carry_out(&c, &target, task).await,
         }
     })
 }

@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use takt_rt::{Nanoseconds, Scale, ScaleError, ScaleParameters};
 
 use super::failure::Failure;
-use super::family::Family;
-use crate::config::{Axis, Limits, Quantity, Travel, is_rounded};
+use crate::config::{Axis, DriveFamily, Limits, Quantity, Travel};
 use crate::controller::assemble;
+use crate::family::{self, Family, is_rounded};
 
 /// A value as the user wrote it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,8 +25,8 @@ pub struct TargetDrive {
     pub name: String,
     /// The node ID.
     pub node: u8,
-    /// The family.
-    pub family: Family,
+    /// The drive, by its family.
+    pub drive: DriveFamily,
     /// Rotary or linear.
     pub travel: Travel,
     /// Counts per turn of the reported position.
@@ -51,7 +51,7 @@ impl TargetDrive {
         Ok(Self {
             name: axis.name.clone(),
             node: axis.node,
-            family: axis.drive,
+            drive: axis.drive.clone(),
             travel: axis.travel,
             counts_per_turn: axis.counts_per_turn,
             scale: assemble::scale(axis)?,
@@ -64,17 +64,18 @@ impl TargetDrive {
     ///
     /// # Errors
     /// None in practice: the family's own units are valid.
-    pub fn unconfigured(node: u8, family: Family) -> Result<Self, ScaleError> {
-        let counts_per_turn = family.counts_per_turn();
+    pub fn unconfigured(node: u8, drive: DriveFamily) -> Result<Self, ScaleError> {
+        let counts_per_turn = drive.counts_per_turn;
+        let velocity_units_per_turn = drive.velocity_units_per_turn(counts_per_turn);
         Ok(Self {
             name: format!("node {node}"),
             node,
-            family,
+            drive,
             travel: Travel::Rotary,
             counts_per_turn,
             scale: Scale::new(ScaleParameters {
                 counts_per_turn,
-                velocity_units_per_turn: family.velocity_units_per_turn(counts_per_turn),
+                velocity_units_per_turn,
                 gear_ratio: 1.0,
                 travel_per_turn: TAU,
                 reversed: false,
@@ -84,6 +85,11 @@ impl TargetDrive {
             limits: None,
             patience_ns: PATIENCE_NS,
         })
+    }
+
+    /// What takt knows of its family.
+    pub fn family(&self) -> &'static dyn Family {
+        family::of(&self.drive)
     }
 
     /// The quantity of a position: an angle or a length.
@@ -250,10 +256,10 @@ mod tests {
 
     #[test]
     fn an_erob_counts_output_turns_and_a_yz_aim_motor_turns() {
-        let erob = TargetDrive::unconfigured(1, Family::ErobCanopen).unwrap();
+        let erob = TargetDrive::unconfigured(1, family::EROB_CANOPEN).unwrap();
         assert_eq!(erob.position_counts(CommandValue::Joint(TAU)), 524_288);
         assert_eq!(erob.velocity_raw(CommandValue::Joint(TAU)), 524_288);
-        let yz_aim = TargetDrive::unconfigured(1, Family::YzAim).unwrap();
+        let yz_aim = TargetDrive::unconfigured(1, family::YZ_AIM).unwrap();
         assert_eq!(yz_aim.position_counts(CommandValue::Joint(TAU)), 32_768);
         assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(TAU)), 60);
         assert_eq!(yz_aim.acceleration_raw(CommandValue::Joint(TAU)), 60);
@@ -262,14 +268,14 @@ mod tests {
 
     #[test]
     fn a_slow_velocity_is_not_rounded_to_standstill() {
-        let yz_aim = TargetDrive::unconfigured(1, Family::YzAim).unwrap();
+        let yz_aim = TargetDrive::unconfigured(1, family::YZ_AIM).unwrap();
         assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(-0.001)), -1);
         assert_eq!(yz_aim.velocity_raw(CommandValue::Joint(0.0)), 0);
     }
 
     #[test]
     fn a_velocity_that_a_drive_rounds_is_remarked_with_both_values() {
-        let yz_aim = TargetDrive::unconfigured(1, Family::YzAim).unwrap();
+        let yz_aim = TargetDrive::unconfigured(1, family::YZ_AIM).unwrap();
         let remark = yz_aim.rounding(CommandValue::Joint(20_f64.to_radians())).unwrap();
         assert!(
             remark.contains("(20 deg/s) becomes") && remark.contains("(18 deg/s), 3 in its unit"),
@@ -278,7 +284,7 @@ mod tests {
         assert_eq!(yz_aim.rounding(CommandValue::Joint(18_f64.to_radians())), None);
         assert_eq!(yz_aim.rounding(CommandValue::Joint(0.0)), None);
         assert_eq!(yz_aim.rounding(CommandValue::Drive(3)), None);
-        let erob = TargetDrive::unconfigured(1, Family::ErobCanopen).unwrap();
+        let erob = TargetDrive::unconfigured(1, family::EROB_CANOPEN).unwrap();
         assert_eq!(erob.rounding(CommandValue::Joint(20_f64.to_radians())), None);
     }
 }

@@ -1,7 +1,8 @@
 //! What holds where a file says nothing. `configs/reference.toml` shows every one of these values, and a test
 //! compares it with them.
 
-use super::model::{Axis, Compliance, Control, DriveFamily, Feedback, Identity, Limits, PdoMapping, Travel};
+use super::drive_family::DriveFacts;
+use super::model::{Axis, Compliance, Control, Feedback, Limits, PdoMapping, Travel};
 use super::ranges;
 
 /// `[cycle] period`
@@ -46,20 +47,6 @@ pub const SERVICE_FRAMES_PER_CYCLE: usize = 1;
 /// `[[bus]] sdo_while_enabled`
 pub const SDO_WHILE_ENABLED: bool = false;
 
-/// `[[axis]] counts_per_turn` of an eRob: 19 bits on the output side.
-pub const EROB_COUNTS_PER_TURN: f64 = 524_288.0;
-/// `[axis.identity]` of an eRob with CANopen firmware; the revision changes with the firmware and is not compared.
-pub const EROB_IDENTITY: Identity = Identity {
-    device_type: Some(0x0042_0192),
-    vendor: Some(0x5A65_726F),
-    product: Some(0x2648_3052),
-    revision: None,
-};
-/// `[[axis]] counts_per_turn` of a YZ-AIM: 15 bits on the motor side.
-pub const YZ_AIM_COUNTS_PER_TURN: f64 = 32_768.0;
-/// `[axis.identity]` of a YZ-AIM.
-pub const YZ_AIM_IDENTITY: Identity =
-    Identity { device_type: Some(0x0002_0192), vendor: Some(0x331), product: Some(1), revision: None };
 /// `[[axis]] answers_sync`
 pub const ANSWERS_SYNC: bool = true;
 /// `[[axis]] gear_ratio`
@@ -167,28 +154,9 @@ pub fn heartbeat_timeout_ns(heartbeat_ns: Option<u64>) -> u64 {
     })
 }
 
-/// `[axis.identity]`
-pub const fn identity(drive: DriveFamily) -> Identity {
-    match drive {
-        DriveFamily::ErobCanopen => EROB_IDENTITY,
-        DriveFamily::YzAim => YZ_AIM_IDENTITY,
-    }
-}
-
-/// `[[axis]] mode`
-pub const fn control(drive: DriveFamily) -> Control {
-    match drive {
-        DriveFamily::ErobCanopen => Control::Position,
-        DriveFamily::YzAim => Control::Interpolated,
-    }
-}
-
-/// `[[axis]] mapping`. The PDOs of a YZ-AIM cannot be mapped.
-pub const fn mapping(drive: DriveFamily) -> PdoMapping {
-    match drive {
-        DriveFamily::ErobCanopen => PdoMapping::Written,
-        DriveFamily::YzAim => PdoMapping::AsStored,
-    }
+/// `[[axis]] mapping`
+pub const fn mapping(drive: &DriveFacts) -> PdoMapping {
+    if drive.has_fixed_process_data { PdoMapping::AsStored } else { PdoMapping::Written }
 }
 
 /// `[[axis]] feedback`. A drive whose PDOs are written reports its mode of operation (object 6061). Nothing else shows that another

@@ -1,7 +1,8 @@
 //! A configuration that is made in code, with the same defaults as one that is read from a file.
 //!
 //! ```
-//! use takt::config::{Axis, Bus, Config, DriveFamily, Interface, Limits};
+//! use takt::config::{Axis, Bus, Config, Interface, Limits};
+//! use takt::family;
 //!
 //! let limits = Limits {
 //!     position_min: -2.9,
@@ -12,7 +13,7 @@
 //!     jerk: 100.0,
 //!     torque: 87.0,
 //! };
-//! let joint = |name: &str, node| Axis::new(name, 0, node, DriveFamily::ErobCanopen, limits);
+//! let joint = |name: &str, node| Axis::new(name, 0, node, family::EROB_CANOPEN, limits);
 //! let shoulder = Axis { reversed: true, ..joint("shoulder", 1) };
 //! let config = Config::new("arm", vec![Bus::new("can", Interface::Simulated)], vec![shoulder, joint("elbow", 2)]);
 //! config.validate()?;
@@ -26,9 +27,10 @@ use std::path::PathBuf;
 use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::defaults;
+use super::drive_family::DriveFamily;
 use super::model::{
-    Axis, Bus, Config, Control, Cycle, DriveFamily, FollowingError, Interface, Joint, Limits, Master,
-    MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
+    Axis, Bus, Config, Control, Cycle, FollowingError, Interface, Joint, Limits, Master, MissedSlots,
+    PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
 };
 
 impl Config {
@@ -127,7 +129,8 @@ impl Bus {
 impl Axis {
     /// A rotary axis in the usual mode of its family: an index into the buses, a node ID from 1 to 127, and limits in rad.
     pub fn new(name: impl Into<String>, bus: usize, node: u8, drive: DriveFamily, limits: Limits) -> Self {
-        let (travel, control, mapping) = (Travel::Rotary, defaults::control(drive), defaults::mapping(drive));
+        let (travel, control, mapping) = (Travel::Rotary, drive.usual_mode, defaults::mapping(&drive));
+        let (counts_per_turn, identity) = (drive.counts_per_turn, drive.identity);
         Self {
             name: name.into(),
             bus,
@@ -136,7 +139,7 @@ impl Axis {
             control,
             other_modes: vec![],
             travel,
-            counts_per_turn: drive.counts_per_turn(),
+            counts_per_turn,
             gear_ratio: defaults::GEAR_RATIO,
             reversed: false,
             zero_counts: 0,
@@ -157,7 +160,7 @@ impl Axis {
             answers_sync: defaults::ANSWERS_SYNC,
             feedback_delay_ns: defaults::FEEDBACK_DELAY_NS,
             heartbeat_ns: None,
-            identity: defaults::identity(drive),
+            identity,
             dcf: None,
             power_up_ns: defaults::POWER_UP_NS,
             joint: Joint::default(),

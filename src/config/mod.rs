@@ -6,51 +6,48 @@
 
 pub(crate) mod bounds;
 pub(crate) mod defaults;
+mod drive_family;
 mod error;
 mod in_code;
 mod interface;
 mod model;
 mod problem_kind;
-mod quantities;
-mod quantity;
+pub(crate) mod quantities;
+pub(crate) mod quantity;
 mod ranges;
 pub(crate) mod read;
 mod rules;
 mod source_view;
 mod spelling;
 pub(crate) mod spot;
-mod warning;
 
 use std::fmt;
 use std::path::Path;
 
+pub use drive_family::{
+    ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, ModeChangeRule, ModeSet, Plausible, VelocityUnit,
+};
 pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
-pub use warning::{Warning, WarningKind, is_rounded};
+pub(crate) use read::{Knowledge, parse};
 
 use thiserror::Error;
 
 use crate::printable::printable_path;
 
+/// Reads a file and checks it, as [`read::parse`] does its text.
+pub(crate) fn load(path: &Path, knowledge: &Knowledge<'_>) -> Result<Config, ConfigError> {
+    let name = printable_path(path);
+    match crate::text_file::read(path) {
+        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, knowledge),
+        Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
+    }
+}
+
 impl Config {
-    /// Reads a file and checks it. Whether the buses can carry what it asks for is a question for
-    /// [`crate::bus::schedule::verify`].
-    pub fn load(path: &Path) -> Result<Self, ConfigError> {
-        let name = printable_path(path);
-        match crate::text_file::read(path) {
-            Ok(bytes) => Self::parse(&name, &ConfigError::text_of(&name, bytes)?),
-            Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
-        }
-    }
-
-    /// Reads and checks the text of a configuration. `source_name` is what messages call it.
-    pub fn parse(source_name: &str, text: &str) -> Result<Self, ConfigError> {
-        read::parse(source_name, text)
-    }
-
     /// Connects a bus to another interface than the file says, as `--bus NAME=INTERFACE` does.
     pub fn override_interface(&mut self, name: &str, interface: &str) -> Result<(), OverrideError> {
         let interface: Interface = interface.parse()?;

@@ -11,11 +11,9 @@ pub use takt_rt::AxisLimits as Limits;
 /// How an axis is commanded. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
 pub use takt_rt::ControlLaw as Control;
-use takt_rt::{Dialect, ModeCondition};
-
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
-use super::defaults;
+use super::drive_family::DriveFamily;
 use crate::canopen::dcf::DeviceConfiguration;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
@@ -55,7 +53,7 @@ pub struct Cycle {
     /// Period of SYNC and set-points; 250 µs to 100 ms in whole microseconds. Default 1 ms.
     pub period_ns: u64,
     /// When the command phase begins, after the start of the slot; 5 % to 95 % of the period. Default 55 %. A file
-    /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); this is what that finds.
+    /// may leave it to [`automatic_command_phase`](crate::schedule::automatic_command_phase); this is what that finds.
     pub command_phase_ns: u64,
 }
 
@@ -197,7 +195,7 @@ pub struct Axis {
     pub other_modes: Vec<Control>,
     /// Rotary (the default) or linear.
     pub travel: Travel,
-    /// Counts of one turn of the position that the drive reports. Default: the family's (eRob: 524288, YZ-AIM: 32768).
+    /// Counts of one turn of the position that the drive reports. Default: the family's.
     pub counts_per_turn: f64,
     /// Turns of the reported position for one turn of the joint. Default 1.
     pub gear_ratio: f64,
@@ -224,13 +222,15 @@ pub struct Axis {
     pub missed_feedback_cycles: u16,
     /// Transmission type of the PDOs (1 = every SYNC). Default 1.
     pub transmission_type: u8,
-    /// Whose mapping of the PDOs counts. Default: the controller's; of a YZ-AIM, which cannot be mapped, the drive's.
+    /// Whose mapping of the PDOs counts. Default: the controller's, or the drive's where the family cannot be
+    /// mapped.
     pub mapping: PdoMapping,
     /// What the drive reports every cycle beside statusword and position. Default: the mode of operation, where the PDOs are
     /// written.
     pub feedback: Vec<Feedback>,
-    /// Whether a YZ-AIM answers SYNC with its position (TPDO2), the default, or set-points alone (TPDO4), which spares
-    /// the bus a frame and makes the feedback a cycle older. Other drives always answer SYNC.
+    /// Whether the drive answers SYNC with its position, the default, or set-points alone, which spares the bus a frame and makes
+    /// the feedback a cycle older. Only drives with [`may_ignore_sync`](super::DriveFacts::may_ignore_sync) can do that; the
+    /// others always answer SYNC.
     pub answers_sync: bool,
     /// The longest time from SYNC until the drive has its feedback ready to be sent. Default 20 µs.
     pub feedback_delay_ns: u64,
@@ -250,15 +250,6 @@ pub struct Axis {
     pub simulated: SimulatedJoint,
 }
 
-/// A family of drives.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DriveFamily {
-    /// ZeroErr eRob, CANopen firmware.
-    ErobCanopen,
-    /// YZ-AIM integrated servo, CANopen edition.
-    YzAim,
-}
-
 impl Axis {
     /// How it may be commanded: in the mode that it starts in, and in those that it may be changed to.
     pub fn controls(&self) -> impl Iterator<Item = &Control> {
@@ -272,55 +263,6 @@ impl Travel {
         match self {
             Self::Rotary => TAU,
             Self::Linear { lead_m } => lead_m,
-        }
-    }
-}
-
-impl DriveFamily {
-    /// Every family.
-    pub const ALL: [Self; 2] = [Self::ErobCanopen, Self::YzAim];
-
-    /// The word for it in a configuration.
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::ErobCanopen => "erob-canopen",
-            Self::YzAim => "yz-aim",
-        }
-    }
-
-    /// When its drives take another mode at run time; `None` if they cannot be changed by process data.
-    ///
-    /// An eRob must be disabled before every change (eRunner manual, chapter 5). A YZ-AIM has no object 6061 that would show the change,
-    /// and no cyclic synchronous mode: it interpolates only where 2619h = 7 is stored (manual, 5.10.3).
-    pub const fn mode_condition(self) -> Option<ModeCondition> {
-        match self {
-            Self::ErobCanopen => Some(ModeCondition::Disabled),
-            Self::YzAim => None,
-        }
-    }
-
-    /// How its drives speak through controlword and statusword.
-    pub const fn dialect(self) -> Dialect {
-        match self {
-            Self::ErobCanopen => Dialect::Cia402,
-            Self::YzAim => Dialect::YzAim,
-        }
-    }
-
-    /// Counts of one turn of the position that its drives report.
-    pub const fn counts_per_turn(self) -> f64 {
-        match self {
-            Self::ErobCanopen => defaults::EROB_COUNTS_PER_TURN,
-            Self::YzAim => defaults::YZ_AIM_COUNTS_PER_TURN,
-        }
-    }
-
-    /// What its drives call a speed of one turn of their position in a second.
-    pub const fn velocity_units_per_turn(self, counts_per_turn: f64) -> f64 {
-        match self {
-            Self::ErobCanopen => counts_per_turn,
-            // r/min
-            Self::YzAim => 60.0,
         }
     }
 }
@@ -501,13 +443,13 @@ pub struct Joint {
     pub rated_torque: Option<f64>,
 }
 
-/// The NMT state of a simulated YZ-AIM after power-up. The manual does not say which one real units have.
+/// The NMT state of a simulated drive after power-up. Not every manual says which one real units have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PowerUpState {
     /// Pre-operational, as CiA 301 has it.
     #[default]
     PreOperational,
-    /// Operational, as programs for these drives seem to expect.
+    /// Operational, as published programs for some drives seem to expect.
     Operational,
 }
 
@@ -520,6 +462,6 @@ pub struct SimulatedJoint {
     pub peak_torque: f64,
     /// Position at power-up: rad (m). Default 0, or the limit nearest to it.
     pub initial_position: f64,
-    /// The NMT state after power-up; only a YZ-AIM can be operational. Default: pre-operational.
+    /// The NMT state after power-up; operational only where the family allows it. Default: pre-operational.
     pub power_up: PowerUpState,
 }

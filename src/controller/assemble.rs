@@ -4,15 +4,15 @@ use std::fmt;
 
 use arrayvec::ArrayVec;
 use takt_rt::{
-    AxisLimits, AxisParameters, BusParameters, CommandPdo, Engine, EngineParameters, FeedbackSince, Follow,
-    GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS, Mapping, MappingError,
-    ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters, SetUpError, SlotPlan,
-    TimingLadder, TorqueLimits,
+    AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
+    FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
+    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters,
+    SetUpError, SlotPlan, TimingLadder, TorqueLimits,
 };
 
-use crate::config::{Axis, Compliance, Config, ConfigError, DriveFamily, Interface};
-use crate::controller::channels::{GroupAxes, GroupStream};
-use crate::drive::{PdoPlan, ProcessData, yz_aim};
+use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
+use crate::config::{Axis, Compliance, Config, ConfigError, Interface};
+use crate::drive::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
@@ -82,7 +82,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         .map(|(index, axis)| axis_parameters(index, axis, config, &cycles))
         .collect::<Result<_, _>>()?;
     let buses = config.buses.iter().map(|bus| BusParameters {
-        sync_id: Id::canopen(0x080, 0),
+        canopen: Some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
         divider: bus.divider,
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
@@ -138,29 +138,22 @@ fn axis_parameters(
         Ok(CommandPdo { pdo, transmission: plan.transmission })
     };
     let feedback = |plan: &PdoPlan| Ok(Pdo { id: plan.id, mapping: Mapping::feedback(&plan.objects)? });
-    let spacing_ns = match axis.drive {
-        DriveFamily::ErobCanopen => 0,
-        DriveFamily::YzAim => yz_aim::CONTROLWORD_SPACING_NS,
-    };
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,
         commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
-        feedback_since: match axis.drive {
-            DriveFamily::YzAim if yz_aim::answers_set_points(axis) => FeedbackSince::SetPoint,
-            _ => feedback_since(&data.feedback),
-        },
+        feedback_since: feedback_since(&data.feedback),
         unused: data.unused.iter().map(|plan| plan.id).collect(),
-        dialect: axis.drive.dialect(),
+        codec: axis.drive.codec,
         controlword_spacing_cycles: u32::try_from(
-            spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
+            axis.drive.controlword_spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
         )
         .unwrap_or(u32::MAX),
         law: axis.control,
         mode_changes: ModeChanges {
             laws: axis.other_modes.iter().take(ModeChanges::MOST).copied().collect(),
-            condition: axis.drive.mode_condition().unwrap_or_default(),
+            condition: axis.drive.mode_changes.condition().unwrap_or_default(),
             timeout_cycles: cycles(MODE_TIMEOUT_NS),
         },
         scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
@@ -191,7 +184,9 @@ const LAST_SYNCHRONOUS: u8 = 240;
 
 /// Since when the feedback of a drive is expected.
 fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
-    if feedback.iter().all(|pdo| pdo.transmission_type <= LAST_SYNCHRONOUS) {
+    if feedback.iter().all(|pdo| pdo.reply == Reply::ToCommandsOnly) {
+        FeedbackSince::SetPoint
+    } else if feedback.iter().all(|pdo| pdo.transmission_type <= LAST_SYNCHRONOUS) {
         FeedbackSince::Sync
     } else {
         FeedbackSince::CommandPhase
@@ -235,5 +230,22 @@ pub fn look_ahead(config: &Config, axes: &[usize]) -> LookAheadParameters {
         limits: limits.take(MAX_AXES).collect(),
         period_ns: config.cycle.period_ns,
         delay: config.stream_delay,
+    }
+}
+
+impl ChannelSizes {
+    /// Sizes for a configuration. The record ring is configured. The others hold a burst of SDO traffic of every node, and
+    /// the events of a second in which the logger is late.
+    pub fn of(config: &Config) -> Self {
+        Self {
+            groups: streams(config),
+            axes: config.axes.len(),
+            buses: config.buses.len(),
+            records: config.telemetry.ring_records,
+            events: 1024,
+            requests: 16,
+            service_out: 256,
+            service_in: 1024,
+        }
     }
 }

@@ -92,7 +92,8 @@ pub fn check_point(axis: &Axis, control: &Control, point: &AxisPoint) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{DriveFamily, FeedForward, Limits};
+    use crate::config::{FeedForward, Limits};
+    use crate::family;
 
     fn axis(control: Control) -> Axis {
         let limits = Limits {
@@ -104,7 +105,7 @@ mod tests {
             jerk: 50.0,
             torque: 20.0,
         };
-        Axis::new("joint", 0, 1, DriveFamily::ErobCanopen, limits).with_control(control)
+        Axis::new("joint", 0, 1, family::EROB_CANOPEN, limits).with_control(control)
     }
 
     const CST: Control = Control::Torque {

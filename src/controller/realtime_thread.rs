@@ -6,8 +6,8 @@ use std::thread::{Builder, JoinHandle};
 use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, HostInterface, SlotPlan};
 
-use super::sleep_alignment;
 use crate::config::Realtime;
+use crate::sleep_alignment;
 
 /// Stack that the thread touches before its first cycle. The cycle uses a small part of it.
 const STACK_BYTES: usize = 256 * 1024;

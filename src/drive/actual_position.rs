@@ -5,12 +5,12 @@ use super::check::Check;
 use crate::canopen::objects::{POSITION_ACTUAL_VALUE, TARGET_POSITION};
 
 /// Reads the actual position.
-pub(crate) async fn read(c: &AxisSession<'_>) -> StepResult {
+pub async fn read(c: &AxisSession<'_>) -> StepResult {
     c.read(POSITION_ACTUAL_VALUE, Check::Any, |facts, value| facts.position_counts = value as i32).await
 }
 
 /// Sets the target position to the actual one. Enabling with an old target would make the axis jump.
-pub(crate) async fn make_target(c: &AxisSession<'_>) -> StepResult {
+pub async fn make_target(c: &AxisSession<'_>) -> StepResult {
     read(c).await?;
     let position = c.facts().position_counts.into();
     c.write_and_read_back(TARGET_POSITION, position).await

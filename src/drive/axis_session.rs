@@ -21,7 +21,7 @@ use crate::config::{Axis, Config};
 use crate::procedure::{Access, CanopenSession, POLL_NS};
 
 /// The result of a step of bring-up or shutdown.
-pub(crate) type StepResult<T = ()> = Result<T, FailureCause>;
+pub type StepResult<T = ()> = Result<T, FailureCause>;
 
 /// What happens when an access fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,9 +40,12 @@ pub(super) struct StepFailure {
 }
 
 /// A session with the drive of one axis.
-pub(crate) struct AxisSession<'a> {
+pub struct AxisSession<'a> {
+    /// The whole configuration.
     pub config: &'a Config,
+    /// The axis.
     pub axis: &'a Axis,
+    /// The timeouts.
     pub timing: BringUpTiming,
     pub(super) bus: CanopenSession,
     on_failure: OnFailure,

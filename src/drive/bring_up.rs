@@ -10,7 +10,6 @@
 //! If the configuration gives the master a heartbeat, the drives monitor it from the end of [`Stage::Configure`] on.
 //! The caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
 
-use std::pin::pin;
 use std::rc::Rc;
 use std::task::{Context, Waker};
 
@@ -19,11 +18,11 @@ use takt_rt::{Frame, Nanoseconds};
 use super::axis_session::{AxisSession, OnFailure, StepFailure, StepResult};
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError, FailureCause};
-use super::family::{self, Part};
 use super::network_state::RESTART_STEP;
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config};
+use crate::family::{self, SettingUp};
 use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, SdoQuirks};
 
 /// Number of restarts of a drive after which its configuration gives up.
@@ -235,7 +234,7 @@ impl Group {
     fn begin(&mut self, part: Part, config: &Rc<Config>, timing: BringUpTiming, facts: &[AxisFacts]) {
         let mut facts = facts.iter().cloned();
         let begun = self.members.iter_mut().zip(&config.axes).map(|(member, axis)| {
-            let unknown = || AxisFacts { dialect: axis.drive.dialect(), ..AxisFacts::default() };
+            let unknown = || AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
             let facts = facts.next().unwrap_or_else(unknown);
             member.accesses = rehearse(part, config, axis).accesses;
             member.session.begin_again();
@@ -304,7 +303,25 @@ impl Member {
     }
 }
 
+/// A part of a drive's life that has a procedure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Configure,
+    Start,
+    ShutDown,
+}
+
 impl Part {
+    /// The procedure of the drive's family.
+    fn of_family<'a>(self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        let family = family::of(&c.axis.drive);
+        match self {
+            Self::Configure => family.configure(c),
+            Self::Start => family.start(c),
+            Self::ShutDown => family.shut_down(c),
+        }
+    }
+
     const fn on_failure(self) -> OnFailure {
         match self {
             Self::Configure | Self::Start => OnFailure::End,
@@ -314,15 +331,15 @@ impl Part {
 }
 
 fn session(axis: &Axis, timing: BringUpTiming) -> CanopenSession {
-    let quirks = SdoQuirks { timing: timing.sdo, ..axis.drive.sdo_quirks() };
+    let quirks = SdoQuirks { timing: timing.sdo, ..family::of(&axis.drive).sdo_quirks() };
     CanopenSession::new(CanopenClient::new(axis.node, quirks))
 }
 
 /// Carries out a part, and watches for restarts of the drive: its configuration is then done again, and another part
 /// fails.
-async fn carry_out(part: Part, c: &AxisSession<'_>) -> StepResult {
+async fn carry_out<'a>(part: Part, c: &'a AxisSession<'a>) -> StepResult {
     loop {
-        let work = family::carry_out(part, c);
+        let work = part.of_family(c);
         if let Some(result) = c.bus.give_up_when(|| c.has_restarted(), work).await {
             return result;
         }
@@ -345,9 +362,9 @@ struct Rehearsal {
 fn rehearse(part: Part, config: &Config, axis: &Axis) -> Rehearsal {
     let timing = BringUpTiming::default();
     let session = session(axis, timing);
-    let facts = AxisFacts { dialect: axis.drive.dialect(), ..AxisFacts::default() };
+    let facts = AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
     let c = AxisSession::new(session.clone(), config, axis, timing, part.on_failure(), facts).rehearsal();
     // Nothing is waited for without a drive, so one poll is enough.
-    let _ = pin!(family::carry_out(part, &c)).poll(&mut Context::from_waker(Waker::noop()));
+    let _ = part.of_family(&c).as_mut().poll(&mut Context::from_waker(Waker::noop()));
     Rehearsal { accesses: session.done(), writes: c.rehearsed() }
 }

@@ -1,6 +1,6 @@
 //! What a bring-up reads from a drive.
 
-use takt_rt::{Dialect, DriveState};
+use takt_rt::{Cia402Codec, DriveState};
 
 use super::process_data::ProcessData;
 use crate::canopen::emcy::{Emergency, ErrorCode};
@@ -10,7 +10,7 @@ use crate::canopen::object::ObjectAddress;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AxisFacts {
     /// The codec of its statusword.
-    pub dialect: Dialect,
+    pub codec: Cia402Codec,
     /// Its identity.
     pub identity: DeviceIdentity,
     /// Its names and versions, where it has them.
@@ -69,7 +69,7 @@ pub struct DeviceTexts {
 impl AxisFacts {
     /// The state in the last statusword.
     pub const fn state(&self) -> DriveState {
-        self.dialect.state(self.statusword)
+        self.codec.state(self.statusword)
     }
 
     /// The error code of a drive in a fault: object 603F; when it is zero, the code of the last emergency message.

@@ -6,14 +6,14 @@ use super::axis_units::rounded_up;
 use crate::canopen::objects::{CONSUMER_HEARTBEAT_TIME, PRODUCER_HEARTBEAT_TIME};
 
 /// Sets the period of the drive's own heartbeat; 0 if none is configured.
-pub(crate) async fn produce(c: &AxisSession<'_>) -> StepResult {
+pub async fn produce(c: &AxisSession<'_>) -> StepResult {
     c.step("heartbeat", "choose heartbeat times that this drive accepts");
     let period_ms = c.axis.heartbeat_ns.map_or(0, |period_ns| rounded_up(period_ns, 1_000_000));
     c.write_and_read_back(PRODUCER_HEARTBEAT_TIME, period_ms).await
 }
 
 /// Lets the drive watch the master's heartbeat, if it has one: 1016:1 has the master's node ID and the timeout.
-pub(crate) async fn watch_master(c: &AxisSession<'_>) -> StepResult {
+pub async fn watch_master(c: &AxisSession<'_>) -> StepResult {
     let master = &c.config.master;
     let watched = master.heartbeat_ns.map_or(0, |_| {
         let timeout_ms = rounded_up(master.heartbeat_timeout_ns, 1_000_000).min(u16::MAX.into());
@@ -23,7 +23,7 @@ pub(crate) async fn watch_master(c: &AxisSession<'_>) -> StepResult {
 }
 
 /// Lets the drive watch the master no longer.
-pub(crate) async fn end_watch(c: &AxisSession<'_>, advice: &'static str) -> StepResult {
+pub async fn end_watch(c: &AxisSession<'_>, advice: &'static str) -> StepResult {
     c.step("end of heartbeats", advice);
     c.write_and_read_back(CONSUMER_HEARTBEAT_TIME, 0).await
 }

@@ -7,7 +7,7 @@ use crate::canopen::objects::*;
 const PROFILE_CIA402: u16 = 402;
 
 /// Compares the drive's identity with the configuration.
-pub(crate) async fn compare(c: &AxisSession<'_>) -> StepResult {
+pub async fn compare(c: &AxisSession<'_>) -> StepResult {
     c.step(
         "identity",
         "another drive than configured answers under this node ID: check the wiring and the node IDs, or correct \
@@ -27,7 +27,7 @@ pub(crate) async fn compare(c: &AxisSession<'_>) -> StepResult {
 }
 
 /// Reads the names and versions that the drive has.
-pub(crate) async fn read_texts(c: &AxisSession<'_>) -> StepResult {
+pub async fn read_texts(c: &AxisSession<'_>) -> StepResult {
     c.read_text(DEVICE_NAME, |facts, text| facts.texts.device_name = Some(text)).await?;
     c.read_text(HARDWARE_VERSION, |facts, text| facts.texts.hardware_version = Some(text)).await?;
     c.read_text(SOFTWARE_VERSION, |facts, text| facts.texts.software_version = Some(text)).await?;

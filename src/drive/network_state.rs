@@ -5,15 +5,15 @@ use takt_rt::Nanoseconds;
 use super::axis_session::{AxisSession, StepResult};
 use super::bring_up::BringUpTiming;
 use super::failure::{FailureCause, ProbeResult};
-use super::identifiers::other_protocol;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::sdo::{SdoError, Transfer};
 use crate::config::Axis;
+use crate::family;
 use crate::procedure::Access;
 
 /// The first step of every bring-up.
-pub(crate) const RESTART_STEP: &str = "restart of its communication";
+pub const RESTART_STEP: &str = "restart of its communication";
 /// A state is not waited for when the drive reports it less often than this: Ctrl-C would take as long.
 const LONGEST_AWAITED_HEARTBEAT_NS: Nanoseconds = 1_000_000_000;
 
@@ -123,7 +123,7 @@ impl AxisSession<'_> {
     /// Probes the node by SDO and by the vendor's own protocol, because it has not reported the awaited state. It may
     /// still report it meanwhile.
     async fn probe(&self, awaited: NmtState, waited_ns: Nanoseconds) -> StepResult {
-        let other = other_protocol(self.axis.drive, self.axis.node);
+        let other = family::of(&self.axis.drive).other_protocol(self.axis.node);
         if let Some(other) = other {
             self.bus.send(other.request);
         }

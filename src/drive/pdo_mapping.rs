@@ -8,12 +8,7 @@ use crate::canopen::objects::{PDO_IDENTITY, PDO_INVALID, PdoDirection, PdoParame
 use crate::canopen::pdo_reader::PdoReader;
 
 /// Writes the mapping of the planned PDOs of one direction, and switches the others off, up to PDO `count`.
-pub(crate) async fn write(
-    c: &AxisSession<'_>,
-    direction: PdoDirection,
-    plans: &[PdoPlan],
-    count: u8,
-) -> StepResult {
+pub async fn write(c: &AxisSession<'_>, direction: PdoDirection, plans: &[PdoPlan], count: u8) -> StepResult {
     let name = match direction {
         PdoDirection::Receive => "RPDO mapping",
         PdoDirection::Transmit => "TPDO mapping",
@@ -59,7 +54,7 @@ fn unused_id(direction: PdoDirection, number: u8, node: u8) -> u32 {
 }
 
 /// Reads the drive's PDO configuration, and takes the process data from it.
-pub(crate) async fn take_reported(c: &AxisSession<'_>) -> StepResult {
+pub async fn take_reported(c: &AxisSession<'_>) -> StepResult {
     c.step("PDO mapping", "the drive's own mapping does not suit this axis");
     let taken = if c.is_rehearsal() { Ok(()) } else { read_reported(c).await };
     c.settled(taken)

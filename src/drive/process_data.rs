@@ -4,19 +4,13 @@ use takt_rt::{
     AxisProcessData, CommandSlot, Id, MAX_PDOS, MappedObject, MappedPdo, Request, TransmissionType,
 };
 
-use super::yz_aim;
+use super::mapped_objects::{
+    CONTROLWORD, CURRENT, ERROR_CODE, OPERATION_MODE, OPERATION_MODE_DISPLAY, POSITION, STATUSWORD,
+    TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY, TORQUE, TORQUE_OFFSET, VELOCITY, VELOCITY_OFFSET,
+};
 use crate::canopen::objects::PdoDirection;
-use crate::config::{Axis, Control, DriveFamily, Feedback, PdoMapping};
-
-const CONTROLWORD: MappedObject = MappedObject::new(0x6040, 0, 16);
-const TARGET_POSITION: MappedObject = MappedObject::new(0x607A, 0, 32);
-const TARGET_VELOCITY: MappedObject = MappedObject::new(0x60FF, 0, 32);
-const TARGET_TORQUE: MappedObject = MappedObject::new(0x6071, 0, 16);
-const VELOCITY_OFFSET: MappedObject = MappedObject::new(0x60B1, 0, 32);
-const TORQUE_OFFSET: MappedObject = MappedObject::new(0x60B2, 0, 16);
-const OPERATION_MODE: MappedObject = MappedObject::new(0x6060, 0, 8);
-const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
-const POSITION: MappedObject = MappedObject::new(0x6064, 0, 32);
+use crate::config::{Axis, Control, Feedback};
+use crate::family;
 
 const PDO_BITS: u32 = 64;
 /// A placeholder for one byte of a PDO with unknown content.
@@ -35,9 +29,35 @@ pub struct PdoPlan {
     pub objects: Vec<MappedObject>,
     /// Condition the controller sends it, for an RPDO.
     pub transmission: TransmissionType,
+    /// Whether it is sent in reply to a command, for a TPDO.
+    pub reply: Reply,
+}
+
+/// Whether a drive sends a TPDO in reply to a command of the controller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Reply {
+    /// It does not: the transmission type alone says when.
+    #[default]
+    No,
+    /// It does, and on other events as well.
+    ToCommands,
+    /// It does, and at no other time.
+    ToCommandsOnly,
 }
 
 impl PdoPlan {
+    /// PDO 1 to 4 of a node, with its identifier of the pre-defined connection set and transmission type 0.
+    pub fn new(
+        direction: PdoDirection,
+        number: u8,
+        node: u8,
+        objects: Vec<MappedObject>,
+        transmission: TransmissionType,
+    ) -> Self {
+        let id = pdo_id(direction, number, node);
+        Self { number, id, transmission_type: 0, objects, transmission, reply: Reply::No }
+    }
+
     /// The payload in bytes.
     pub fn length(&self) -> usize {
         self.objects.iter().map(|object| usize::from(object.bits)).sum::<usize>() / 8
@@ -57,19 +77,13 @@ pub struct ProcessData {
 
 impl ProcessData {
     /// The process data of an axis. If the drive's own mapping is used, it is known only after the drive has reported
-    /// it ([`ProcessData::as_reported`]). Until then this has the same number of PDOs as a written mapping, each of
-    /// full length.
+    /// it ([`ProcessData::as_reported`]).
     pub fn of(axis: &Axis) -> Self {
-        match axis.drive {
-            DriveFamily::ErobCanopen if axis.mapping == PdoMapping::AsStored => {
-                Self::mapped_freely(axis).padded()
-            }
-            DriveFamily::ErobCanopen => Self::mapped_freely(axis),
-            DriveFamily::YzAim => Self::of_yz_aim(axis),
-        }
+        family::of(&axis.drive).process_data(axis)
     }
 
-    fn padded(mut self) -> Self {
+    /// The same PDOs at full length.
+    pub(crate) fn padded(mut self) -> Self {
         for pdo in self.commands.iter_mut().chain(&mut self.feedback) {
             let free_bytes = (PDO_BITS as usize / 8).saturating_sub(pdo.length());
             pdo.objects.extend(std::iter::repeat_n(ANY_BYTE, free_bytes));
@@ -114,53 +128,22 @@ impl ProcessData {
 
     /// Maps a drive with free mapping: command and feedback in as many PDOs as they need, controlword and target, statusword and
     /// position first.
-    fn mapped_freely(axis: &Axis) -> Self {
+    pub(crate) fn mapped_freely(axis: &Axis) -> Self {
         let (commands, feedback) = (packed(Self::needed_commands(axis)), packed(Self::needed_feedback(axis)));
         let transmission_type = axis.transmission_type;
         let receive = |number, objects| PdoPlan {
             transmission_type,
-            ..pdo(PdoDirection::Receive, number, axis.node, objects, TransmissionType::EveryCycle)
+            ..PdoPlan::new(PdoDirection::Receive, number, axis.node, objects, TransmissionType::EveryCycle)
         };
         let transmit = |(number, objects)| PdoPlan {
             transmission_type,
-            ..pdo(PdoDirection::Transmit, number, axis.node, objects, TransmissionType::EveryCycle)
+            ..PdoPlan::new(PdoDirection::Transmit, number, axis.node, objects, TransmissionType::EveryCycle)
         };
         Self {
             commands: (1..).zip(commands).map(|(number, objects)| receive(number, objects)).collect(),
             feedback: (1..).zip(feedback).map(transmit).collect(),
             unused: vec![],
         }
-    }
-
-    /// The fixed PDOs of a YZ-AIM (manual, 5.08): it answers RPDO n with TPDO n at once, and SYNC with TPDO 2.
-    fn of_yz_aim(axis: &Axis) -> Self {
-        let receive = |number, objects, transmission| PdoPlan {
-            transmission_type: if number == 4 { 1 } else { 255 },
-            ..pdo(PdoDirection::Receive, number, axis.node, objects, transmission)
-        };
-        let transmit = |number: u8| {
-            let objects = vec![POSITION, if number == 3 { mapped(Feedback::Velocity) } else { STATUSWORD }];
-            let answers_sync = number == 2 && yz_aim::answers_sync(axis);
-            PdoPlan {
-                transmission_type: if answers_sync { 1 } else { 255 },
-                ..pdo(PdoDirection::Transmit, number, axis.node, objects, TransmissionType::EveryCycle)
-            }
-        };
-        let position = vec![CONTROLWORD, OPERATION_MODE, TARGET_POSITION];
-        let (commands, answer) = match axis.control {
-            Control::ProfileVelocity => {
-                let velocity = vec![CONTROLWORD, OPERATION_MODE, TARGET_VELOCITY];
-                (vec![receive(3, velocity, TransmissionType::EveryCycle)], 3)
-            }
-            Control::ProfilePosition => (vec![receive(1, position, TransmissionType::EveryCycle)], 1),
-            _ => {
-                let interpolated = receive(4, vec![TARGET_POSITION], TransmissionType::EveryCycle);
-                (vec![receive(1, position, TransmissionType::OnControlword), interpolated], 4)
-            }
-        };
-        let feedback = if yz_aim::answers_sync(axis) { 2 } else { answer };
-        let unused = (1..=4).filter(|number| *number != feedback).map(transmit).collect();
-        Self { commands, feedback: vec![transmit(feedback)], unused }
     }
 
     /// The request that makes the cycle exchange this process data with the drive of an axis.
@@ -209,17 +192,6 @@ fn packed(objects: Vec<MappedObject>) -> Vec<Vec<MappedObject>> {
     pdos
 }
 
-fn pdo(
-    direction: PdoDirection,
-    number: u8,
-    node: u8,
-    objects: Vec<MappedObject>,
-    transmission: TransmissionType,
-) -> PdoPlan {
-    let id = pdo_id(direction, number, node);
-    PdoPlan { number, id, transmission_type: 0, objects, transmission }
-}
-
 /// The identifier of PDO 1 to 4 in the pre-defined connection set.
 pub(super) fn pdo_id(direction: PdoDirection, number: u8, node: u8) -> Id {
     let first = match direction {
@@ -231,10 +203,10 @@ pub(super) fn pdo_id(direction: PdoDirection, number: u8, node: u8) -> Id {
 
 fn mapped(feedback: Feedback) -> MappedObject {
     match feedback {
-        Feedback::OperationMode => MappedObject::new(0x6061, 0, 8),
-        Feedback::Velocity => MappedObject::new(0x606C, 0, 32),
-        Feedback::Torque => MappedObject::new(0x6077, 0, 16),
-        Feedback::Current => MappedObject::new(0x6078, 0, 16),
-        Feedback::ErrorCode => MappedObject::new(0x603F, 0, 16),
+        Feedback::OperationMode => OPERATION_MODE_DISPLAY,
+        Feedback::Velocity => VELOCITY,
+        Feedback::Torque => TORQUE,
+        Feedback::Current => CURRENT,
+        Feedback::ErrorCode => ERROR_CODE,
     }
 }

@@ -3,11 +3,12 @@
 
 use takt_rt::{CommandSlot, Id, MappedObject, TransmissionType};
 
-use super::process_data::{PdoPlan, ProcessData, pdo_id};
+use super::process_data::{PdoPlan, ProcessData, Reply, pdo_id};
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::objects::PdoDirection;
 use crate::canopen::pdo_configuration::PdoConfiguration;
-use crate::config::{Axis, DriveFamily};
+use crate::config::Axis;
+use crate::family::{self, MappingMatch};
 
 /// Why the PDOs that the drive reports do not suit the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -154,15 +155,15 @@ fn named(object: MappedObject) -> String {
 
 impl ProcessData {
     /// The process data of an axis by the drive's report. With free mapping, any PDOs with the needed objects will do.
-    /// Each PDO of a YZ-AIM has a fixed purpose; a PDO that it does not report is as in the manual.
+    /// Where each PDO has its purpose by its number, one that the drive does not report is as in the manual.
     ///
     /// # Errors
     /// The first reason for which the axis cannot work with it, or the bus load is not covered by the check.
     pub fn as_reported(axis: &Axis, reported: &[PdoConfiguration]) -> Result<Self, MappingProblem> {
         let counted = Self::of(axis);
-        match axis.drive {
-            DriveFamily::ErobCanopen => by_content(axis, &counted, reported),
-            DriveFamily::YzAim => by_number(axis, counted, reported),
+        match family::of(&axis.drive).mapping_match() {
+            MappingMatch::ByContent => by_content(axis, &counted, reported),
+            MappingMatch::ByNumber => by_number(axis, counted, reported),
         }
     }
 }
@@ -284,6 +285,7 @@ fn plan_of(
         transmission_type: transmission_type.unwrap_or(axis.transmission_type),
         objects: pdo.objects.clone(),
         transmission,
+        reply: Reply::No,
     })
 }
 
@@ -310,8 +312,8 @@ fn by_number(
         if bits > counted_bits {
             return Err(MappingProblem::TooLong { direction, number: pdo.number, bits, counted_bits });
         }
-        let transmission_type = plan.transmission_type;
-        Ok(PdoPlan { transmission_type, ..plan_of(pdo, axis, plan.transmission)? })
+        let PdoPlan { transmission_type, reply, .. } = plan;
+        Ok(PdoPlan { transmission_type, reply, ..plan_of(pdo, axis, plan.transmission)? })
     };
     let all = |direction, plans: Vec<PdoPlan>| -> Result<Vec<PdoPlan>, MappingProblem> {
         plans.into_iter().map(|plan| resolve(direction, plan)).collect()

@@ -20,6 +20,17 @@ pub struct SdoQuirks {
 }
 
 impl SdoQuirks {
+    /// A server that keeps to CiA 301.
+    pub const fn standard() -> Self {
+        Self {
+            timing: SdoTiming { reply_timeout_ns: 100_000_000, retries: 2 },
+            gap_ns: 0,
+            has_short_replies: false,
+            has_other_lengths: false,
+            is_silent_if_absent: false,
+        }
+    }
+
     /// Whether this error means that the drive does not have the object.
     pub fn means_absent(&self, error: SdoError) -> bool {
         match error {

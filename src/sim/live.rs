@@ -9,8 +9,7 @@ use takt_rt::{BusHealth, BusPort, Clock, Nanoseconds, ReceiveBatch};
 use super::drive::Drive;
 use super::lss::LssDevice;
 use super::mailbox::{Mailbox, QueueOrder};
-use super::port::{DRIVE_MAILBOX, drives_of};
-use crate::config::Config;
+use super::port::DRIVE_MAILBOX;
 
 /// Longest wait, so that a request to stop is noticed.
 const LONGEST_WAIT_NS: Nanoseconds = 20_000_000;
@@ -29,11 +28,10 @@ pub struct LiveDrives {
 }
 
 impl LiveDrives {
-    /// One drive for every axis on the bus with this index in the configuration. The supply is switched on now.
-    pub fn new(config: &Config, bus: usize, port: SocketCanPort) -> Self {
-        let stations = drives_of(config, bus)
-            .into_iter()
-            .map(|drive| (drive, Mailbox::new(QueueOrder::Priority, DRIVE_MAILBOX)));
+    /// These drives on an interface. The supply is switched on now.
+    pub fn new(drives: Vec<Box<dyn Drive>>, port: SocketCanPort) -> Self {
+        let stations =
+            drives.into_iter().map(|drive| (drive, Mailbox::new(QueueOrder::Priority, DRIVE_MAILBOX)));
         Self {
             port,
             stations: stations.collect(),
@@ -158,6 +156,8 @@ mod tests {
 
     use super::*;
     use crate::canopen::lss::{LssAddress, LssRequest, LssResponse};
+    use crate::config::Config;
+    use crate::family::simulated_drives;
 
     /// The drives of the first bus of a configuration on one end of a socket pair, and the other end. Only the
     /// interface differs from a real one.
@@ -166,7 +166,7 @@ mod tests {
         config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 1_000_000);
         let (ours, theirs) = UnixDatagram::pair().unwrap();
         let port = |socket: &UnixDatagram| SocketCanPort::new(socket.as_raw_fd(), 1_000_000, None).unwrap();
-        (LiveDrives::new(&config, 0, port(&ours)), port(&theirs))
+        (LiveDrives::new(simulated_drives(&config, 0), port(&ours)), port(&theirs))
     }
 
     /// Runs until the master has received `count` frames.

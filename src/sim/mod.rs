@@ -66,6 +66,7 @@ pub use drive::{Drive, DriveFault, NodeState, Observation};
 pub use live::LiveDrives;
 pub use mailbox::{Mailbox, QueueOrder};
 pub use medium::{FrameOnWire, Medium, WireBitRates};
+pub use plant::Gravity;
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
 pub use sdo_reply::AbortCode;
 pub use wire_length::{INTERMISSION_BITS, WireLength, bits_ns};

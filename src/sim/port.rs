@@ -9,11 +9,7 @@ use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Re
 
 use super::defect::{Defect, Unsupported};
 use super::drive::{Drive, DriveFault, Observation};
-use super::erob::{ErobJoint, ErobParameters};
 use super::medium::{FrameOnWire, Medium, WireBitRates};
-use super::plant::Gravity;
-use super::yz_aim::{YzAimJoint, YzAimParameters};
-use crate::config::{Axis, Config, DriveFamily, Travel};
 
 /// Capacity of the interface's transmit queue.
 const TRANSMIT_QUEUE: usize = 256;
@@ -42,33 +38,6 @@ pub struct SimulatedBus {
     now_ns: Nanoseconds,
 }
 
-/// The drive that simulates an axis, under its gravity.
-fn simulated(axis: &Axis, config: &Config) -> Box<dyn Drive> {
-    let mut drive = weightless(axis, config);
-    drive.set_gravity(match axis.travel {
-        Travel::Rotary => Gravity::Pendulum(axis.simulated.gravity),
-        Travel::Linear { .. } => Gravity::Weight(axis.simulated.gravity),
-    });
-    drive
-}
-
-fn weightless(axis: &Axis, config: &Config) -> Box<dyn Drive> {
-    let simulation = &config.simulation;
-    match axis.drive {
-        DriveFamily::ErobCanopen => Box::new(ErobJoint::new(ErobParameters::of(axis, simulation))),
-        DriveFamily::YzAim => {
-            let bit_rate = config.buses.get(axis.bus).map_or(1_000_000, |bus| bus.bit_rate);
-            Box::new(YzAimJoint::new(YzAimParameters::of(axis, bit_rate, simulation)))
-        }
-    }
-}
-
-/// The drives that simulate the axes of a bus.
-pub(super) fn drives_of(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
-    let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-    axes.map(|axis| simulated(axis, config)).collect()
-}
-
 /// The bus has no drive with this node ID.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no simulated drive with node ID {node} on this bus")]
@@ -89,14 +58,6 @@ pub enum InjectDefectError {
 }
 
 impl SimulatedBus {
-    /// The bus with this index in the configuration, with one drive for every axis on it.
-    pub fn new(config: &Config, bus: usize) -> Self {
-        let rates = config.buses.get(bus).map_or(WireBitRates { nominal: 1_000_000, data: None }, |bus| {
-            WireBitRates { nominal: bus.bit_rate, data: bus.data_bit_rate }
-        });
-        Self::with_drives(rates, config.simulation.longest_gap_ns, drives_of(config, bus))
-    }
-
     /// A bus with these drives, whose supply is switched on at the first call. When two calls are more than
     /// `longest_gap_ns` apart, the simulation pauses for the rest of the gap.
     pub fn with_drives(

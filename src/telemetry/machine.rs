@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use takt_rt::ControlLaw;
 
-use crate::config::{Axis, Config, DriveFamily, Interface, Travel};
-use crate::drive;
+use crate::config::{Axis, Config, Interface, Travel};
+use crate::family;
 
 /// Names and units of a controller.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +33,7 @@ pub struct AxisDescription {
     /// The number of its group; 0 where all axes are one group.
     pub group: usize,
     /// The family of its drive, which its error codes belong to; `None` in a recording of an earlier version.
-    pub family: Option<DriveFamily>,
+    pub family: Option<String>,
     /// The unit of its position.
     pub unit: Unit,
     /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
@@ -140,16 +140,16 @@ impl Machine {
 
     /// An error code of the drive of an axis, in words.
     pub fn drive_error(&self, axis: u8, code: u16) -> String {
-        drive::error_words(self.family(axis), code)
+        family::error_words(self.family(axis), code)
     }
 
     /// The cure of an error of the drive of an axis.
     pub fn drive_cure(&self, axis: u8, code: u16) -> &'static str {
-        drive::error_cure(self.family(axis), code)
+        family::error_cure(self.family(axis), code)
     }
 
-    fn family(&self, axis: u8) -> Option<DriveFamily> {
-        self.axes.get(usize::from(axis)).and_then(|axis| axis.family)
+    fn family(&self, axis: u8) -> Option<&str> {
+        self.axes.get(usize::from(axis)).and_then(|axis| axis.family.as_deref())
     }
 
     /// The unit of an axis.
@@ -169,7 +169,7 @@ impl AxisDescription {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
             group: config.group_of_axis(number),
-            family: Some(axis.drive),
+            family: Some(axis.drive.word.to_owned()),
             unit,
             plans_own_profile: matches!(
                 axis.control,

@@ -17,7 +17,7 @@ use super::history::OnBus;
 use super::machine::Machine;
 use super::messages::{self, MessageType};
 use super::wall_clock::WallClock;
-use crate::bus::trace::{TracedFrame, TracedHealth};
+use crate::link::trace::{TracedFrame, TracedHealth};
 
 /// A chunk is written to the file as a whole. It holds a third of a second of six axes at 1 ms. A crash of the computer
 /// loses at most that.
@@ -92,7 +92,7 @@ impl Recording {
                 ("acceleration_limit".to_owned(), description.limits.acceleration.to_string()),
                 ("jerk_limit".to_owned(), description.limits.jerk.to_string()),
             ]);
-            metadata.extend(description.family.map(|family| ("drive".to_owned(), family.word().to_owned())));
+            metadata.extend(description.family.clone().map(|family| ("drive".to_owned(), family)));
             metadata.extend(description.bus.clone().map(|bus| ("bus".to_owned(), bus)));
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }

@@ -123,7 +123,6 @@ pub fn silence(snapshot: &Snapshot, machine: &Machine) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::DriveFamily;
     use crate::telemetry::machine::{AxisDescription, BusDescription, SetPointMagnitudes, Unit};
     use takt_rt::DriveState;
     use takt_rt::{RejectReason, RequestError, RequestKind};
@@ -133,7 +132,7 @@ mod tests {
             name: name.to_owned(),
             bus: None,
             group: 0,
-            family: Some(DriveFamily::ErobCanopen),
+            family: Some("erob-canopen".to_owned()),
             unit,
             plans_own_profile: false,
             counts_per_unit: 1.0,

@@ -143,7 +143,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         name: format!("joint{}", number + 1),
         bus,
         node,
-        drive: DriveFamily::ErobCanopen,
+        drive: takt::family::EROB_CANOPEN,
         control: Control::Position,
         other_modes: vec![],
         travel: Travel::Rotary,

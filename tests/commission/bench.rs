@@ -141,7 +141,7 @@ pub fn number(report: &Report, key: &str) -> f64 {
 }
 
 pub fn read(bench: &mut Bench, name: &str) -> i64 {
-    let Ok(SelectedObject::Known(entry)) = dictionary::find(bench.target.family, name) else {
+    let Ok(SelectedObject::Known(entry)) = dictionary::find(&bench.target.drive, name) else {
         panic!("{name}")
     };
     let object = ReadObject { address: entry.object.address, entry: Some(entry), data_type: None };

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use takt::commission::dictionary::{self, SelectedObject};
-use takt::commission::{CommandValue, Failure, Family, MotionProfile, MoveKind, TargetDrive, Task};
+use takt::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::config::Config;
+use takt::family;
 use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::{BusPort, Clock, DriveState, Frame, Id};
 
@@ -317,7 +318,7 @@ fn zero_clears_the_turn_count_with_consent_and_never_with_torque() {
 fn saved_parameters_survive_a_power_cycle_and_others_do_not() {
     let mut bench = bench();
     let write = |name: &str, value| {
-        let Ok(SelectedObject::Known(entry)) = dictionary::find(Family::ErobCanopen, name) else {
+        let Ok(SelectedObject::Known(entry)) = dictionary::find(&family::EROB_CANOPEN, name) else {
             panic!("{name}")
         };
         Task::Write { object: entry.object, value, entry: Some(entry) }
@@ -347,7 +348,7 @@ fn a_missing_node_is_named_and_a_stopped_node_is_woken() {
 #[test]
 fn a_drive_of_another_family_is_read_but_not_moved() {
     let mut bench = bench();
-    let other = TargetDrive { family: Family::YzAim, ..bench.target.clone() };
+    let other = TargetDrive { drive: family::YZ_AIM, ..bench.target.clone() };
     let request = Task::Move { kind: absolute(1.0), profile: brisk(), keeps_enabled: false };
     let failed = bench.run_as(other, request, |_| 0).unwrap_err();
     assert!(matches!(failed.failure, Failure::OtherDrive { expected: 0x331, .. }), "{failed:?}");

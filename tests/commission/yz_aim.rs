@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use takt::commission::{CommandValue, Failure, Family, MotionProfile, MoveKind, TargetDrive, Task};
+use takt::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::config::{Limits, Travel};
+use takt::family;
 use takt::sim::homing_switches::{HomingSwitches, Switch};
 use takt::sim::plant::{EndStops, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
@@ -60,7 +61,7 @@ fn with(drives: Vec<YzAimParameters>) -> Bench {
     let target = TargetDrive {
         name: "joint".to_owned(),
         node: NODE,
-        family: Family::YzAim,
+        drive: family::YZ_AIM,
         travel: Travel::Rotary,
         counts_per_turn: 32_768.0,
         scale: Scale::new(scale).unwrap(),

@@ -1,7 +1,8 @@
 //! The controller falls silent in motion and comes back, as a process that was stopped and continued.
 
-use takt::config::{Config, DriveFamily};
+use takt::config::Config;
 use takt::controller::Outcome;
+use takt::family;
 use takt_rt::{BusPort, DriveState, Phase, Rule};
 
 use crate::world::{MILLISECOND_NS, World, counts_per_unit, id, load, one_yz_aim, parse, word};
@@ -45,7 +46,7 @@ fn largest_way_to_the_end(world: &mut World, from: &[f64]) -> f64 {
 
 /// A YZ-AIM shows its alarm in process data, and is led down as soon as it does; its last word may be repeated until then.
 fn assert_nobody_enables_after(world: &mut World, since_ns: u64) {
-    let axes = world.config.axes.iter().filter(|axis| axis.drive == DriveFamily::YzAim);
+    let axes = world.config.axes.iter().filter(|axis| axis.drive == family::YZ_AIM);
     let rpdos =
         [0x200, 0x400].map(|function| axes.clone().map(move |axis| (axis.bus, id(function, axis.node))));
     for (bus, id) in rpdos.into_iter().flatten().collect::<Vec<_>>() {

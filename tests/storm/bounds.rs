@@ -1,6 +1,6 @@
 //! What is stated of a stop: how long it takes and how far it leads.
 
-use takt::config::{Axis, Config, DriveFamily};
+use takt::config::{Axis, Config};
 
 /// How far behind its set-point a joint may be that obeys.
 const LAG_S: f64 = 0.4;
@@ -35,9 +35,9 @@ pub fn to_rest_distance(axes: &[Axis], axis: &Axis) -> f64 {
 /// stopped it.
 pub fn coasting_s(axis: &Axis) -> f64 {
     let joint = &axis.joint;
-    match axis.drive {
-        DriveFamily::YzAim => axis.limits.velocity * joint.inertia() / joint.coulomb_friction(),
-        DriveFamily::ErobCanopen => 0.0,
+    match axis.drive.word {
+        "yz-aim" => axis.limits.velocity * joint.inertia() / joint.coulomb_friction(),
+        _ => 0.0,
     }
 }
 

@@ -10,7 +10,7 @@ use crate::tap::Tap;
 /// The axes that follow set-points in a cyclic synchronous mode may be changed to each of the others, where the buses carry that.
 pub fn let_modes_change(config: &mut Config) {
     let before = config.clone();
-    for axis in config.axes.iter_mut().filter(|axis| axis.drive.mode_condition().is_some()) {
+    for axis in config.axes.iter_mut().filter(|axis| axis.drive.mode_changes.condition().is_some()) {
         if axis.control.is_cyclic_synchronous() {
             let others = [Control::Position, Control::Velocity { position_gain: 10.0 }, torque_loop(axis)];
             let own = axis.control.operation_mode();
@@ -18,7 +18,7 @@ pub fn let_modes_change(config: &mut Config) {
             *axis = axis.clone().with_other_modes(others);
         }
     }
-    let fits = takt::bus::schedule::analyse(config).iter().all(takt::bus::schedule::BusSchedule::fits);
+    let fits = takt::schedule::analyse(config).iter().all(takt::schedule::BusSchedule::fits);
     if !fits || config.validate().is_err() {
         *config = before;
     }

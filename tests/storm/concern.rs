@@ -1,12 +1,13 @@
 //! Whom a fault concerns, from the cycle on in which it begins.
 
-use takt::bus::schedule::analyse;
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
-use takt::config::{Axis, Config, DriveFamily};
+use takt::config::{Axis, Config};
+use takt::family;
 use takt::faults::{
     Direction, DriveEffect, Effect, FaultInjector, ForeignFrames, FrameEffect, FrameFunction,
     InterfaceEffect, Part, Selection,
 };
+use takt::schedule::analyse;
 use takt::sim::Defect;
 
 use crate::heartbeat::MissedHeartbeat;
@@ -183,7 +184,7 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
         _ => false,
     };
     // A servo holds its shaft before anybody has commanded it, and follows an encoder that slips.
-    let is_led_astray = fault.kind == "encoder-jump" && axis.drive == DriveFamily::YzAim;
+    let is_led_astray = fault.kind == "encoder-jump" && axis.drive == family::YZ_AIM;
     Concern {
         is_present,
         is_misled,

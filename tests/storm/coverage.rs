@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
-use takt::config::DriveFamily;
 use takt_rt::Phase;
 
 use crate::case::Case;
@@ -62,7 +61,7 @@ impl Coverage {
             let period_us =
                 case.config.cycle.period_ns * u64::from(case.config.buses[axis.bus].divider) / 1000;
             let mode = axis.control.operation_mode() as u8;
-            *self.drives.entry((axis.drive.word(), mode, period_us)).or_default() += 1;
+            *self.drives.entry((axis.drive.word, mode, period_us)).or_default() += 1;
         }
         for outcome in &done.outcomes {
             let situations = self.situations.entry(case.scenario.faults[outcome.fault].kind).or_default();
@@ -126,11 +125,10 @@ impl Coverage {
             }
         }
         let drives: BTreeSet<(&str, u8)> = self.drives.keys().map(|(word, mode, _)| (*word, *mode)).collect();
-        let all =
-            [(DriveFamily::ErobCanopen, &[1, 3, 4, 7, 8, 9, 10][..]), (DriveFamily::YzAim, &[1, 3, 7][..])];
+        let all = [("erob-canopen", &[1, 3, 4, 7, 8, 9, 10][..]), ("yz-aim", &[1, 3, 7][..])];
         for (family, modes) in all {
-            let missing = modes.iter().filter(|mode| !drives.contains(&(family.word(), **mode)));
-            gaps.extend(missing.map(|mode| format!("{} in mode {mode}", family.word())));
+            let missing = modes.iter().filter(|mode| !drives.contains(&(family, **mode)));
+            gaps.extend(missing.map(|mode| format!("{family} in mode {mode}")));
         }
         for (count, what) in [
             (self.serving, "a group that clients command"),

@@ -2,7 +2,7 @@
 //! stops by itself: an eRob by its fault reaction, with error 8130 and its node stopped (object 1029), a YZ-AIM with alarm 20h
 //! and 04h in its own heartbeat.
 
-use takt::config::{Axis, Config, DriveFamily};
+use takt::config::{Axis, Config};
 use takt::sim::Observation;
 use takt_rt::Frame;
 
@@ -45,9 +45,9 @@ impl Heartbeats {
     pub fn new(config: &Config) -> Self {
         let drive = |axis: &Axis| Drive {
             bus: axis.bus,
-            error_code: match axis.drive {
-                DriveFamily::ErobCanopen => 0x8130,
-                DriveFamily::YzAim => 0x20,
+            error_code: match axis.drive.word {
+                "yz-aim" => 0x20,
+                _ => 0x8130,
             },
             missed: MissedHeartbeat::No,
             since_missed: 0,

@@ -5,7 +5,8 @@ use std::fmt::Write;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use takt::config::{Axis, Config, DriveFamily, Feedback};
+use takt::config::{Axis, Config, Feedback};
+use takt::family;
 use takt_rt::Rule;
 
 use crate::dice::Dice;
@@ -46,7 +47,7 @@ pub fn load(name: &str) -> Config {
 fn read(name: &str) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("configs/{name}.toml"));
     let mut config = Config::load(&path).unwrap_or_else(|error| panic!("{name}: {error}"));
-    for axis in config.axes.iter_mut().filter(|axis| axis.drive == DriveFamily::ErobCanopen) {
+    for axis in config.axes.iter_mut().filter(|axis| axis.drive == family::EROB_CANOPEN) {
         axis.feedback = vec![Feedback::OperationMode];
     }
     ready(config)
@@ -72,7 +73,7 @@ pub fn any(dice: &mut Dice, needs_erob: bool) -> Config {
             true => random(dice),
             false => load(dice.pick(&SHIPPED)),
         };
-        let is_erob = |axis: &Axis| axis.drive == DriveFamily::ErobCanopen;
+        let is_erob = |axis: &Axis| axis.drive == family::EROB_CANOPEN;
         if !needs_erob || config.axes.iter().any(is_erob) {
             return config;
         }

@@ -1,6 +1,6 @@
 //! Random faults of every kind, as a user would write them down.
 
-use takt::config::{Axis, Config, DriveFamily, Travel};
+use takt::config::{Axis, Config, Travel};
 
 use crate::dice::Dice;
 
@@ -131,9 +131,9 @@ fn particulars(dice: &mut Dice, axis: &Axis, kind: &str) -> (Place, bool, String
         }
         "mode-display" => (Place::Axis, true, format!("mode = {}", dice.pick(&[0, 1, 2, 3, 6, 8]))),
         "alarm" => {
-            let codes: &[u16] = match axis.drive {
-                DriveFamily::ErobCanopen => &[0x2310, 0x4310, 0x7500, 0xFF01],
-                DriveFamily::YzAim => &[0x10, 0x12, 0x14, 0x15, 0x20],
+            let codes: &[u16] = match axis.drive.word {
+                "yz-aim" => &[0x10, 0x12, 0x14, 0x15, 0x20],
+                _ => &[0x2310, 0x4310, 0x7500, 0xFF01],
             };
             (Place::Axis, false, format!("code = {}", dice.pick(codes)))
         }

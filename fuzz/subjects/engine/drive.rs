@@ -3,7 +3,7 @@
 use takt::config::{Axis, Config, Control};
 use takt::controller::assemble;
 use takt::drive::{PdoPlan, ProcessData};
-use takt_rt::{Command, Dialect, DriveState, Frame, Id, MappedObject, Scale, controlword, statusword};
+use takt_rt::{Command, DriveState, Frame, Id, MappedObject, Scale, ShownStates, controlword, statusword};
 
 /// Below this speed friction fades out, so that a joint at rest stays there: rad/s (m/s).
 const COULOMB_FADE: f64 = 1e-3;
@@ -102,13 +102,13 @@ impl ObedientDrive {
 
     fn statusword(&self) -> u16 {
         let is_enabled = self.state == DriveState::OperationEnabled;
-        match self.axis.drive.dialect() {
-            Dialect::YzAim => match self.state {
-                DriveState::Fault | DriveState::FaultReactionActive => 0x0008,
-                _ if is_enabled => 0x0037 | self.target_reached(),
+        match self.axis.drive.codec.states {
+            ShownStates::EnabledAndFault { enabled, fault } => match self.state {
+                DriveState::Fault | DriveState::FaultReactionActive => fault,
+                _ if is_enabled => enabled | self.target_reached(),
                 _ => 0x0404,
             },
-            Dialect::Cia402 => {
+            ShownStates::All => {
                 let has_handshake = self.axis.control == Control::ProfilePosition;
                 let is_offered = is_enabled && self.controlword & controlword::BIT_4 != 0;
                 let acknowledged = if has_handshake && is_offered { statusword::BIT_12 } else { 0 };
@@ -148,7 +148,8 @@ impl ObedientDrive {
             let is_edge =
                 word & controlword::FAULT_RESET != 0 && self.controlword & controlword::FAULT_RESET == 0;
             self.state = self.state.after(Command::decode(word), is_edge);
-            let is_offered = word & controlword::BIT_4 != 0 || self.axis.drive.dialect() == Dialect::YzAim;
+            let is_offered =
+                word & controlword::BIT_4 != 0 || !self.axis.drive.codec.acknowledges_set_points();
             if is_offered {
                 self.taken = self.target_position;
             }

@@ -11,13 +11,13 @@ mod watch;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::OnceLock;
 
-use takt::config::{Config, Control};
+use takt::config::{Config, Control, DriveFamily};
 use takt::controller::assemble;
 use takt_rt::{
     AxisSnapshot, AxisTarget, BitSet, BusHealth, BusState, CallbackCycle, CallbackId, CallbackReturn,
-    Command, CycleInput, CycleRecord, CycleTiming, Deadline, Dialect, DriveState, Engine, Event, Frame,
-    HostInterface, LookAhead, MAX_AXES, OperationMode, Phase, Received, Request, RequestEnvelope, RequestId,
-    RequestTarget, SendBatch, Snapshot, StreamPoint, StreamSample, StreamWish,
+    Command, CycleInput, CycleRecord, CycleTiming, Deadline, DriveState, Engine, Event, Frame, HostInterface,
+    LookAhead, MAX_AXES, OperationMode, Phase, Received, Request, RequestEnvelope, RequestId, RequestTarget,
+    SendBatch, Snapshot, StreamPoint, StreamSample, StreamWish,
 };
 
 use super::input::Input;
@@ -68,8 +68,8 @@ enum Disturbed {
 #[derive(Default)]
 pub struct Journey {
     pub phases: Vec<Phase>,
-    /// The modes of axes that were enabled while the group moved, with the dialects of their drives.
-    pub modes_in_motion: Vec<(OperationMode, Dialect)>,
+    /// The modes of axes that were enabled while the group moved, with the families of their drives.
+    pub modes_in_motion: Vec<(OperationMode, DriveFamily)>,
     /// Requests that were taken up and those that were refused.
     pub taken: u64,
     pub refused: u64,
@@ -391,7 +391,8 @@ impl Machine {
         journey.stops.extend(stops.map(|stop| stop.rule().key()));
         for axis in self.engine.axes() {
             let phase = phases[self.config.group_of_axis(axis.number().into())];
-            let mode = (axis.parameters().law.operation_mode(), axis.parameters().dialect);
+            let family = self.config.axes[usize::from(axis.number())].drive.clone();
+            let mode = (axis.parameters().law.operation_mode(), family);
             let is_moved = matches!(phase, Phase::Moving | Phase::Streaming) && axis.is_enabled();
             if is_moved && !journey.modes_in_motion.contains(&mode) {
                 journey.modes_in_motion.push(mode);

@@ -122,13 +122,13 @@ impl Axis {
         if is_on_its_way_up && self.controlwords.must_wait(self.parameters.controlword_spacing_cycles) {
             return last;
         }
-        self.parameters.dialect.controlword(self.drive_state(), goal, last)
+        self.parameters.codec.controlword(self.drive_state(), goal, last)
     }
 
     /// The bits that the mode of operation adds to the controlword of an enabled drive.
     #[inline]
     fn mode_bits(&mut self) -> u16 {
-        let has_handshake = self.parameters.dialect.acknowledges_set_points();
+        let has_handshake = self.parameters.codec.acknowledges_set_points();
         match self.parameters.law {
             ControlLaw::ProfilePosition if has_handshake => self.profile.position_bits(self.statusword()),
             ControlLaw::ProfilePosition => {

@@ -116,7 +116,7 @@ impl Axis {
         if self.joint.take_report(counts, velocity, span, scale, velocity_limit) {
             self.start_from_actual();
         }
-        if self.report.note_state(self.parameters.dialect.state(self.statusword())) {
+        if self.report.note_state(self.parameters.codec.state(self.statusword())) {
             self.power.note_fault_gone();
         }
         let behind = self.set_points.due().position - self.joint.position();

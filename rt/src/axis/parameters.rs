@@ -3,8 +3,8 @@
 use arrayvec::ArrayVec;
 
 use crate::cia402::OperationMode;
+use crate::cia402_codec::Cia402Codec;
 use crate::control::{ControlLaw, GainError};
-use crate::dialect::Dialect;
 use crate::frame::Id;
 use crate::guard::{AxisLimits, LimitError};
 use crate::pdo::{MAX_PDOS, Mapping, TransmissionType};
@@ -151,8 +151,8 @@ pub struct AxisParameters {
     pub feedback_since: FeedbackSince,
     /// Identifiers of process data that the drive sends beside that, which carries nothing new.
     pub unused: ArrayVec<Id, MAX_PDOS>,
-    /// How it speaks.
-    pub dialect: Dialect,
+    /// How its drive uses controlword and statusword.
+    pub codec: Cia402Codec,
     /// Cycles of the bus from one controlword to the next on the way to operation enabled; 0 where the drive shows how
     /// far it has come.
     pub controlword_spacing_cycles: u32,
@@ -299,7 +299,7 @@ pub(super) mod tests {
             feedback: [feedback].into_iter().collect(),
             feedback_since: FeedbackSince::Sync,
             unused: ArrayVec::new(),
-            dialect: Dialect::Cia402,
+            codec: Cia402Codec::default(),
             controlword_spacing_cycles: 0,
             law: ControlLaw::Position,
             mode_changes: ModeChanges::default(),

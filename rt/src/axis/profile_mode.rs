@@ -1,8 +1,8 @@
 //! An axis in a profile mode: targets instead of set-points.
 
 use super::Axis;
+use crate::cia402_codec::ProfileRamps;
 use crate::control::ControlLaw;
-use crate::dialect::Dialect;
 use crate::fault::Fault;
 use crate::plan::State;
 use crate::profile::{ProfileCommand, ProfileTarget};
@@ -127,7 +127,7 @@ impl Axis {
         let scale = &self.parameters.scale;
         let (raw, needs_handshake) = match target {
             ProfileTarget::Position(position) => {
-                (scale.position_to_counts(position), self.parameters.dialect.acknowledges_set_points())
+                (scale.position_to_counts(position), self.parameters.codec.acknowledges_set_points())
             }
             ProfileTarget::Velocity(velocity) => (scale.velocity_to_drive(velocity), false),
             ProfileTarget::Torque(torque) => (scale.torque_to_per_mille(torque), false),
@@ -147,12 +147,12 @@ impl Axis {
         self.set_profile_target(target, Nanoseconds::MAX);
     }
 
-    /// How the drive decelerates. A YZ-AIM has one ramp for both.
+    /// How the drive decelerates.
     fn deceleration(&self) -> f64 {
         let limits = &self.parameters.limits;
-        match self.parameters.dialect {
-            Dialect::Cia402 => limits.deceleration,
-            Dialect::YzAim => limits.deceleration.min(limits.acceleration),
+        match self.parameters.codec.ramps {
+            ProfileRamps::Separate => limits.deceleration,
+            ProfileRamps::Common => limits.deceleration.min(limits.acceleration),
         }
     }
 
@@ -196,7 +196,7 @@ impl Axis {
     /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has. A joint
     /// that coasts has reached its target when it stands.
     pub fn is_target_reached(&self) -> bool {
-        let is_there = || self.profile.command.is_reached(self.parameters.dialect, self.statusword());
+        let is_there = || self.profile.command.is_reached(self.statusword());
         !self.is_profile() || !self.is_coasting() && is_there()
     }
 

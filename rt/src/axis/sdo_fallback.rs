@@ -1,9 +1,9 @@
 //! The drive's controlword by SDO: what is left for a drive that takes no process data any more.
 
-use super::Axis;
+use super::{Axis, CommandPdo, Pdo};
 use crate::cia402::controlword;
-use crate::dialect::Dialect;
 use crate::frame::{Frame, Id};
+use crate::pdo::CommandSlot;
 use crate::watch::{NmtState, nmt_command, node_state};
 
 /// Function codes of an SDO request and of its answer (CiA 301, 7.3.3).
@@ -52,6 +52,13 @@ impl SdoFallback {
         } else if let Self::Writing { wait_slots, .. } = self {
             *wait_slots = wait_slots.saturating_sub(1);
         }
+    }
+
+    /// The controlword that is due, on a bus without SDO. It is due again after so many slots.
+    fn take_due_word(&mut self, repeat_slots: u32) -> Option<u16> {
+        let Self::Writing { word, wait_slots: wait_slots @ 0, .. } = self else { return None };
+        *wait_slots = repeat_slots;
+        Some(*word)
     }
 
     /// The frame that is due, if one is. It is due again after so many slots, unless it is confirmed before.
@@ -106,11 +113,10 @@ impl Axis {
 
     /// The controlword that stops a drive which process data do not reach.
     pub fn sdo_stop_word(&self) -> u16 {
-        match self.parameters.dialect {
-            _ if !self.drive_state().has_torque() => controlword::DISABLE_VOLTAGE,
-            Dialect::Cia402 => controlword::QUICK_STOP,
-            // It has no quick stop; its halt keeps the shaft locked.
-            Dialect::YzAim => controlword::ENABLE_OPERATION | controlword::HALT,
+        if self.drive_state().has_torque() {
+            self.parameters.codec.stop_word()
+        } else {
+            controlword::DISABLE_VOLTAGE
         }
     }
 
@@ -126,6 +132,15 @@ impl Axis {
         self.sdo_fallback.frame(self.parameters.node, self.node_monitor.nmt_state(), repeat_slots)
     }
 
+    /// The frame with that controlword, if it is due, for a drive that has no SDO.
+    pub fn stop_frame(&mut self, repeat_slots: u32) -> Option<Frame> {
+        let word = self.sdo_fallback.take_due_word(repeat_slots)?;
+        self.command.set(CommandSlot::Controlword, word.into());
+        let carries_it = |command: &&CommandPdo| command.pdo.mapping.sends(CommandSlot::Controlword);
+        let Pdo { id, mapping } = &self.parameters.commands.iter().find(carries_it)?.pdo;
+        Some(Frame::packed(*id, mapping.pack(&self.command), mapping.length()))
+    }
+
     /// Takes a frame that may confirm a controlword that was written by SDO.
     pub fn receive_service(&mut self, frame: &Frame) {
         self.sdo_fallback.receive(self.parameters.node, frame);
@@ -139,8 +154,7 @@ impl Axis {
     /// Takes the state in a boot-up message or heartbeat.
     pub fn receive_error_control(&mut self, state: u8) {
         self.node_monitor.receive(state);
-        // A stopped YZ-AIM says nothing, and one with an alarm says "stopped" (manual, 5.11.1).
-        if state == node_state::STOPPED && self.parameters.dialect == Dialect::Cia402 {
+        if state == node_state::STOPPED && self.parameters.codec.is_stopped_by_heartbeat() {
             self.node_monitor.receive_foreign_nmt(nmt_command::STOP);
         }
     }

@@ -4,6 +4,7 @@
 //! stops the drives.
 
 use super::group::{Commands, Group};
+use super::parameters::CanopenNetwork;
 use super::shared::Shared;
 use super::state::{GroupState, PowerRemoval};
 use super::{Deadline, Engine, SendBatch, has_cycle};
@@ -46,7 +47,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// The SYNC of a bus, if one is to be sent in this slot, now. Answers to an earlier one are late from now on.
     pub fn sync(&mut self, bus: usize, slot: u64, now_ns: Nanoseconds) -> Option<Frame> {
         let parameters = self.shared.buses.get(bus)?;
-        let sync_id = parameters.sync_id;
+        let CanopenNetwork { sync_id } = parameters.canopen?;
         let is_due = self.shared.requested.sync && has_cycle(parameters, slot);
         if !is_due || !self.may_leave(bus, Deadline::Met, Purpose::Operate) {
             return None;
@@ -94,6 +95,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     fn encode_heartbeat_and_time(&mut self, bus: usize, batch: &mut SendBatch) {
+        if !self.shared.is_canopen(bus) {
+            return;
+        }
         let heartbeat = self.shared.heartbeat.as_mut().and_then(|heartbeat| heartbeat.take(bus));
         if let Some(frame) = heartbeat {
             self.push(frame, batch);
@@ -117,7 +121,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             if is_passive { parameters.service_frames_passive } else { parameters.service_frames_active };
         let may_serve = self.may_leave(bus, deadline, Purpose::Operate);
         for number in 0..budget.max(1).min(batch.remaining_capacity()) {
-            let stopping = self.sdo_fallback_frame(bus);
+            let stopping = self.fallback_frame(bus);
             let frame = match stopping {
                 None if may_serve && number < budget => host.service_frame(bus),
                 stopping => stopping,

@@ -179,7 +179,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
         let is_harder = present.is_none_or(|present| wanted < present.category);
         if is_harder || kept.is_none() {
-            self.group.untold = Some(reason);
+            self.group.note_untold(reason);
         }
         if is_harder {
             self.carry_out(wanted);

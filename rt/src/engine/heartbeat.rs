@@ -1,8 +1,8 @@
-//! The heartbeat of this controller (CiA 301, 7.2.8.3.2), which the drives watch: when it leaves on each bus.
+//! The heartbeat of this controller (CiA 301, 7.2.8.3.2), which the drives watch: when it leaves on each CANopen bus.
 
 use arrayvec::ArrayVec;
 
-use super::parameters::Heartbeat;
+use super::parameters::{BusParameters, Heartbeat};
 use crate::frame::{Frame, Id};
 
 /// Cycles of the slowest bus for which the heartbeat waits after the controller was away for more than its period.
@@ -19,7 +19,8 @@ pub(super) struct HeartbeatProducer<const BUSES: usize> {
     heartbeat: Heartbeat,
     /// Cycles for which it waits after an absence.
     held_cycles: u32,
-    buses: ArrayVec<BusHeartbeat, BUSES>,
+    /// `None` where no heartbeat is sent: the bus is no CANopen network.
+    buses: ArrayVec<Option<BusHeartbeat>, BUSES>,
 }
 
 /// The heartbeat on one bus.
@@ -34,22 +35,23 @@ struct BusHeartbeat {
 }
 
 impl<const BUSES: usize> HeartbeatProducer<BUSES> {
-    /// For so many buses, the slowest of which has a cycle of so many slots.
-    pub(super) fn new(heartbeat: Heartbeat, buses: usize, slowest_divider: u32) -> Self {
+    /// For these buses, of which those have it that are CANopen networks.
+    pub(super) fn new(heartbeat: Heartbeat, buses: &[BusParameters]) -> Self {
+        let slowest_divider = buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
         let held_cycles = HELD_BUS_CYCLES.saturating_mul(slowest_divider);
-        let buses = core::iter::repeat_n(BusHeartbeat::default(), buses.min(BUSES)).collect();
-        Self { heartbeat, held_cycles, buses }
+        let buses = buses.iter().take(BUSES).map(|bus| bus.canopen.map(|_| BusHeartbeat::default()));
+        Self { heartbeat, held_cycles, buses: buses.collect() }
     }
 
-    /// Cycles without a heartbeat after which the drives stop by themselves.
-    pub(super) const fn timeout_cycles(&self) -> u32 {
-        self.heartbeat.timeout_cycles
+    /// Cycles without a heartbeat after which the drives on a bus stop by themselves; `None` where they never do.
+    pub(super) fn timeout_cycles(&self, bus: usize) -> Option<u32> {
+        self.buses.get(bus).is_some_and(Option::is_some).then_some(self.heartbeat.timeout_cycles)
     }
 
     /// Lets slots pass. After an absence that a drive may have noticed, the heartbeat waits.
     pub(super) fn pass(&mut self, elapsed: u64) {
         let was_away = elapsed > self.heartbeat.cycles.into();
-        for BusHeartbeat { due, overdue, .. } in &mut self.buses {
+        for BusHeartbeat { due, overdue, .. } in self.buses.iter_mut().flatten() {
             *overdue = if *due == 0 { overdue.saturating_add(1) } else { 0 };
             *due = if was_away { (*due).max(self.held_cycles) } else { due.saturating_sub(1) };
         }
@@ -58,7 +60,7 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
     /// A drive watches the controller from the first heartbeat on that it receives after its set-up: that one leaves before
     /// the drive is enabled, and not only after a whole period.
     pub(super) fn hasten(&mut self) {
-        for bus in &mut self.buses {
+        for bus in self.buses.iter_mut().flatten() {
             bus.awaited = BEFORE_ENABLING;
             bus.due = bus.due.min(self.held_cycles);
         }
@@ -66,13 +68,13 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
 
     /// Whether enough heartbeats have left on a bus, or leave with this cycle, for its drives to be enabled.
     pub(super) fn allows_enabling(&self, bus: usize) -> bool {
-        self.buses.get(bus).is_none_or(|bus| bus.awaited <= u32::from(bus.due == 0))
+        self.buses.get(bus).copied().flatten().is_none_or(|bus| bus.awaited <= u32::from(bus.due == 0))
     }
 
     /// The heartbeat of a bus, if it is due. It counts as sent. One that could not leave for a whole period has been missed by
     /// the drives as in an absence.
     pub(super) fn take(&mut self, bus: usize) -> Option<Frame> {
-        let BusHeartbeat { due, overdue, awaited } = self.buses.get_mut(bus)?;
+        let BusHeartbeat { due, overdue, awaited } = self.buses.get_mut(bus)?.as_mut()?;
         if *due > 0 {
             return None;
         }

@@ -56,7 +56,9 @@ use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};
 use shared::{Ending, Shared};
 
-pub use parameters::{BusParameters, CycleCount, EngineParameters, GroupParameters, Heartbeat, SetUpError};
+pub use parameters::{
+    BusParameters, CanopenNetwork, CycleCount, EngineParameters, GroupParameters, Heartbeat, SetUpError,
+};
 pub use sense::Receiver;
 
 /// The most frames that the engine hands to one bus in one cycle.
@@ -131,7 +133,7 @@ pub enum Deadline {
 ///     feedback: [pdo(0x180, feedback)].into_iter().collect(),
 ///     feedback_since: FeedbackSince::Sync,
 ///     unused: Default::default(),
-///     dialect: Dialect::Cia402,
+///     codec: Cia402Codec::default(),
 ///     controlword_spacing_cycles: 0,
 ///     law: ControlLaw::Position,
 ///     mode_changes: ModeChanges::default(),
@@ -164,7 +166,7 @@ pub enum Deadline {
 ///     missed_feedback_cycles: 5,
 /// };
 /// let bus = BusParameters {
-///     sync_id: Id::canopen(0x080, 0),
+///     canopen: Some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
 ///     divider: 1,
 ///     service_frames_active: 1,
 ///     service_frames_passive: 6,

@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::SEND_BATCH;
-use crate::axis::{Axis, AxisParameters, AxisParametersError};
+use crate::axis::{Axis, AxisParameters, AxisParametersError, FeedbackSince};
 use crate::bit_set::BitSet;
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::Id;
@@ -15,8 +15,9 @@ use crate::watch::TimingLadder;
 /// A bus as the engine knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BusParameters {
-    /// Identifier of SYNC.
-    pub sync_id: Id,
+    /// What makes it a CANopen network. On any other bus, nothing leaves but what its axes are commanded by, and the service frames of
+    /// the host: no SYNC, NMT, heartbeat, TIME or SDO.
+    pub canopen: Option<CanopenNetwork>,
     /// Slots in one cycle of this bus, 1 to 32: it has SYNC, feedback and set-points in every slot whose number this
     /// divides.
     pub divider: u32,
@@ -24,6 +25,13 @@ pub struct BusParameters {
     pub service_frames_active: usize,
     /// The most service frames in a cycle before that.
     pub service_frames_passive: usize,
+}
+
+/// What a bus has where its nodes speak CANopen (CiA 301).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CanopenNetwork {
+    /// Identifier of SYNC.
+    pub sync_id: Id,
 }
 
 /// The heartbeat of this controller.
@@ -57,9 +65,9 @@ pub struct EngineParameters<const AXES: usize = MAX_AXES, const BUSES: usize = M
     pub groups: ArrayVec<GroupParameters<AXES>, MAX_GROUPS>,
     /// The buses.
     pub buses: ArrayVec<BusParameters, BUSES>,
-    /// The heartbeat, if one is sent.
+    /// The heartbeat, if one is sent, on each CANopen bus.
     pub heartbeat: Option<Heartbeat>,
-    /// Cycles from one TIME message to the next, where the drives are told the time of day.
+    /// Cycles from one TIME message to the next, where the drives on each CANopen bus are told the time of day.
     pub time_cycles: Option<u32>,
     /// How each rule stops the group.
     pub categories: StopCategories,
@@ -101,6 +109,11 @@ pub enum SetUpError {
         axis: usize,
         /// The reason.
         error: AxisParametersError,
+    },
+    /// An axis waits for SYNC, or for a heartbeat of its node, on a bus that is no CANopen network.
+    NotCanopen {
+        /// The axis.
+        axis: usize,
     },
     /// The node ID of the controller is not 1 to 127.
     MasterNodeId {
@@ -194,6 +207,9 @@ impl core::fmt::Display for SetUpError {
             }
             Self::UnknownBus { axis } => write!(f, "axis {axis} names a bus that does not exist"),
             Self::Axis { axis, error } => write!(f, "axis {axis}: {error}"),
+            Self::NotCanopen { axis } => {
+                write!(f, "axis {axis} needs SYNC or heartbeats, and its bus is no CANopen network")
+            }
             Self::MasterNodeId { node } => {
                 write!(f, "{node} is not a node ID for the controller: 1 to 127 are")
             }
@@ -245,7 +261,8 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
             if !(1..=127).contains(&node) {
                 return Err(SetUpError::MasterNodeId { node });
             }
-            if let Some(axis) = self.axes.iter().position(|axis| axis.node == node) {
+            let is_taken = |axis: &AxisParameters| axis.node == node && self.is_canopen(axis.bus);
+            if let Some(axis) = self.axes.iter().position(is_taken) {
                 return Err(SetUpError::DuplicateNodeId { axis, node });
             }
         }
@@ -293,6 +310,10 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         self.groups.iter().map(|group| group.axes.clone()).chain(all)
     }
 
+    fn is_canopen(&self, bus: u8) -> bool {
+        self.buses.get(usize::from(bus)).is_some_and(|bus| bus.canopen.is_some())
+    }
+
     fn bus_of(&self, axis: u8) -> Option<usize> {
         self.axes.get(usize::from(axis)).map(|axis| usize::from(axis.bus))
     }
@@ -334,6 +355,10 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
             return Err(SetUpError::UnknownBus { axis });
         }
         own.validate().map_err(|error| SetUpError::Axis { axis, error })?;
+        let is_asked_by_sync = own.feedback_since == FeedbackSince::Sync;
+        if (is_asked_by_sync || own.heartbeat_timeout_cycles.is_some()) && !self.is_canopen(own.bus) {
+            return Err(SetUpError::NotCanopen { axis });
+        }
         let mut before = self.axes.iter().take(axis);
         if before.any(|other| (other.bus, other.node) == (own.bus, own.node)) {
             return Err(SetUpError::DuplicateNodeId { axis, node: own.node });
@@ -380,11 +405,16 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
         let own = parameters.axes.get(axis).ok_or(SetUpError::NoAxis)?;
         let table = dispatch.get_mut(usize::from(own.bus));
         let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
-        enter(table.ok_or(SetUpError::UnknownBus { axis })?, place, own).map_err(taken)?;
+        let table = table.ok_or(SetUpError::UnknownBus { axis })?;
+        enter_process_data(table, place, own).map_err(taken)?;
+        if parameters.is_canopen(own.bus) {
+            enter_services(table, place, own).map_err(taken)?;
+        }
     }
     for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
+        let Some(CanopenNetwork { sync_id }) = bus.canopen else { continue };
         table.foreign(NMT);
-        table.foreign(bus.sync_id);
+        table.foreign(sync_id);
         if let Some(heartbeat) = parameters.heartbeat {
             table.foreign(Id::canopen(0x700, heartbeat.node));
         }
@@ -392,12 +422,16 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
     Ok(dispatch)
 }
 
-fn enter(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
+/// What a CANopen node sends beside process data.
+fn enter_services(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
     table.emergency(Id::canopen(0x080, own.node), place)?;
+    table.error_control(Id::canopen(0x700, own.node), place)
+}
+
+fn enter_process_data(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
     for (number, pdo) in (0..).zip(&own.feedback) {
         table.feedback(pdo.id, place, number)?;
     }
-    table.error_control(Id::canopen(0x700, own.node), place)?;
     for command in &own.commands {
         table.foreign(command.pdo.id);
     }

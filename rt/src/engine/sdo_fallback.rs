@@ -1,5 +1,5 @@
-//! Stopping drives that PDOs do not reach: their controlword (object 6040) by SDO, from the real-time thread, before the
-//! service frames of the host. PDOs do not reach a node that another master has stopped or reset, and none while the thread is
+//! Stopping drives that PDOs do not reach: their controlword (object 6040) by SDO, or on a bus without SDO by the frame that carries
+//! it, from the real-time thread, before the service frames of the host. PDOs do not reach a node that another master has stopped or reset, and none while the thread is
 //! always late or the bus always behind: the way to switch a drive off does not need a punctual set-point.
 
 use super::Engine;
@@ -13,8 +13,8 @@ use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 /// How long an SDO server may take: a drive answers within a millisecond, one that has just been reset is there within
 /// another.
 const ANSWER_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 100;
-/// How long drives that receive PDOs take to obey the controlwords of disabling, and to show it: a YZ-AIM is told
-/// again after 20 ms.
+/// How long drives that receive PDOs take to obey the controlwords of disabling, and to show it: those whose controlwords are
+/// spaced are told again after 20 ms.
 const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
@@ -56,8 +56,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 }
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
-    /// The frame that is due for a drive on a bus.
-    pub(super) fn sdo_fallback_frame(&mut self, bus: usize) -> Option<Frame> {
+    /// The frame that is due for a drive on a bus, whatever else may leave there.
+    pub(super) fn fallback_frame(&mut self, bus: usize) -> Option<Frame> {
         if !self.shared.stopped_by_sdo.contains(bus) {
             return None;
         }
@@ -65,7 +65,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let turns = 2 * self.axes.len() as u32;
         let repeat_slots =
             u32::try_from(ANSWER_NS.div_ceil(self.shared.period_ns)).unwrap_or(u32::MAX).max(turns);
-        self.axes_of(bus).find_map(|axis| axis.service_frame(repeat_slots))
+        let is_canopen = self.shared.is_canopen(bus);
+        self.axes_of(bus).find_map(|axis| match is_canopen {
+            true => axis.service_frame(repeat_slots),
+            false => axis.stop_frame(repeat_slots),
+        })
     }
 
     /// Takes a frame that may be a drive's answer.

@@ -75,7 +75,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Takes what another master has told the nodes of a bus.
     fn receive_foreign_nmt(&mut self, bus: usize, frame: &Frame) {
-        let (0, &[command, node]) = (frame.id().value(), frame.payload()) else { return };
+        let (0, &[command, node], true) = (frame.id().value(), frame.payload(), self.shared.is_canopen(bus))
+        else {
+            return;
+        };
         for axis in self.axes_of(bus).filter(|axis| node == 0 || node == axis.parameters().node) {
             axis.receive_foreign_nmt(command);
         }

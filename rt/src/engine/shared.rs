@@ -84,9 +84,8 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     pub(super) fn new(parameters: EngineParameters<AXES, BUSES>) -> Self {
         let (axis_count, bus_count) = (parameters.axes.len() as u8, parameters.buses.len() as u8);
         let group_count = parameters.groups.len().max(1) as u8;
-        let slowest_divider = parameters.buses.iter().map(|bus| bus.divider).max().unwrap_or(1);
         let buses = parameters.buses.len();
-        let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, buses, slowest_divider);
+        let heartbeat = |heartbeat| HeartbeatProducer::new(heartbeat, &parameters.buses);
         let mut places_on = [BitSet::default(); BUSES];
         for (place, number) in parameters.axes_of_groups().flatten().enumerate() {
             let axis = parameters.axes.get(usize::from(number));
@@ -134,6 +133,11 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     /// The axes on a bus, by their places among those of the engine.
     pub(super) fn places_on(&self, bus: usize) -> BitSet {
         self.places_on.get(bus).copied().unwrap_or_default()
+    }
+
+    /// Whether a bus is a CANopen network.
+    pub(super) fn is_canopen(&self, bus: usize) -> bool {
+        self.buses.get(bus).is_some_and(|bus| bus.canopen.is_some())
     }
 
     /// Slots in one cycle of the bus of an axis.

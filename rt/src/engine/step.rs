@@ -258,8 +258,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         // stopped by itself. One that PDOs do not reach is told by SDO.
         let has_stopped_by_itself = |axis: &Axis| {
             let silent_cycles = u32::from(axis.feedback_age()).saturating_mul(self.shared.divider_of(axis));
-            let is_over =
-                self.shared.heartbeat.as_ref().is_some_and(|beat| silent_cycles > beat.timeout_cycles());
+            let bus = axis.parameters().bus.into();
+            let timeout_cycles = self.shared.heartbeat.as_ref().and_then(|beat| beat.timeout_cycles(bus));
+            let is_over = timeout_cycles.is_some_and(|timeout_cycles| silent_cycles > timeout_cycles);
             is_over && !is_on_way && !axis.is_pdo_unreachable()
         };
         // The set-points of a drive that seems to follow go on to rest, though it may have said otherwise by SDO; and

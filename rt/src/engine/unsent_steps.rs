@@ -44,15 +44,9 @@ impl<const BUSES: usize> UnsentSteps<BUSES> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::Id;
 
     fn bus(divider: u32) -> BusParameters {
-        BusParameters {
-            sync_id: Id::canopen(0x080, 0),
-            divider,
-            service_frames_active: 1,
-            service_frames_passive: 1,
-        }
+        BusParameters { canopen: None, divider, service_frames_active: 1, service_frames_passive: 1 }
     }
 
     #[test]

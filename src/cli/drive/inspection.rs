@@ -88,7 +88,7 @@ impl Action {
 impl Read {
     fn task(&self, target: &TargetDrive) -> Result<Task, Failure> {
         let objects = self.objects.iter().map(|text| {
-            Ok(match dictionary::find(target.family, text)? {
+            Ok(match dictionary::find(&target.drive, text)? {
                 SelectedObject::Known(entry) => ReadObject {
                     address: entry.object.address,
                     entry: Some(entry),
@@ -105,7 +105,7 @@ impl Read {
 
 impl Write {
     fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
-        let found = dictionary::find(target.family, &self.object)?;
+        let found = dictionary::find(&target.drive, &self.object)?;
         let (object, entry) = match (found, self.data_type) {
             (SelectedObject::Known(entry), None) => (entry.object, Some(entry)),
             (SelectedObject::Known(entry), Some(data_type)) if data_type == entry.object.data_type => {

@@ -169,7 +169,7 @@ impl Output {
         let printed = Printed {
             axis: &self.target.name,
             node: self.target.node,
-            family: self.target.family.word(),
+            family: self.target.drive.word,
             action: self.action,
             ended,
             step: failed.map(|failed| failed.step),

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use takt::commission::{Family, TargetDrive};
-use takt::config::{Config, Interface, Quantity};
+use takt::commission::TargetDrive;
+use takt::config::{Config, DriveFamily, Interface, Quantity};
+use takt::family;
 
 use super::super::configuration;
 use super::super::usage_error::UsageError;
@@ -25,7 +26,7 @@ pub struct Target {
     node: Option<u8>,
     /// The family: erob-canopen, yz-aim
     #[arg(long, value_name = "FAMILY", global = true, value_parser = family)]
-    family: Option<Family>,
+    family: Option<DriveFamily>,
     /// The bit rate of an interface without a configuration
     #[arg(long, value_name = "RATE", global = true, value_parser = bit_rate, default_value = "1 Mbit/s")]
     bit_rate: u32,
@@ -54,12 +55,11 @@ pub enum Bus {
     },
 }
 
-fn family(text: &str) -> Result<Family, String> {
-    let known = || Family::ALL.map(Family::word).join(", ");
-    Family::ALL
-        .into_iter()
-        .find(|family| family.word() == text)
-        .ok_or_else(|| format!("the families are {}", known()))
+fn family(text: &str) -> Result<DriveFamily, String> {
+    let words = || family::all().iter().map(|family| family.word()).collect::<Vec<_>>().join(", ");
+    family::named(text)
+        .and_then(|family| family.unconfigured())
+        .ok_or_else(|| format!("the families are {}", words()))
 }
 
 impl Target {
@@ -73,7 +73,7 @@ impl Target {
     }
 
     fn of_interface(&self) -> Result<(TargetDrive, Bus), UsageError> {
-        let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, self.family) else {
+        let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, &self.family) else {
             return Err(
                 "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)".into(),
             );
@@ -81,7 +81,7 @@ impl Target {
         let interface = bus.parse::<Interface>();
         match interface {
             Ok(Interface::SocketCan(name)) => {
-                let target = TargetDrive::unconfigured(node, family)
+                let target = TargetDrive::unconfigured(node, family.clone())
                     .map_err(|error| format!("the units cannot be converted ({error:?})"))?;
                 Ok((target, Bus::Interface { name, bit_rate: self.bit_rate }))
             }
@@ -115,8 +115,8 @@ impl Target {
         }
         let mut target = TargetDrive::of(&axis)
             .map_err(|error| format!("axis {}: its units cannot be converted ({error:?})", axis.name))?;
-        if let Some(family) = self.family.filter(|family| *family != target.family) {
-            let (name, configured, other) = (&axis.name, target.family.word(), family.word());
+        if let Some(family) = self.family.as_ref().filter(|family| **family != target.drive) {
+            let (name, configured, other) = (&axis.name, target.drive.word, family.word);
             return Err(format!("the axis {name} is configured as {configured}, not {other}").into());
         }
         // A drive that still has the factory's node ID is addressed by that ID.

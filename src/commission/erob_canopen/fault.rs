@@ -11,7 +11,7 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::erob_canopen::{MULTI_TURN_BATTERY, error_text};
+use crate::family::erob_canopen::{MULTI_TURN_BATTERY, error_text};
 
 /// Controlword bit 7 must stay set for several cycles of the drive.
 const EDGE_NS: Nanoseconds = 50_000_000;

@@ -12,7 +12,7 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::erob_canopen::error_text;
+use crate::family::erob_canopen::error_text;
 use serde_json::json;
 use takt_rt::OperationMode;
 
@@ -37,10 +37,10 @@ async fn identity(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Resul
     ] {
         let value = c.read(&object).await?;
         report.add(key, object.name, value, object.show(value));
-        if object == VENDOR_ID && value != i64::from(s.family.vendor_id()) {
+        if object == VENDOR_ID && s.drive.identity.vendor.is_some_and(|vendor| value != i64::from(vendor)) {
             c.note(format!(
                 "the vendor ID is not that of {}: check that this is the intended drive",
-                s.family.word()
+                s.drive.word
             ));
         }
     }

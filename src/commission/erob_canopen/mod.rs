@@ -19,7 +19,7 @@ use super::target::TargetDrive;
 use super::task::{MoveKind, Task};
 
 /// Carries out a task. AxisReading and writing objects is the same for every family and is done elsewhere.
-pub(super) async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
+pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
     match task {
         Task::Info => info::info(c, s).await,
         Task::Watch { every_ns, duration_ns } => reading::watch(c, s, every_ns, duration_ns).await,

@@ -5,7 +5,7 @@ use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::commission::dictionary::{ObjectEntry, ObjectUnit};
 use crate::commission::target::TargetDrive;
-use crate::drive::erob_canopen::error_words;
+use crate::family::erob_canopen::error_words;
 
 use super::state;
 use takt_rt::{Frame, Id, OperationMode};

@@ -11,9 +11,8 @@ use crate::commission::polling;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::config::DriveFamily;
-use crate::drive::erob_canopen::error_text;
-use crate::drive::error_cure;
+use crate::family::erob_canopen::{FACTS, error_text};
+use crate::family::error_cure;
 use crate::procedure::AxisReading;
 
 /// The rated torque (6076) in N·m; `None` when the drive does not report it.
@@ -75,7 +74,7 @@ pub async fn error_code(c: &SdoSession) -> Result<ErrorCode, Failure> {
 
 /// The cure of an error.
 pub fn cure(code: ErrorCode) -> &'static str {
-    error_cure(Some(DriveFamily::ErobCanopen), code.0)
+    error_cure(Some(FACTS.word), code.0)
 }
 
 /// `watch`

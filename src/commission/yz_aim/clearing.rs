@@ -14,7 +14,7 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::yz_aim::{Alarm, Clearing};
+use crate::family::yz_aim::{Alarm, Clearing};
 
 /// Time until the drive has processed a controlword.
 const CONTROL_NS: Nanoseconds = 20_000_000;

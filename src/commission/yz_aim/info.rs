@@ -32,10 +32,10 @@ async fn identity(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Resul
     ] {
         let value = c.read(&object).await?;
         report.add(key, object.name, value, object.show(value));
-        if object == VENDOR_ID && value != i64::from(s.family.vendor_id()) {
+        if object == VENDOR_ID && s.drive.identity.vendor.is_some_and(|vendor| value != i64::from(vendor)) {
             c.note(format!(
                 "the vendor ID is not that of {}: check that this is the intended drive",
-                s.family.word()
+                s.drive.word
             ));
         }
     }

@@ -116,7 +116,7 @@ pub fn meaning(object: &Object, value: i64) -> Option<String> {
         0x6040 => Some(words::controlword(value as u16)),
         0x6041 => Some(words::statusword(value as u16)),
         0x6060 => words::mode(value).map(str::to_owned),
-        0x260E => Some(crate::drive::yz_aim::Alarm::of(value as u16).to_string()),
+        0x260E => Some(crate::family::yz_aim::Alarm::of(value as u16).to_string()),
         0x2614 => words::save_flag(value).map(str::to_owned),
         0x2619 => Some(words::special_function(value)),
         0x260A => words::gear_key(value).map(str::to_owned),

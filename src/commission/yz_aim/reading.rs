@@ -11,7 +11,7 @@ use crate::commission::polling;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::yz_aim::Alarm;
+use crate::family::yz_aim::Alarm;
 use crate::procedure::AxisReading;
 
 /// The scale of 606C by SDO: 0.1 r/min by the object table, although the manual's example of TPDO3 contradicts it.

@@ -13,7 +13,7 @@ use crate::commission::report::Report;
 use crate::commission::scan;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::yz_aim::Alarm;
+use crate::family::yz_aim::Alarm;
 
 /// Timeout of storing; the manual gives no time.
 const STORING_NS: Nanoseconds = 10_000_000_000;

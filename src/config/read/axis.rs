@@ -13,9 +13,10 @@ use super::section::Section;
 use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
+use crate::config::drive_family::{ConfiguredFamily, DriveFacts, FamilyKeys};
 use crate::config::model::{
-    Axis, DriveFamily, FeedForward, Feedback, Follow, Identity, Interface, Joint, Limits, PdoMapping,
-    PowerUpState, SimulatedJoint, Travel,
+    Axis, FeedForward, Feedback, Follow, Identity, Interface, Joint, Limits, PdoMapping, PowerUpState,
+    SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -24,12 +25,6 @@ use crate::config::ranges;
 use crate::config::rules;
 use crate::config::rules::loops::Surroundings;
 use crate::config::rules::program::AxisView;
-
-/// The families of drives by their words.
-const DRIVES: [(&str, DriveFamily); 2] = [
-    (DriveFamily::ErobCanopen.word(), DriveFamily::ErobCanopen),
-    (DriveFamily::YzAim.word(), DriveFamily::YzAim),
-];
 
 /// An axis as far as it could be read.
 pub struct ReadAxis {
@@ -64,6 +59,8 @@ pub struct Machine<'a> {
     pub buses: &'a [ReadBus<'a>],
     pub cycle_ns: u64,
     pub master_node: u8,
+    /// The families that a drive may be of.
+    pub families: &'a [&'static dyn ConfiguredFamily],
 }
 
 impl Machine<'_> {
@@ -108,9 +105,12 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         check_node(&entry, node, bus, machine, earlier);
         Some(node)
     });
-    let drive = section
+    let families: Vec<_> = machine.families.iter().map(|family| (family.word(), *family)).collect();
+    let family = section
         .require("drive", "the family of the drive: drive = \"erob-canopen\"")
-        .and_then(|entry| entry.choice(&DRIVES));
+        .and_then(|entry| entry.choice(&families));
+    let family_drive = family.and_then(|family| family.read(&mut FamilyKeys::of(&mut section)));
+    let drive = family_drive.as_deref();
     if let Some((drive, bus)) = drive.zip(machine.bus(bus))
         && let Some(spot) = &bus.bit_rate_spot
     {
@@ -142,13 +142,13 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         rules::axis::joint(&modes.all(), &joint, is_simulated, |key| joint_section.spot(key));
     }
     joint_section.finish();
-    if drive == Some(DriveFamily::YzAim) {
+    if let Some(drive) = drive {
         if let (Some(control), Some(period_ns), Some(bus)) = (control, period_ns, machine.bus(bus)) {
-            rules::axis::interpolation_period(&bus.spot, control, period_ns);
+            rules::axis::interpolation_period(&bus.spot, drive, control, period_ns);
         }
         if let (Some(limits), Some(counting)) = (&limits, &counting) {
             let spot = section.section("limits").spot("velocity");
-            rules::axis::motor_speed(&spot, limits, counting, q);
+            rules::axis::motor_speed(&spot, drive, limits, counting, q);
         }
     }
     let mapping = mapping(&mut section, drive);
@@ -180,7 +180,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             name: name.clone()?,
             bus,
             node,
-            drive: drive?,
+            drive: family_drive.clone()?,
             control: modes.control,
             other_modes: modes.others,
             travel,
@@ -254,7 +254,7 @@ fn simulated(
     q: Quantities,
     limits: Option<&Limits>,
     rated_torque: f64,
-    drive: Option<DriveFamily>,
+    drive: Option<&DriveFacts>,
     name: Option<&str>,
 ) -> SimulatedJoint {
     let mut value = |key, quantity, bounds| {
@@ -295,7 +295,7 @@ fn simulated(
     }
 }
 
-fn mapping(section: &mut Section<'_>, drive: Option<DriveFamily>) -> PdoMapping {
+fn mapping(section: &mut Section<'_>, drive: Option<&DriveFacts>) -> PdoMapping {
     let choices = [("written", PdoMapping::Written), ("as-stored", PdoMapping::AsStored)];
     let read = section.get("mapping").and_then(|entry| {
         let mapping = entry.choice(&choices)?;
@@ -307,7 +307,7 @@ fn mapping(section: &mut Section<'_>, drive: Option<DriveFamily>) -> PdoMapping 
     read.unwrap_or(drive.map_or(PdoMapping::Written, defaults::mapping))
 }
 
-fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoMapping) -> Vec<Feedback> {
+fn feedback(section: &mut Section<'_>, drive: Option<&DriveFacts>, mapping: PdoMapping) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
     let Some(entry) = section.get("feedback") else {
         return defaults::feedback(mapping);
@@ -321,7 +321,7 @@ fn feedback(section: &mut Section<'_>, drive: Option<DriveFamily>, mapping: PdoM
     feedback
 }
 
-fn feed_forward(section: &mut Section<'_>, drive: Option<DriveFamily>) -> FeedForward {
+fn feed_forward(section: &mut Section<'_>, drive: Option<&DriveFacts>) -> FeedForward {
     let choices = [
         ("none", FeedForward::None),
         ("velocity", FeedForward::Velocity),
@@ -350,8 +350,8 @@ fn dcf(entry: &Entry<'_>, node: Option<u8>) -> Option<DeviceConfiguration> {
     DeviceConfiguration::load(&path, node?).map_err(|reason| entry.report(ProblemKind::Dcf { reason })).ok()
 }
 
-fn identity(mut section: Section<'_>, drive: Option<DriveFamily>) -> Identity {
-    let default = drive.map_or(Identity::default(), defaults::identity);
+fn identity(mut section: Section<'_>, drive: Option<&DriveFacts>) -> Identity {
+    let default = drive.map_or(Identity::default(), |drive| drive.identity);
     let mut value = |key, default| match section.get(key) {
         None => default,
         Some(entry) if entry.is_word("any") => None,

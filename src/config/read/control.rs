@@ -3,13 +3,13 @@
 use super::section::Section;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Compliance, Control, DriveFamily, Joint};
+use crate::config::drive_family::DriveFacts;
+use crate::config::model::{Compliance, Control, Joint};
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
 use crate::config::rules;
 use crate::config::rules::loops::{self, Origin, Surroundings, TorqueLoop};
-use crate::drive::yz_aim;
 
 /// How an axis is commanded.
 pub struct Modes {
@@ -32,7 +32,7 @@ impl Modes {
 /// Without the surroundings, whose period could not be read, no loop is judged.
 pub fn modes(
     section: &mut Section<'_>,
-    drive: Option<DriveFamily>,
+    drive: Option<&DriveFacts>,
     q: Quantities,
     joint: &Joint,
     surroundings: Option<&Surroundings>,
@@ -54,13 +54,15 @@ pub fn modes(
         ("pt", Some(Control::ProfileTorque)),
     ];
     let control = match (section.get("mode"), drive) {
-        (Some(entry), Some(DriveFamily::YzAim)) => {
-            let is_own = |control: &Option<Control>| control.as_ref().is_some_and(yz_aim::has_mode);
+        (Some(entry), drive) => {
+            // A loop whose gains are wrong has been reported; its mode may be chosen.
+            let is_own = |control: &Option<Control>| {
+                drive.zip(control.as_ref()).is_none_or(|(drive, control)| drive.has_mode(control))
+            };
             let own: Vec<_> = modes.into_iter().filter(|(_, control)| is_own(control)).collect();
             entry.choice(&own).flatten()
         }
-        (Some(entry), _) => entry.choice(&modes).flatten(),
-        (None, drive) => Some(drive.map_or(Control::Position, defaults::control)),
+        (None, drive) => Some(drive.map_or(Control::Position, |drive| drive.usual_mode)),
     };
     let others = others(section, drive, control, &modes);
     for law in control.iter().chain(&others) {
@@ -95,7 +97,7 @@ pub fn modes(
 /// been reported.
 fn others(
     section: &mut Section<'_>,
-    drive: Option<DriveFamily>,
+    drive: Option<&DriveFacts>,
     control: Option<Control>,
     modes: &[(&'static str, Option<Control>)],
 ) -> Vec<Control> {

@@ -3,7 +3,8 @@
 use super::machine::boolean;
 use super::section::Section;
 use crate::config::defaults;
-use crate::config::model::{DriveFamily, Travel};
+use crate::config::drive_family::DriveFacts;
+use crate::config::model::Travel;
 use crate::config::quantities::Counting;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -28,7 +29,7 @@ pub fn travel(section: &mut Section<'_>) -> Option<Travel> {
 /// How positions are counted; `None` where something about it is wrong.
 pub fn counting(
     section: &mut Section<'_>,
-    drive: Option<DriveFamily>,
+    drive: Option<&DriveFacts>,
     travel: Option<Travel>,
 ) -> Option<Counting> {
     let counts_per_turn = section.get("counts_per_turn").map(|entry| entry.number(ranges::COUNTS_PER_TURN));
@@ -38,7 +39,7 @@ pub fn counting(
     let reversed = boolean(section, "reversed", false);
     Some(Counting {
         travel: travel?,
-        counts_per_turn: counts_per_turn.unwrap_or_else(|| drive.map(DriveFamily::counts_per_turn))?,
+        counts_per_turn: counts_per_turn.unwrap_or_else(|| drive.map(|drive| drive.counts_per_turn))?,
         gear_ratio: gear_ratio.unwrap_or(Some(defaults::GEAR_RATIO))?,
         reversed,
         zero_counts: i32::try_from(zero.unwrap_or(Some(0))?).ok()?,

@@ -4,8 +4,9 @@ use takt_rt::{MAX_AXES, OperationMode};
 
 use super::loops::Surroundings;
 use super::{Fields, limits, loops, master, name, simulation};
+use crate::config::drive_family::{DriveFacts, ModeChangeRule};
 use crate::config::model::{
-    Axis, Config, Control, DriveFamily, FeedForward, Feedback, Interface, Joint, Limits, PdoMapping, Travel,
+    Axis, Config, Control, FeedForward, Feedback, Interface, Joint, Limits, PdoMapping, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::{Counting, Quantities};
@@ -13,7 +14,6 @@ use crate::config::quantity::{Quantity, Short};
 use crate::config::ranges;
 use crate::config::spelling;
 use crate::config::spot::Spot;
-use crate::drive::yz_aim;
 use crate::printable::excerpt;
 
 pub fn validate(config: &Config, whole: &Fields<'_>) {
@@ -61,7 +61,7 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
             spot.report(duplicate_node(&bus.name, axis.node));
         }
     }
-    bit_rate(&fields.at("bus.bit_rate"), axis.drive, bus.bit_rate);
+    bit_rate(&fields.at("bus.bit_rate"), &axis.drive, bus.bit_rate);
 }
 
 pub fn unknown_bus(given: &str, known: &[&str]) -> ProblemKind {
@@ -74,19 +74,27 @@ pub fn duplicate_node(bus: &str, node: u8) -> ProblemKind {
     ProblemKind::DuplicateNode { bus: bus.to_owned(), node }
 }
 
-/// An eRob knows one bit rate (eRunner manual, section 1 of the specification), a YZ-AIM four (manual, 5.13).
-pub fn bit_rate(spot: &Spot<'_>, drive: DriveFamily, rate: u32) {
-    let (rates, allowed): (&[u32], _) = match drive {
-        DriveFamily::ErobCanopen => (&[1_000_000], "1 Mbit/s, the one bit rate of the eRobs on this bus"),
-        DriveFamily::YzAim => (
-            &[125_000, 250_000, 500_000, 1_000_000],
-            "125, 250 or 500 kbit/s or 1 Mbit/s, the bit rates of the YZ-AIMs on this bus",
-        ),
+/// A bit rate that the drives on the bus know.
+pub fn bit_rate(spot: &Spot<'_>, drive: &DriveFacts, rate: u32) {
+    if drive.bit_rates.is_empty() || drive.bit_rates.contains(&rate) {
+        return;
+    }
+    let show = |rate: &u32| Quantity::BIT_RATE.show((*rate).into());
+    let allowed = match drive.bit_rates {
+        [only] => format!("{}, the one bit rate of the {}s on this bus", show(only), drive.name),
+        rates => {
+            format!("{}, the bit rates of the {}s on this bus", or_list(rates.iter().map(show)), drive.name)
+        }
     };
-    if !rates.contains(&rate) {
-        let value = Quantity::BIT_RATE.show(rate.into());
-        let key = "bus.bit_rate".to_owned();
-        spot.report(ProblemKind::OutOfRange { key, value, allowed: allowed.to_owned() });
+    spot.report(ProblemKind::OutOfRange { key: "bus.bit_rate".to_owned(), value: show(&rate), allowed });
+}
+
+/// `a, b or c`
+fn or_list(words: impl IntoIterator<Item = String>) -> String {
+    let words: Vec<String> = words.into_iter().collect();
+    match words.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => words.concat(),
     }
 }
 
@@ -111,17 +119,15 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
         q,
         limits,
         &axis.name,
-        axis.drive,
+        &axis.drive,
         &fields.within("simulated"),
     );
 
     let period_ns = config.bus_cycle(axis.bus).period_ns;
-    mode(&fields.at("mode"), axis.drive, axis.control);
-    if axis.drive == DriveFamily::YzAim {
-        interpolation_period(&fields.at("bus.period"), axis.control, period_ns);
-        if let Some(limits) = limits {
-            motor_speed(&fields.at("limits.velocity"), limits, &counting, q);
-        }
+    mode(&fields.at("mode"), &axis.drive, axis.control);
+    interpolation_period(&fields.at("bus.period"), &axis.drive, axis.control, period_ns);
+    if let Some(limits) = limits {
+        motor_speed(&fields.at("limits.velocity"), &axis.drive, limits, &counting, q);
     }
     let is_simulated = config.buses.get(axis.bus).is_some_and(|bus| bus.interface == Interface::Simulated);
     let surroundings =
@@ -198,10 +204,10 @@ fn validate_counting(axis: &Axis, fields: &Fields<'_>) -> bool {
 
 /// What is exchanged with the drive in every cycle, and its heartbeat.
 fn validate_process_data(axis: &Axis, fields: &Fields<'_>) {
-    mapping(&fields.at("mapping"), axis.drive, axis.mapping);
+    mapping(&fields.at("mapping"), &axis.drive, axis.mapping);
     for (index, object) in axis.feedback.iter().enumerate() {
         let earlier = axis.feedback.get(..index).unwrap_or_default();
-        feedback(&fields.at("feedback"), Some(axis.drive), *object, earlier);
+        feedback(&fields.at("feedback"), Some(&axis.drive), *object, earlier);
     }
     transmission_type(&fields.at("transmission_type"), axis.transmission_type);
     let missed = fields.at("missed_feedback_cycles");
@@ -212,13 +218,26 @@ fn validate_process_data(axis: &Axis, fields: &Fields<'_>) {
     }
 }
 
-/// A mode that drives of the family know.
-fn mode(spot: &Spot<'_>, drive: DriveFamily, control: Control) {
-    if drive == DriveFamily::YzAim && !yz_aim::has_mode(&control) {
-        let allowed = "a mode of YZ-AIM drives: \"ip\", \"pp\" or \"pv\"".to_owned();
+/// A mode that the drive has.
+fn mode(spot: &Spot<'_>, drive: &DriveFacts, control: Control) {
+    if !drive.has_mode(&control) {
+        let words = MODES.iter().filter(|(_, mode)| drive.modes.contains(*mode));
+        let words = or_list(words.map(|(word, _)| format!("\"{word}\"")));
+        let allowed = format!("a mode of {} drives: {words}", drive.name);
         spot.report_range(format!("{:?}", control.operation_mode()), allowed);
     }
 }
+
+/// The modes that an axis may have, by their words.
+const MODES: [(&str, OperationMode); 7] = [
+    ("csp", OperationMode::CyclicSynchronousPosition),
+    ("csv", OperationMode::CyclicSynchronousVelocity),
+    ("cst", OperationMode::CyclicSynchronousTorque),
+    ("ip", OperationMode::InterpolatedPosition),
+    ("pp", OperationMode::ProfilePosition),
+    ("pv", OperationMode::ProfileVelocity),
+    ("pt", OperationMode::ProfileTorque),
+];
 
 /// The modes that an axis may be changed to at run time, by their words.
 pub const CHANGEABLE_MODES: [(&str, OperationMode); 3] = [
@@ -228,7 +247,7 @@ pub const CHANGEABLE_MODES: [(&str, OperationMode); 3] = [
 ];
 
 fn validate_other_modes(axis: &Axis, spot: &Spot<'_>) {
-    if axis.other_modes.is_empty() || !has_other_modes(spot, axis.drive, axis.control) {
+    if axis.other_modes.is_empty() || !has_other_modes(spot, &axis.drive, axis.control) {
         return;
     }
     let mut seen = vec![axis.control.operation_mode()];
@@ -244,17 +263,18 @@ fn validate_other_modes(axis: &Axis, spot: &Spot<'_>) {
 }
 
 /// Whether a drive that starts like this can be changed to other modes; reports it if not.
-pub fn has_other_modes(spot: &Spot<'_>, drive: DriveFamily, control: Control) -> bool {
-    let (given, allowed) = if drive.mode_condition().is_none() {
-        let given = "given for a YZ-AIM";
-        (given, "left out: no object 6061 shows its mode, and it interpolates only with 2619h = 7 stored")
-    } else if !control.is_cyclic_synchronous() {
-        let given = "given for an axis in another mode than \"csp\", \"csv\" or \"cst\"";
-        (given, "left out, or `mode` one of them: only they change without a bump")
-    } else {
-        return true;
+pub fn has_other_modes(spot: &Spot<'_>, drive: &DriveFacts, control: Control) -> bool {
+    let (given, allowed) = match drive.mode_changes {
+        ModeChangeRule::Never { because } => {
+            (format!("given for a {}", drive.name), format!("left out: {because}"))
+        }
+        ModeChangeRule::When(_) if control.is_cyclic_synchronous() => return true,
+        ModeChangeRule::When(_) => (
+            "given for an axis in another mode than \"csp\", \"csv\" or \"cst\"".to_owned(),
+            "left out, or `mode` one of them: only they change without a bump".to_owned(),
+        ),
     };
-    spot.report_range(given.to_owned(), allowed.to_owned());
+    spot.report_range(given, allowed);
     false
 }
 
@@ -263,48 +283,56 @@ pub fn repeated_mode(spot: &Spot<'_>, mode: OperationMode) {
     spot.report(ProblemKind::Repeated { key: spot.key.clone(), given: word.to_owned() });
 }
 
-/// A YZ-AIM interpolates from target to target in 2 ms (manual, 5.10.3).
-pub fn interpolation_period(spot: &Spot<'_>, control: Control, period_ns: u64) {
-    if control == Control::Interpolated && period_ns != yz_aim::INTERPOLATION_PERIOD_NS {
-        let (key, value) = ("bus.period".to_owned(), Quantity::DURATION.show(period_ns as f64 / 1e9));
-        let allowed = "2 ms, the period of a YZ-AIM that interpolates: period = \"2 ms\"".to_owned();
+/// The period in which the drive interpolates from target to target, where it has only one.
+pub fn interpolation_period(spot: &Spot<'_>, drive: &DriveFacts, control: Control, period_ns: u64) {
+    if let Some(only_ns) = drive.interpolation_period_ns
+        && control == Control::Interpolated
+        && period_ns != only_ns
+    {
+        let show = |ns: u64| Quantity::DURATION.show(ns as f64 / 1e9);
+        let (key, value, only) = ("bus.period".to_owned(), show(period_ns), show(only_ns));
+        let allowed =
+            format!("{only}, the period of a {} that interpolates: period = \"{only}\"", drive.name);
         spot.report(ProblemKind::OutOfRange { key, value, allowed });
     }
 }
 
-/// Objects 6081 and 60FF of a YZ-AIM end at 3000 r/min of the motor.
-pub fn motor_speed(spot: &Spot<'_>, limits: &Limits, counting: &Counting, q: Quantities) {
-    let highest = yz_aim::HIGHEST_SPEED_RPM / 60.0 / counting.turns_per_unit();
+/// The highest speed that objects 6081 and 60FF of the drive can hold.
+pub fn motor_speed(spot: &Spot<'_>, drive: &DriveFacts, limits: &Limits, counting: &Counting, q: Quantities) {
+    let Some(highest_rpm) = drive.highest_speed_rpm else { return };
+    let highest = highest_rpm / 60.0 / counting.turns_per_unit();
     if limits.velocity > highest * (1.0 + 1e-9) {
-        let allowed = format!("at most {}, 3000 r/min of the motor", q.velocity.show(highest));
+        let allowed = format!("at most {}, {highest_rpm} r/min of the motor", q.velocity.show(highest));
         spot.report_range(q.velocity.show(limits.velocity), allowed);
     }
 }
 
-pub fn mapping(spot: &Spot<'_>, drive: DriveFamily, mapping: PdoMapping) {
-    if drive == DriveFamily::YzAim && mapping == PdoMapping::Written {
-        let allowed = "as-stored, since the PDOs of a YZ-AIM are fixed".to_owned();
-        spot.report_range("written".to_owned(), allowed);
+pub fn mapping(spot: &Spot<'_>, drive: &DriveFacts, mapping: PdoMapping) {
+    if drive.has_fixed_process_data && mapping == PdoMapping::Written {
+        spot.report_range("written".to_owned(), format!("as-stored, {}", since_fixed(drive)));
     }
 }
 
-pub fn feedback(spot: &Spot<'_>, drive: Option<DriveFamily>, object: Feedback, earlier: &[Feedback]) {
+fn since_fixed(drive: &DriveFacts) -> String {
+    format!("since the PDOs of a {} are fixed", drive.name)
+}
+
+pub fn feedback(spot: &Spot<'_>, drive: Option<&DriveFacts>, object: Feedback, earlier: &[Feedback]) {
     let given = object.word().to_owned();
-    if drive == Some(DriveFamily::YzAim) {
-        spot.report_range(given.clone(), "nothing, since the PDOs of a YZ-AIM are fixed".to_owned());
+    if let Some(drive) = drive.filter(|drive| drive.has_fixed_process_data) {
+        spot.report_range(given.clone(), format!("nothing, {}", since_fixed(drive)));
     }
     if earlier.contains(&object) {
         spot.report(ProblemKind::Repeated { key: spot.key.clone(), given });
     }
 }
 
-/// The PDOs of a YZ-AIM have no room for anything beside the target.
-pub fn feed_forward(spot: &Spot<'_>, drive: Option<DriveFamily>, feed_forward: FeedForward) {
-    if drive == Some(DriveFamily::YzAim) && feed_forward != FeedForward::None {
-        spot.report_range(
-            "an offset".to_owned(),
-            "\"none\", since the PDOs of a YZ-AIM are fixed".to_owned(),
-        );
+/// Fixed PDOs have no room for anything beside the target.
+pub fn feed_forward(spot: &Spot<'_>, drive: Option<&DriveFacts>, feed_forward: FeedForward) {
+    if let Some(drive) =
+        drive.filter(|drive| drive.has_fixed_process_data && feed_forward != FeedForward::None)
+    {
+        spot.report_range("an offset".to_owned(), format!("\"none\", {}", since_fixed(drive)));
     }
 }
 

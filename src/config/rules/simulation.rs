@@ -5,7 +5,8 @@ use std::ops::RangeInclusive;
 use super::Fields;
 use super::limits::contains;
 use crate::config::bounds::Bounds;
-use crate::config::model::{DriveFamily, Limits, PowerUpState, SimulatedJoint, Simulation};
+use crate::config::drive_family::DriveFacts;
+use crate::config::model::{Limits, PowerUpState, SimulatedJoint, Simulation};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
 use crate::config::ranges;
@@ -27,7 +28,7 @@ pub fn validate_joint(
     q: Quantities,
     limits: Option<&Limits>,
     axis: &str,
-    drive: DriveFamily,
+    drive: &DriveFacts,
     fields: &Fields<'_>,
 ) {
     fields.at("gravity").quantity(joint.gravity, q.effort, q.ranges.friction);
@@ -36,13 +37,13 @@ pub fn validate_joint(
     power_up(&fields.at("power_up"), drive, joint.power_up);
 }
 
-/// Only a YZ-AIM may power up operational: the manual of the eRob says that it is pre-operational.
-pub fn power_up(spot: &Spot<'_>, drive: DriveFamily, power_up: PowerUpState) {
-    if power_up == PowerUpState::Operational && drive != DriveFamily::YzAim {
+/// Some families may power up operational, where their manuals do not say how they do.
+pub fn power_up(spot: &Spot<'_>, drive: &DriveFacts, power_up: PowerUpState) {
+    if power_up == PowerUpState::Operational && !drive.may_power_up_operational {
         spot.report(ProblemKind::OutOfRange {
             key: spot.key.clone(),
             value: "\"operational\"".to_owned(),
-            allowed: "\"pre-operational\"; only a YZ-AIM may power up operational".to_owned(),
+            allowed: format!("\"pre-operational\", as a drive of the family {} powers up", drive.name),
         });
     }
 }

@@ -21,8 +21,8 @@ use super::messages::{self, MessageType};
 use super::recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
-use crate::bus::trace::TracedHealth;
-use crate::config::DriveFamily;
+use crate::family;
+use crate::link::trace::TracedHealth;
 use crate::printable::printable;
 use records::Record;
 
@@ -342,7 +342,7 @@ impl Decoder {
                     name: name(text("name")),
                     bus: metadata.get("bus").map(|bus| name(bus)),
                     group: text("group").parse().unwrap_or(0),
-                    family: DriveFamily::ALL.into_iter().find(|family| family.word() == text("drive")),
+                    family: family::named(text("drive")).map(|family| family.word().to_owned()),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
                     // Recordings of earlier versions do not have it.
                     plans_own_profile: text("plans_own_profile") == "true",

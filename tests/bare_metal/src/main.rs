@@ -6,8 +6,8 @@
 use core::f64::consts::TAU;
 
 use takt_rt::{
-    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CommandPdo, ControlLaw, CycleInput,
-    CycleTiming, Deadline, Dialect, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
+    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CanopenNetwork, Cia402Codec, CommandPdo, ControlLaw, CycleInput,
+    CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
     HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope,
     RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
 };
@@ -66,7 +66,7 @@ fn axis() -> Option<AxisParameters> {
             .into_iter()
             .collect(),
         feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
-        dialect: Dialect::Cia402,
+        codec: Cia402Codec::default(),
         controlword_spacing_cycles: 0,
         feedback_since: FeedbackSince::Sync,
         unused: Default::default(),
@@ -95,7 +95,7 @@ fn axis() -> Option<AxisParameters> {
 
 fn cycles() -> Option<Phase> {
     let bus = BusParameters {
-        sync_id: Id::canopen(0x080, 0),
+        canopen: Some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
         divider: 1,
         service_frames_active: 1,
         service_frames_passive: 6,

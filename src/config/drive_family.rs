@@ -1,0 +1,280 @@
+//! A family of drives, as far as a configuration, the schedule and the engine need to know it: facts, as data.
+//!
+//! The facts of each family stand in its own folder (`src/family/<name>`). A family whose drives differ, each described by a file,
+//! makes the facts of a drive when it reads the configuration.
+
+use std::any::Any;
+use std::fmt;
+use std::ops::Deref;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use takt_rt::{Cia402Codec, ModeCondition, OperationMode};
+
+use super::model::{Control, Identity};
+use super::read::section::Section;
+
+/// A family of drives: the word for it in a configuration, and what is known of its drives.
+#[derive(Clone)]
+pub struct DriveFamily {
+    facts: Facts,
+}
+
+#[derive(Clone)]
+enum Facts {
+    /// Every drive of the family is alike.
+    OfFamily(&'static DriveFacts),
+    /// They were read from the description of one drive, which the family keeps beside them.
+    OfDrive(Arc<Described>),
+}
+
+struct Described {
+    facts: DriveFacts,
+    description: Box<dyn Any + Send + Sync>,
+}
+
+/// What is known of the drives of a family.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DriveFacts {
+    /// The word for the family in a configuration.
+    pub word: &'static str,
+    /// What people call such a drive.
+    pub name: &'static str,
+    /// What the drives say of themselves. `None` accepts anything.
+    pub identity: Identity,
+    /// Counts of one turn of the position that the drives report.
+    pub counts_per_turn: f64,
+    /// The unit of velocities (objects 606C, 60FF, 6081).
+    pub velocity_unit: VelocityUnit,
+    /// The modes that the drives have.
+    pub modes: ModeSet,
+    /// The mode where a configuration names none.
+    pub usual_mode: Control,
+    /// Whether they take another mode at run time.
+    pub mode_changes: ModeChangeRule,
+    /// The only period of interpolated position mode, where there is only one.
+    pub interpolation_period_ns: Option<u64>,
+    /// The highest speed that objects 60FF and 6081 can hold, in r/min of the reported position.
+    pub highest_speed_rpm: Option<f64>,
+    /// The bit rates that the drives know. Empty: any.
+    pub bit_rates: &'static [u32],
+    /// Whether the controller can map their PDOs.
+    pub has_fixed_process_data: bool,
+    /// Whether the drives can be told to answer set-points alone, and not SYNC (`answers_sync`).
+    pub may_ignore_sync: bool,
+    /// Whether the drives have emergency objects.
+    pub sends_emergencies: bool,
+    /// Whether the drives may be operational after power-up, without an NMT command.
+    pub may_power_up_operational: bool,
+    /// How they use controlword and statusword.
+    pub codec: Cia402Codec,
+    /// The pause that they need between two controlwords.
+    pub controlword_spacing_ns: u64,
+    /// What is plausible for such a drive.
+    pub plausible: Plausible,
+}
+
+/// Modes of operation, a bit for each as in object 6502.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ModeSet(pub u32);
+
+impl ModeSet {
+    /// These modes.
+    pub const fn of(modes: &[OperationMode]) -> Self {
+        let (mut bits, mut at) = (0, 0);
+        while at < modes.len() {
+            bits |= 1 << (modes[at] as u32 - 1);
+            at += 1;
+        }
+        Self(bits)
+    }
+
+    /// Whether the mode is one of them.
+    pub const fn contains(self, mode: OperationMode) -> bool {
+        self.0 >> (mode as u32 - 1) & 1 == 1
+    }
+}
+
+/// The unit of a drive's velocities.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VelocityUnit {
+    /// Counts of the reported position in a second.
+    CountsPerSecond,
+    /// r/min of the reported position.
+    RevolutionsPerMinute,
+    /// So many units are one turn of the reported position in a second.
+    PerTurn(f64),
+}
+
+impl VelocityUnit {
+    /// What the drive calls a speed of one turn of its position in a second.
+    pub const fn units_per_turn(self, counts_per_turn: f64) -> f64 {
+        match self {
+            Self::CountsPerSecond => counts_per_turn,
+            Self::RevolutionsPerMinute => 60.0,
+            Self::PerTurn(units) => units,
+        }
+    }
+}
+
+/// Whether drives take another mode at run time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModeChangeRule {
+    /// They do, under this condition.
+    When(ModeCondition),
+    /// They do not.
+    Never {
+        /// Why.
+        because: &'static str,
+    },
+}
+
+impl ModeChangeRule {
+    /// When drives take another mode; `None` if they never do.
+    pub const fn condition(self) -> Option<ModeCondition> {
+        match self {
+            Self::When(condition) => Some(condition),
+            Self::Never { .. } => None,
+        }
+    }
+}
+
+/// What is plausible for a drive of a family. What is not is possible, and warned of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plausible {
+    /// The fastest that drives of the family turn, in turns per second of the position that they report.
+    pub fastest_turns_per_s: f64,
+    /// The fastest that the joint of a drive without a further transmission usually turns: rad/s.
+    pub usual_velocity: f64,
+    /// The ratios of the gears inside the drives, from this one on, where the drives report turns of the output behind that
+    /// gear.
+    pub inner_gear_from: Option<f64>,
+}
+
+impl Plausible {
+    /// Nothing is known.
+    pub const ANYTHING: Self =
+        Self { fastest_turns_per_s: f64::INFINITY, usual_velocity: f64::INFINITY, inner_gear_from: None };
+}
+
+impl DriveFacts {
+    /// A family that keeps to CiA 402, without a mark of its own: every mode, free process data, counts per second.
+    pub const fn standard(word: &'static str, name: &'static str) -> Self {
+        Self {
+            word,
+            name,
+            identity: Identity { device_type: None, vendor: None, product: None, revision: None },
+            counts_per_turn: 65_536.0,
+            velocity_unit: VelocityUnit::CountsPerSecond,
+            modes: ModeSet::of(&OperationMode::ALL),
+            usual_mode: Control::Position,
+            mode_changes: ModeChangeRule::When(ModeCondition::Disabled),
+            interpolation_period_ns: None,
+            highest_speed_rpm: None,
+            bit_rates: &[],
+            has_fixed_process_data: false,
+            may_ignore_sync: false,
+            sends_emergencies: true,
+            may_power_up_operational: false,
+            codec: Cia402Codec::STANDARD,
+            controlword_spacing_ns: 0,
+            plausible: Plausible::ANYTHING,
+        }
+    }
+
+    /// Whether the drives have the mode.
+    pub fn has_mode(&self, control: &Control) -> bool {
+        self.modes.contains(control.operation_mode())
+    }
+
+    /// What the drives call a speed of one turn of their position in a second.
+    pub const fn velocity_units_per_turn(&self, counts_per_turn: f64) -> f64 {
+        self.velocity_unit.units_per_turn(counts_per_turn)
+    }
+}
+
+impl DriveFamily {
+    /// A family whose drives are all alike.
+    pub const fn of_family(facts: &'static DriveFacts) -> Self {
+        Self { facts: Facts::OfFamily(facts) }
+    }
+
+    /// One drive of a family, with the facts that its description gives. The family finds the description again by
+    /// [`description`](Self::description).
+    pub fn of_drive(facts: DriveFacts, description: impl Any + Send + Sync) -> Self {
+        Self { facts: Facts::OfDrive(Arc::new(Described { facts, description: Box::new(description) })) }
+    }
+
+    /// What the family has read of this drive, if it has read anything, and it is of this type.
+    pub fn description<T: Any>(&self) -> Option<&T> {
+        match &self.facts {
+            Facts::OfFamily(_) => None,
+            Facts::OfDrive(drive) => drive.description.downcast_ref(),
+        }
+    }
+}
+
+impl Deref for DriveFamily {
+    type Target = DriveFacts;
+
+    fn deref(&self) -> &DriveFacts {
+        match &self.facts {
+            Facts::OfFamily(facts) => facts,
+            Facts::OfDrive(drive) => &drive.facts,
+        }
+    }
+}
+
+impl PartialEq for DriveFamily {
+    /// Whether they are drives of one family that look alike to a configuration.
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl fmt::Debug for DriveFamily {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.word)
+    }
+}
+
+/// A family as the reader of configurations knows it.
+pub trait ConfiguredFamily: Sync {
+    /// The word for it: `drive = "WORD"`.
+    fn word(&self) -> &'static str;
+
+    /// The drive of an axis. A family with keys of its own reads them here; what is wrong with them is reported to `keys`, and
+    /// the answer is `None`.
+    fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily>;
+}
+
+/// The table of an axis, for the keys that belong to the family of its drive.
+pub struct FamilyKeys<'s, 'a> {
+    section: &'s mut Section<'a>,
+}
+
+impl<'s, 'a> FamilyKeys<'s, 'a> {
+    pub(super) fn of(section: &'s mut Section<'a>) -> Self {
+        Self { section }
+    }
+
+    /// A file that the key names, relative to the configuration. `None` if the key is not there, or is no text.
+    pub fn path(&mut self, key: &'static str) -> Option<PathBuf> {
+        self.section.get(key).and_then(|entry| entry.path_from_file())
+    }
+
+    /// A text. `None` if the key is not there, or is something else, which is reported.
+    pub fn text(&mut self, key: &'static str) -> Option<String> {
+        self.section.get(key).and_then(|entry| entry.text().map(str::to_owned))
+    }
+
+    /// Reports that the key, for which `says` tells what it is, is missing, unless it is there.
+    pub fn require(&mut self, key: &'static str, says: &'static str) {
+        self.section.require(key, says);
+    }
+
+    /// Reports what is wrong with the value of a key.
+    pub fn refuse(&mut self, key: &'static str, given: impl Into<String>, allowed: impl Into<String>) {
+        self.section.spot(key).report_range(given.into(), allowed.into());
+    }
+}

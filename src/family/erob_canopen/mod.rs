@@ -1,0 +1,116 @@
+//! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and field experience).
+
+mod bring_up;
+mod errors;
+mod facts;
+
+pub use errors::{MULTI_TURN_BATTERY, error_text, error_words};
+pub use facts::FACTS;
+
+use takt_rt::{Frame, Id};
+
+use super::{CarryingOut, Family, OtherProtocol, SettingUp};
+use crate::canopen::emcy::ErrorCode;
+use crate::canopen::object::Object;
+use crate::commission::dictionary::ObjectEntry;
+use crate::commission::{SdoSession, TargetDrive, Task, erob_canopen as commissioning};
+use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys, PdoMapping};
+use crate::drive::{AxisSession, ProcessData};
+use crate::sim::Drive;
+use crate::sim::erob::{ErobJoint, ErobParameters};
+
+/// The family.
+#[derive(Clone, Copy, Debug)]
+pub struct ErobCanopen;
+
+impl ConfiguredFamily for ErobCanopen {
+    fn word(&self) -> &'static str {
+        FACTS.word
+    }
+
+    fn read(&self, _: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
+        Some(super::EROB_CANOPEN)
+    }
+}
+
+impl Family for ErobCanopen {
+    fn unconfigured(&self) -> Option<DriveFamily> {
+        Some(super::EROB_CANOPEN)
+    }
+
+    fn process_data(&self, axis: &Axis) -> ProcessData {
+        let written = ProcessData::mapped_freely(axis);
+        if axis.mapping == PdoMapping::AsStored { written.padded() } else { written }
+    }
+
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::configure(c))
+    }
+
+    fn start<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::start(c))
+    }
+
+    fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::shut_down(c))
+    }
+
+    /// The vendor's own protocol of firmware without CANopen. The request 0x0002 reads the position and changes nothing.
+    /// Above node ID 63 its identifiers are those of other nodes' SDO.
+    fn other_protocol(&self, node: u8) -> Option<OtherProtocol> {
+        let name = "vendor's custom CAN protocol";
+        let id = |base: u32| Id::base(base + u32::from(node)).ok();
+        let (request, answer) = (id(0x640)?, id(0x5C0)?);
+        (1..=63).contains(&node).then(|| OtherProtocol {
+            name,
+            request: Frame::of(request, [0x00, 0x02]),
+            answer,
+        })
+    }
+
+    fn error_words(&self, code: u16) -> String {
+        error_text(ErrorCode(code))
+    }
+
+    fn error_cure(&self, code: u16) -> Option<&'static str> {
+        errors::error_advice(ErrorCode(code))
+    }
+
+    fn objects(&self) -> &'static [ObjectEntry] {
+        commissioning::OBJECTS
+    }
+
+    fn meaning(&self, object: &Object, value: i64) -> Option<String> {
+        commissioning::meaning(object, value)
+    }
+
+    fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {
+        commissioning::process_data_words(target, frame)
+    }
+
+    fn carry_out<'a>(
+        &'a self,
+        session: &'a SdoSession,
+        target: &'a TargetDrive,
+        task: Task,
+    ) -> CarryingOut<'a> {
+        Box::pin(commissioning::carry_out(session, target, task))
+    }
+
+    fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
+        Box::new(ErobJoint::new(ErobParameters::of(axis, &config.simulation)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_probe_in_the_vendors_protocol_reads_the_position_and_uses_no_other_nodes_identifiers() {
+        let request = ErobCanopen.other_protocol(2).unwrap();
+        assert_eq!(format!("{:?}", request.request), "642#0002");
+        assert_eq!(request.answer.value(), 0x5C2);
+        assert_eq!(ErobCanopen.other_protocol(64), None);
+    }
+}

@@ -1,0 +1,156 @@
+//! One folder a family of drives: everything that takt knows of it outside the cycle.
+//!
+//! A family is a [`Family`]: its facts, its process data, its bring-up and its shutdown, the identifiers that it uses, the words for
+//! its errors, and the drive that simulates it. Nothing outside its folder and `sim/` says its name. [`register`] adds a family
+//! of your own, so that configurations may name it.
+
+pub mod erob_canopen;
+mod error_words;
+mod registry;
+mod simulated_bus;
+mod warning;
+pub mod yz_aim;
+
+use std::pin::Pin;
+
+use takt_rt::{Frame, Id};
+
+pub use error_words::{error_cure, error_words};
+pub use registry::{NameTaken, all, named, of, register};
+pub use simulated_bus::simulated_drives;
+pub use warning::{Warning, WarningKind, is_rounded};
+
+use crate::canopen::emcy::ErrorCode;
+use crate::canopen::object::Object;
+use crate::commission::dictionary::ObjectEntry;
+use crate::commission::{Failure, Report, SdoQuirks, SdoSession, TargetDrive, Task};
+use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily};
+use crate::drive::{AxisSession, ProcessData, StepResult};
+use crate::sim::Drive;
+
+/// ZeroErr eRob with CANopen firmware.
+pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACTS);
+/// YZ-AIM integrated servo, CANopen edition.
+pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
+
+/// A task of commissioning that is under way.
+pub type CarryingOut<'a> = Pin<Box<dyn Future<Output = Result<Report, Failure>> + 'a>>;
+
+/// A part of bring-up or shutdown that is under way.
+pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + 'a>>;
+
+/// What takt needs to know of a family of drives, beside the facts that a configuration reads.
+pub trait Family: ConfiguredFamily {
+    /// A drive without a configuration; `None` where the family knows nothing of a drive without one.
+    fn unconfigured(&self) -> Option<DriveFamily>;
+
+    /// The process data of an axis. A drive whose own mapping is used tells it at bring-up; until then this has as many PDOs as a
+    /// written mapping, each of full length.
+    fn process_data(&self, axis: &Axis) -> ProcessData {
+        ProcessData::mapped_freely(axis)
+    }
+
+    /// How the PDOs that a drive reports are matched with those that its axis needs.
+    fn mapping_match(&self) -> MappingMatch {
+        MappingMatch::ByContent
+    }
+
+    /// From any state to NMT pre-operational, configured, without torque.
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
+
+    /// From configured to operational.
+    fn start<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
+
+    /// From operational to pre-operational, without torque, and without the watchdog on the controller's heartbeat.
+    fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
+
+    /// The protocol that a drive with this node ID may speak instead, if it can be probed for.
+    fn other_protocol(&self, _node: u8) -> Option<OtherProtocol> {
+        None
+    }
+
+    /// An error code of a drive in words.
+    fn error_words(&self, code: u16) -> String {
+        ErrorCode(code).to_string()
+    }
+
+    /// What clears a fault with this code, where the family knows more than the standard.
+    fn error_cure(&self, _code: u16) -> Option<&'static str> {
+        None
+    }
+
+    /// Timing and quirks of the SDO server.
+    fn sdo_quirks(&self) -> SdoQuirks {
+        SdoQuirks::standard()
+    }
+
+    /// The objects that commissioning knows by name.
+    fn objects(&self) -> &'static [ObjectEntry] {
+        &[]
+    }
+
+    /// The meaning of an object's value in words, if it has one beyond its number.
+    fn meaning(&self, _object: &Object, _value: i64) -> Option<String> {
+        None
+    }
+
+    /// The contents of a PDO in words, if they are known.
+    fn process_data_words(&self, _target: &TargetDrive, _frame: &Frame) -> Option<String> {
+        None
+    }
+
+    /// Carries out a task of commissioning, other than reading and writing objects, which are the same for every family.
+    fn carry_out<'a>(
+        &'a self,
+        session: &'a SdoSession,
+        target: &'a TargetDrive,
+        task: Task,
+    ) -> CarryingOut<'a>;
+
+    /// The drive that stands in for an axis on a simulated bus.
+    fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive>;
+}
+
+/// How the PDOs that a drive reports are matched with those that its axis needs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MappingMatch {
+    /// Any PDO may carry an object.
+    ByContent,
+    /// Each PDO has its purpose by its number.
+    ByNumber,
+}
+
+/// A protocol of the vendor that a drive may speak instead of CANopen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OtherProtocol {
+    /// Its name.
+    pub name: &'static str,
+    /// A request that changes nothing in the drive.
+    pub request: Frame,
+    /// The identifier of the reply.
+    pub answer: Id,
+}
+
+/// Every identifier between a drive and its master: those that CANopen gives to its node (CiA 301, 7.3.3), and those of
+/// the vendor's own protocol.
+pub fn identifiers(family: &DriveFamily, node: u8) -> Vec<Id> {
+    let canopen = (1..=0xE).map(|function| Id::canopen(function << 7, node));
+    let other = of(family).other_protocol(node);
+    canopen.chain(other.into_iter().flat_map(|other| [other.request.id(), other.answer])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_family_uses_the_identifiers_of_its_own_protocol_beside_those_of_canopen() {
+        let erob = identifiers(&EROB_CANOPEN, 2);
+        for id in [0x082, 0x182, 0x202, 0x582, 0x602, 0x642, 0x5C2, 0x702] {
+            assert!(erob.contains(&Id::base(id).unwrap()), "{id:03X}");
+        }
+        let yz_aim = identifiers(&YZ_AIM, 2);
+        assert!(yz_aim.contains(&Id::base(0x582).unwrap()) && !yz_aim.contains(&Id::base(0x642).unwrap()));
+        assert_eq!(identifiers(&EROB_CANOPEN, 64).len(), 14, "there they are those of other nodes");
+    }
+}

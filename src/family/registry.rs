@@ -1,0 +1,51 @@
+//! The families that configurations may name.
+
+use std::sync::{PoisonError, RwLock};
+
+use super::{Family, erob_canopen, yz_aim};
+use crate::config::DriveFamily;
+
+/// The families that come with takt.
+static SHIPPED: [&dyn Family; 2] = [&erob_canopen::ErobCanopen, &yz_aim::YzAim];
+/// Those of the program that embeds takt.
+static REGISTERED: RwLock<Vec<&dyn Family>> = RwLock::new(vec![]);
+
+/// A family has a name that another one has already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("there is a family \"{word}\" already")]
+pub struct NameTaken {
+    /// The name.
+    pub word: &'static str,
+}
+
+/// Adds a family, so that configurations which are read after this may name it.
+///
+/// # Errors
+/// There is a family of this name already.
+pub fn register(family: &'static dyn Family) -> Result<(), NameTaken> {
+    let mut registered = REGISTERED.write().unwrap_or_else(PoisonError::into_inner);
+    let word = family.word();
+    if SHIPPED.iter().chain(registered.iter()).any(|other| other.word() == word) {
+        return Err(NameTaken { word });
+    }
+    registered.push(family);
+    Ok(())
+}
+
+/// Every family, those that come with takt first.
+pub fn all() -> Vec<&'static dyn Family> {
+    let registered = REGISTERED.read().unwrap_or_else(PoisonError::into_inner);
+    SHIPPED.iter().chain(registered.iter()).copied().collect()
+}
+
+/// The family with this word.
+pub fn named(word: &str) -> Option<&'static dyn Family> {
+    all().into_iter().find(|family| family.word() == word)
+}
+
+/// What takt knows of a family. One that nobody has registered is treated as the first: [`Config::validate`] refuses it.
+///
+/// [`Config::validate`]: crate::config::Config::validate
+pub fn of(drive: &DriveFamily) -> &'static dyn Family {
+    named(drive.word).unwrap_or(SHIPPED[0])
+}

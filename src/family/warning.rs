@@ -1,0 +1,202 @@
+//! What a configuration may say and hardly means: values that are possible, and that a person has most likely mistaken or
+//! would miss.
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+use crate::canopen::object::ObjectAddress;
+use crate::config::quantities::{Counting, Quantities};
+use crate::config::quantity::Short;
+use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Travel};
+use crate::drive;
+
+/// A rotary axis that goes round more often than this is unusual.
+const USUAL_TURNS: f64 = 2.0;
+/// A drive that rounds a velocity by less than this share runs as commanded.
+const ROUNDING: f64 = 0.01;
+
+/// A value that is possible, and implausible for its drive or joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Warning {
+    /// The name of the axis.
+    pub axis: String,
+    /// What is implausible.
+    pub kind: WarningKind,
+}
+
+/// What is implausible.
+#[derive(Clone, Debug, PartialEq)]
+pub enum WarningKind {
+    /// At its velocity limit the drive turns faster than drives of its family do.
+    DriveSpeed {
+        /// Turns per second of the position that the drive reports.
+        turns_per_s: f64,
+        /// The fastest that drives of its family turn.
+        fastest: f64,
+        /// `gear_ratio`
+        gear_ratio: f64,
+        /// Whether the drive reports turns of its output, behind its own gear.
+        counts_output: bool,
+    },
+    /// A gear ratio as of the gear inside the drive, whose counts are behind that gear already.
+    GearInDrive {
+        /// `gear_ratio`
+        gear_ratio: f64,
+    },
+    /// The range of positions is more than two turns.
+    Range {
+        /// Turns of the joint.
+        turns: f64,
+        /// The limits, where they look like degrees.
+        degrees: Option<[f64; 2]>,
+    },
+    /// A velocity limit in rad/s that looks like one in deg/s.
+    VelocityInDegrees {
+        /// The limit.
+        velocity: f64,
+    },
+    /// A value of the configuration file that bring-up overwrites, because the controller needs another one.
+    Overwritten {
+        /// The object.
+        object: ObjectAddress,
+    },
+    /// A velocity of a program that the drive cannot have exactly.
+    RoundedVelocity {
+        /// What is commanded, with its unit.
+        commanded: String,
+        /// What the drive gets, with its unit.
+        rounded: String,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "axis `{}`: {}", self.axis, self.kind)
+    }
+}
+
+impl fmt::Display for WarningKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DriveSpeed { turns_per_s, fastest, gear_ratio, counts_output } => {
+                write!(
+                    f,
+                    "at `limits.velocity` the drive would turn {} times a second; no drive of its family turns \
+                     faster than {} times a second: check `limits.velocity`",
+                    Short(*turns_per_s),
+                    Short(*fastest)
+                )?;
+                match counts_output {
+                    true if *gear_ratio > 1.0 => write!(
+                        f,
+                        " and `gear_ratio = {}`: the drive counts turns of its output, so that the gear inside it \
+                         does not count",
+                        Short(*gear_ratio)
+                    ),
+                    _ => write!(f, ", `gear_ratio` and `counts_per_turn`"),
+                }
+            }
+            Self::GearInDrive { gear_ratio } => write!(
+                f,
+                "`gear_ratio = {}` is as of the gear inside the drive, but the drive counts turns of its output: leave \
+                 `gear_ratio` at 1 unless there is a second transmission behind the drive",
+                Short(*gear_ratio)
+            ),
+            Self::Range { turns, degrees: None } => {
+                write!(f, "`limits.position` is a range of {} turns: check its unit", Short(*turns))
+            }
+            Self::Range { turns, degrees: Some([low, high]) } => write!(
+                f,
+                "`limits.position` is a range of {} turns, and looks like degrees: a number without a unit is in rad; \
+                 write [\"{low} deg\", \"{high} deg\"]",
+                Short(*turns)
+            ),
+            Self::VelocityInDegrees { velocity } => write!(
+                f,
+                "`limits.velocity` looks like degrees: a number without a unit is in rad/s; write \"{velocity} deg/s\""
+            ),
+            Self::Overwritten { object } => write!(
+                f,
+                "bring-up overwrites the value that `dcf` has for {object}, because the controller needs another one"
+            ),
+            Self::RoundedVelocity { commanded, rounded } => write!(
+                f,
+                "its drive takes whole numbers of r/min only: the program's velocity of {commanded} becomes {rounded}"
+            ),
+        }
+    }
+}
+
+impl Config {
+    /// What is possible and implausible: `takt check` and `takt run` say it, and go on.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = vec![];
+        for (index, axis) in self.axes.iter().enumerate() {
+            let mut kinds = of_axis(axis);
+            kinds.extend(self.rounded_velocities(index, axis));
+            let overwritten = drive::overwritten(self, axis);
+            kinds.extend(overwritten.into_iter().map(|object| WarningKind::Overwritten { object }));
+            warnings.extend(kinds.into_iter().map(|kind| Warning { axis: axis.name.clone(), kind }));
+        }
+        warnings
+    }
+
+    /// The velocities of the program that the drive of an axis cannot have, each once.
+    fn rounded_velocities(&self, index: usize, axis: &Axis) -> Vec<WarningKind> {
+        let mut kinds = vec![];
+        if axis.control != Control::ProfileVelocity {
+            return kinds;
+        }
+        for planned in &self.program.moves {
+            let ProgramTarget::Velocity { velocity, .. } = &planned.target else { continue };
+            let place = match self.groups.get(planned.group) {
+                Some(group) => group.axes.iter().position(|axis| *axis == index),
+                None => Some(index),
+            };
+            let Some(&commanded) = place.and_then(|place| velocity.get(place)) else { continue };
+            let per_turn = axis.drive.velocity_units_per_turn(axis.counts_per_turn);
+            let units = commanded * Counting::of(axis).turns_per_unit() * per_turn;
+            let rounded = commanded * units.round() / units;
+            if commanded != 0.0 && is_rounded(commanded, rounded) {
+                let quantity = Quantities::of(axis.travel).velocity;
+                let (commanded, rounded) = (quantity.show(commanded), quantity.show(rounded));
+                let kind = WarningKind::RoundedVelocity { commanded, rounded };
+                if !kinds.contains(&kind) {
+                    kinds.push(kind);
+                }
+            }
+        }
+        kinds
+    }
+}
+
+/// Whether a drive that gets `rounded` runs otherwise than commanded.
+pub fn is_rounded(commanded: f64, rounded: f64) -> bool {
+    (commanded - rounded).abs() > ROUNDING * commanded.abs()
+}
+
+fn of_axis(axis: &Axis) -> Vec<WarningKind> {
+    let Axis { drive, limits, gear_ratio, travel, .. } = axis;
+    let mut kinds = vec![];
+    let turns_per_s = limits.velocity * Counting::of(axis).turns_per_unit();
+    let Plausible { fastest_turns_per_s: fastest, usual_velocity, inner_gear_from } = drive.plausible;
+    if turns_per_s > fastest {
+        let (gear_ratio, counts_output) = (*gear_ratio, inner_gear_from.is_some());
+        kinds.push(WarningKind::DriveSpeed { turns_per_s, fastest, gear_ratio, counts_output });
+    } else if inner_gear_from.is_some_and(|from| *gear_ratio >= from) {
+        kinds.push(WarningKind::GearInDrive { gear_ratio: *gear_ratio });
+    }
+    if *travel != Travel::Rotary {
+        return kinds;
+    }
+    let turns = (limits.position_max - limits.position_min) / TAU;
+    if turns > USUAL_TURNS {
+        let both = [limits.position_min, limits.position_max];
+        let degrees = (turns <= 360.0 && both.iter().all(|limit| limit.fract() == 0.0)).then_some(both);
+        kinds.push(WarningKind::Range { turns, degrees });
+    }
+    if limits.velocity > usual_velocity && limits.velocity.fract() == 0.0 {
+        kinds.push(WarningKind::VelocityInDegrees { velocity: limits.velocity });
+    }
+    kinds
+}

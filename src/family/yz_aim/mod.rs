@@ -1,0 +1,110 @@
+//! YZ-AIM integrated servos, CANopen edition (manual v1.62, and field experience).
+//!
+//! The PDO mapping is fixed. The drive has no mode display (6061) and no emergency messages, and it does not answer SDO
+//! requests for unknown objects.
+
+mod alarm;
+mod bring_up;
+mod facts;
+mod process_data;
+
+pub use alarm::{Alarm, Clearing};
+pub use facts::{CODEC, FACTS, HIGHEST_SPEED_RPM, INTERPOLATION_PERIOD_NS, NO_RAMP, STANDSTILL};
+pub(crate) use process_data::answers_sync;
+
+use takt_rt::Frame;
+
+use super::{CarryingOut, Family, MappingMatch, SettingUp};
+use crate::canopen::object::Object;
+use crate::commission::dictionary::ObjectEntry;
+use crate::commission::{SdoQuirks, SdoSession, TargetDrive, Task, yz_aim as commissioning};
+use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
+use crate::drive::{AxisSession, ProcessData};
+use crate::sim::Drive;
+use crate::sim::yz_aim::{YzAimJoint, YzAimParameters};
+
+/// The family.
+#[derive(Clone, Copy, Debug)]
+pub struct YzAim;
+
+impl ConfiguredFamily for YzAim {
+    fn word(&self) -> &'static str {
+        FACTS.word
+    }
+
+    fn read(&self, _: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
+        Some(super::YZ_AIM)
+    }
+}
+
+impl Family for YzAim {
+    fn unconfigured(&self) -> Option<DriveFamily> {
+        Some(super::YZ_AIM)
+    }
+
+    fn process_data(&self, axis: &Axis) -> ProcessData {
+        process_data::fixed(axis)
+    }
+
+    fn mapping_match(&self) -> MappingMatch {
+        MappingMatch::ByNumber
+    }
+
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::configure(c))
+    }
+
+    fn start<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::start(c))
+    }
+
+    fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::shut_down(c))
+    }
+
+    fn error_words(&self, code: u16) -> String {
+        format!("alarm {}", Alarm::of(code))
+    }
+
+    fn error_cure(&self, code: u16) -> Option<&'static str> {
+        Some(Alarm::of(code).advice().unwrap_or(super::error_words::UNKNOWN))
+    }
+
+    /// A YZ-AIM drops requests that overlap or follow too soon, shortens its replies, and does not answer for objects that
+    /// it does not have. The manual gives 606C two lengths (A27), so the length of the reply counts.
+    fn sdo_quirks(&self) -> SdoQuirks {
+        SdoQuirks {
+            gap_ns: 2_000_000,
+            has_short_replies: true,
+            has_other_lengths: true,
+            is_silent_if_absent: true,
+            ..SdoQuirks::standard()
+        }
+    }
+
+    fn objects(&self) -> &'static [ObjectEntry] {
+        commissioning::OBJECTS
+    }
+
+    fn meaning(&self, object: &Object, value: i64) -> Option<String> {
+        commissioning::meaning(object, value)
+    }
+
+    fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {
+        commissioning::process_data_words(target, frame)
+    }
+
+    fn carry_out<'a>(
+        &'a self,
+        session: &'a SdoSession,
+        target: &'a TargetDrive,
+        task: Task,
+    ) -> CarryingOut<'a> {
+        Box::pin(commissioning::carry_out(session, target, task))
+    }
+
+    fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
+        let bit_rate = config.buses.get(axis.bus).map_or(1_000_000, |bus| bus.bit_rate);
+        Box::new(YzAimJoint::new(YzAimParameters::of(axis, bit_rate, &config.simulation)))
+    }
+}
