@@ -21,6 +21,7 @@ const ORDER: [&str; 23] = [
     "link",
     "sim",
     "config",
+    "procedure",
     "canopen",
     "channels",
     "trajectory",
