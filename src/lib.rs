@@ -8,12 +8,11 @@
 //!
 //! ```text
 //! cli                                 the program `takt`
-//! doctor jitter play                  is the machine fit, and how evenly it paces the loop; motion from a file
+//! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
-//! commission drive                    commissioning; bring-up and shutdown, over the services of CiA 301, without I/O
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
@@ -27,7 +26,7 @@
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`link`]: what a bus is connected to, and who commands it.
 //! - [`schedule`]: whether everything fits on the buses in the worst case.
-//! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
+//! - [`family`], [`procedure`] and [`canopen`]: what takt knows of each family of drives, and how it sets one up, without I/O.
 //! - [`procedure`]: the engine of procedures on drives, for bring-up, shutdown and [`commission`]ing.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
@@ -49,7 +48,6 @@ pub mod commission;
 pub mod config;
 pub mod controller;
 pub mod doctor;
-pub mod drive;
 mod error;
 pub mod family;
 pub mod faults;
