@@ -30,6 +30,7 @@
 
 mod answers;
 mod axis;
+mod bit_fields;
 mod bit_set;
 mod cia402;
 mod cia402_codec;
@@ -65,6 +66,12 @@ pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
     ModeCondition, Pdo, SenderByte, TorqueLimits,
+};
+pub use bit_fields::{
+    BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits, FieldDrive,
+    FieldDriveParameters, FieldFrame, FieldMode, FieldTargets, FieldValue, FrameLayout, LayoutError, Life,
+    LifeCycle, LifeState, LifeStep, LifeWish, LinearScale, MAX_FIELD_BYTES, MAX_FIELDS, ModeCodes, Number,
+    OwnFrame, OwnFrames, PositionReference, ReplyError, ReplyValue, ReplyValues, Setting,
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
