@@ -2,13 +2,33 @@
 //!
 //! This is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
 //! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
-//! bounded, lock-free channels ([`controller::channels`]), and nothing else.
+//! bounded, lock-free channels ([`channels`]), and nothing else.
+//!
+//! Each folder uses only what stands below it in this picture (`tests/arrows.rs` proves it):
+//!
+//! ```text
+//! cli                                 the program `takt`
+//! doctor jitter play                  is the machine fit, and how evenly it paces the loop; motion from a file
+//! error                               one error for a program that embeds takt
+//! controller                          the engine of a configuration, its life, its ports, the handles
+//! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
+//! family                              one folder a family of drives: everything that takt knows of it outside the cycle
+//! commission drive                    commissioning; bring-up and shutdown, over the services of CiA 301, without I/O
+//! faults link sim                     faults on purpose; sockets; simulated buses and drives
+//! config                              TOML to checked plain data in SI units
+//! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
+//! canopen                             the protocols of CiA 301, 305 and 306, without I/O
+//! channels                            the lock-free door to the real-time thread
+//! trajectory frame_time sleep_alignment source_text printable text_file
+//! ```
 //!
 //! A tour, in the order in which a run meets the parts:
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
-//! - [`bus`]: what a bus is connected to, how long frames take, and whether everything fits in the worst case.
+//! - [`link`]: what a bus is connected to, and who commands it.
+//! - [`schedule`]: whether everything fits on the buses in the worst case.
 //! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
+//! - [`procedure`]: the engine of procedures on drives, for bring-up, shutdown and [`commission`]ing.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
 //! - [`commission`]: what a single drive is set up, moved and looked at with, apart from any run.
@@ -23,8 +43,8 @@
 //! each way to move. Every error is readable when `main` returns it: see [`Error`].
 #![deny(unsafe_code)]
 
-pub mod bus;
 pub mod canopen;
+pub mod channels;
 pub mod commission;
 pub mod config;
 pub mod controller;
@@ -33,15 +53,20 @@ pub mod drive;
 mod error;
 pub mod family;
 pub mod faults;
+pub mod frame_time;
 pub mod jitter;
+pub mod link;
 pub mod play;
 pub mod printable;
+pub mod procedure;
+pub mod schedule;
 pub mod sim;
+pub mod sleep_alignment;
+mod source_text;
 pub mod telemetry;
 mod text_file;
 pub mod trajectory;
 
-pub use bus::ownership::IfOwned;
 pub use config::{Config, ConfigError};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
@@ -51,6 +76,7 @@ pub use controller::{
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
+pub use link::ownership::IfOwned;
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 

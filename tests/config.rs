@@ -177,7 +177,7 @@ fn an_automatic_command_phase_is_resolved_when_the_file_is_read() {
     let arm = parse(&arm.replace("command_phase = 0.5", "command_phase = \"auto\""));
     // From 450 to 590 µs: 60 µs for either wake-up, 20 µs for computing.
     assert_eq!(arm.cycle.command_phase_ns, 510_000);
-    for bus in takt::bus::schedule::verify(&arm).unwrap() {
+    for bus in takt::schedule::verify(&arm).unwrap() {
         assert!(!bus.is_narrow());
         assert_eq!((bus.slot.sync_reserve_ns, bus.slot.set_points_reserve_ns), (60_000, 80_000));
     }
@@ -190,7 +190,7 @@ fn an_automatic_command_phase_suits_the_fullest_bus_in_every_cycle() {
         let cycle = format!("[cycle]\nperiod = {period:?}\ncommand_phase = \"auto\"\n[telemetry]");
         let config = parse(&text.replace("[telemetry]", &cycle));
         assert_eq!(config.cycle.command_phase_ns, expected_ns, "{period}");
-        assert!(takt::bus::schedule::verify(&config).is_ok());
+        assert!(takt::schedule::verify(&config).is_ok());
     }
 }
 

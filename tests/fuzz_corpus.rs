@@ -5,7 +5,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 use takt::config::DriveFamily;
-use takt::family;
+use takt::family::{EROB_CANOPEN, YZ_AIM};
 use takt_rt::{OperationMode, Phase, Rule};
 
 #[path = "../fuzz/subjects/mod.rs"]
@@ -79,12 +79,12 @@ fn the_kept_inputs_lead_the_group_through_every_phase_and_move_it_in_every_mode(
         OperationMode::ProfileVelocity,
         OperationMode::ProfileTorque,
     ] {
-        assert!(moved(mode, family::EROB_CANOPEN), "{mode:?}");
+        assert!(moved(mode, EROB_CANOPEN), "{mode:?}");
     }
     for mode in
         [OperationMode::InterpolatedPosition, OperationMode::ProfilePosition, OperationMode::ProfileVelocity]
     {
-        assert!(moved(mode, family::YZ_AIM), "{mode:?} of a YZ-AIM");
+        assert!(moved(mode, YZ_AIM), "{mode:?} of a YZ-AIM");
     }
     assert!(journeys.iter().any(|journey| journey.refused > 0 && journey.refused < journey.taken));
     assert!(journeys.iter().any(|journey| journey.calls > 100), "a callback is called");

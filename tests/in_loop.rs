@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, ThreadId};
 use std::time::Duration;
 
-use takt::controller::channels::{CallbackRecord, GivenCallback, ring};
+use takt::channels::{CallbackRecord, GivenCallback, ring};
 use takt::rt::{AxisLimits, CallbackId, CallbackRun, Fault, MotionState};
 use takt::sim::SimulatedBus;
 use takt::{

@@ -7,9 +7,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use takt::bus::port::Port;
+use takt::channels::{ChannelSizes, channels};
 use takt::config::Config;
-use takt::controller::channels::{ChannelSizes, channels};
+use takt::controller::port::Port;
 use takt::controller::realtime_thread::{self, LoopParts};
 use takt::controller::{Outcome, Supervisor, assemble};
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, LoggerThread, Machine, WallClock};

@@ -8,13 +8,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use takt::bus::port::Port;
-use takt::bus::trace::Trace;
+use takt::channels::{ChannelSizes, HostSide, LogSide, channels};
 use takt::config::Config;
-use takt::controller::channels::{ChannelSizes, HostSide, LogSide, channels};
+use takt::controller::port::Port;
 use takt::controller::realtime_thread::{self, Ended, LoopParts};
 use takt::controller::session::{self, Session, SessionOptions};
 use takt::controller::{Outcome, Supervisor, assemble};
+use takt::link::trace::Trace;
 use takt::telemetry::{
     BlackBoxOptions, Incident, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,
 };

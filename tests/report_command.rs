@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use mcap::records::op;
 use serde_json::Value;
-use takt::bus::trace::traced;
+use takt::channels::{ChannelSizes, GroupStream, channels};
 use takt::config::Config;
-use takt::controller::channels::{ChannelSizes, GroupStream, channels};
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario};
+use takt::link::trace::traced;
 use takt::sim::SimulatedBus;
 use takt::telemetry::{
     BlackBoxOptions, BusDescription, Emphasis, LogSummary, Logger, LoggerOptions, Machine, RealtimeReport,

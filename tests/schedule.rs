@@ -3,8 +3,8 @@
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use takt::bus::schedule::{self, BusSchedule, MessageKind, Remedy, Shortfall};
 use takt::config::{Config, Feedback};
+use takt::schedule::{self, BusSchedule, MessageKind, Remedy, Shortfall};
 
 /// So many eRobs on one bus, with additions to every axis. They report statusword and position and no more, unless that says
 /// what else: it is what the field notes reckon with.

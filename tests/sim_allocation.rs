@@ -6,7 +6,7 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
-use takt::bus::port::Port;
+use takt::controller::port::Port;
 use takt::faults::{
     DelayPlace, DriveEffect, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect,
     Part, ScenarioFault, Selection, Trigger, Window,

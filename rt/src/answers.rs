@@ -1,6 +1,7 @@
 //! What became of the last requests.
 
-use crate::request::{RequestError, RequestId};
+use crate::rejection::RequestError;
+use crate::request::RequestId;
 
 /// What became of a request.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,7 +81,8 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::phase::Phase;
-    use crate::request::{RejectReason, RequestKind};
+    use crate::rejection::RejectReason;
+    use crate::request::RequestKind;
     use std::vec::Vec;
 
     fn rejection(value: u64) -> RequestError {

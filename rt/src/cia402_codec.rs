@@ -74,7 +74,7 @@ pub enum StoppedHeartbeat {
 }
 
 impl Cia402Codec {
-    /// As CiA 402 says, which is the default.
+    /// As the standard says.
     pub const STANDARD: Self = Self {
         states: ShownStates::All,
         set_points: SetPointTransfer::Acknowledged,

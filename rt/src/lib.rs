@@ -52,7 +52,9 @@ pub mod plan;
 mod port;
 mod profile;
 mod record;
+mod rejection;
 mod request;
+mod rule;
 mod source;
 mod stop;
 mod stop_category;
@@ -84,7 +86,7 @@ pub use engine::{
     BusParameters, CanopenNetwork, CycleCount, CycleInput, Deadline, Engine, EngineParameters,
     GroupParameters, Heartbeat, Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
-pub use fault::{Fault, Rule};
+pub use fault::Fault;
 pub use frame::{Frame, FrameError, FrameFormat, FrameKind, Id};
 pub use guard::{AxisLimits, LimitError, braking_distance};
 pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
@@ -100,10 +102,12 @@ pub use record::{
     AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, MAX_AXES, MAX_BUSES, MAX_GROUPS,
     RecordedStop,
 };
+pub use rejection::{RejectReason, RequestError};
 pub use request::{
-    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, RejectReason, Request,
-    RequestEnvelope, RequestError, RequestId, RequestKind, RequestTarget, TrajectoryId,
+    AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
+    RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
+pub use rule::Rule;
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
     LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,

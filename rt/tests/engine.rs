@@ -284,7 +284,8 @@ fn after_a_category_0_stop_in_motion_nothing_of_the_old_motion_comes_back() {
     rig.request(Request::Stop(StopCategory::Zero));
     rig.run_until(Phase::Disabled, 10);
     rig.request(Request::Enable);
-    rig.run(8);
+    // The joints have stood for long enough, and the drives have torque.
+    rig.run(24);
     rig.drive(1).is_silent = true;
     rig.run_until(Phase::Disabling, 10);
     rig.drive(1).is_silent = false;

@@ -177,6 +177,67 @@ fn groups_that_stop_with_another_one_stop_in_the_same_cycle_for_the_same_reason(
     rig.assert_limits_kept();
 }
 
+/// The group that is asked is disabled: it has nothing to stop itself.
+#[test]
+fn the_hardest_stop_of_a_cycle_reaches_the_groups_that_stop_with_another_one() {
+    for (categories, hardest) in [
+        ([StopCategory::Zero, StopCategory::Two], StopCategory::Zero),
+        ([StopCategory::Two, StopCategory::One], StopCategory::One),
+    ] {
+        let mut parameters = three();
+        parameters.groups[1].stops_with.push(0);
+        let mut rig = enabled(parameters);
+        ask(&mut rig, 0, Request::Disable);
+        run_until(&mut rig, 0, Phase::Disabled, 300);
+        ask(&mut rig, 1, Request::Move(move_to(2.5)));
+        rig.run(100);
+        rig.host.group_requests.extend(categories.map(|category| (0, Request::Stop(category))));
+        rig.run(1);
+        let stop = rig.host.snapshot.groups()[1].stop.unwrap();
+        assert_eq!((stop.rule(), stop.category), (Rule::Requested, hardest), "after {categories:?}");
+        run_until(&mut rig, 1, Phase::Disabled, 2_000);
+    }
+}
+
+/// A group is stopped, and enabled at once on a bus that is lost.
+#[test]
+fn a_fault_reaches_the_groups_that_stop_with_another_one_beside_a_harder_stop_of_the_same_cycle() {
+    let mut parameters = three();
+    parameters.groups[1].stops_with.push(0);
+    let mut rig = enabled(parameters);
+    ask(&mut rig, 0, Request::Disable);
+    run_until(&mut rig, 0, Phase::Disabled, 300);
+    ask(&mut rig, 1, Request::Move(move_to(2.5)));
+    rig.run(100);
+    rig.buses[0].state = BusState::BusOff;
+    rig.host.group_requests.extend([(0, Request::Stop(StopCategory::Zero)), (0, Request::Enable)]);
+    rig.run(1);
+    let stop = rig.host.snapshot.groups()[1].stop.unwrap();
+    assert_eq!((stop.rule(), stop.category), (Rule::BusLost, StopCategory::Zero));
+}
+
+#[test]
+fn a_stop_that_is_asked_to_be_harder_does_not_bring_back_a_fault_that_another_group_has_reset() {
+    let mut parameters = three();
+    parameters.groups[0].stops_with.push(1);
+    parameters.groups[1].stops_with.push(0);
+    parameters.categories.set(Rule::ImplausibleFeedback, StopCategory::Two);
+    let mut rig = enabled(parameters);
+    ask(&mut rig, 1, Request::Move(move_to(2.5)));
+    rig.run(300);
+    rig.drive(0).lies.push_back((DriveState::OperationEnabled, 500_000));
+    rig.run(3);
+    assert_eq!(stops(&rig), [0, 1].map(|group| (group, Rule::ImplausibleFeedback)));
+    ask(&mut rig, 0, Request::ResetFaults);
+    ask(&mut rig, 0, Request::Move(move_to(1.0)));
+    assert_eq!([0, 1].map(|group| rig.phase_of(group)), [Phase::Moving, Phase::Stopping]);
+    ask(&mut rig, 1, Request::Stop(StopCategory::One));
+    let shown = [0, 1].map(|group: usize| rig.host.snapshot.groups()[group].stop.unwrap());
+    assert_eq!(shown.map(|stop| stop.category), [StopCategory::One; 2]);
+    assert_eq!(shown.map(|stop| stop.rule()), [Rule::Requested, Rule::ImplausibleFeedback]);
+    rig.assert_limits_kept();
+}
+
 #[test]
 fn a_coupling_has_one_direction() {
     let mut parameters = three();

@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use takt::bus::schedule::{self, BusSchedule};
 use takt::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel};
 use takt::rt::ModeCondition;
+use takt::schedule::{self, BusSchedule};
 
 use super::exit::Exit;
 use super::print;

@@ -9,7 +9,6 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use takt::bus::schedule;
 use takt::config::Config;
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{SessionError, SessionOptions};
@@ -18,6 +17,7 @@ use takt::play::{
     ArmedFrom, AxisMaxima, FileStream, FileTrajectory, PlayError, PlayFile, PlayFileError, PlayedGroup,
     RealStage, SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
 };
+use takt::schedule;
 use takt::telemetry::{Machine, StopReport, words};
 use takt_rt::{Follow, NANOSECONDS_PER_SECOND, Snapshot, StopReason, StreamDelay};
 

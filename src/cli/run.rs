@@ -10,12 +10,12 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use takt::bus::schedule;
 use takt::config::{Config, Interface, Master};
 use takt::controller::realtime_thread::StartError;
 use takt::controller::session::{self, Session, SessionError, SessionOptions};
 use takt::controller::{Interrupt, Outcome, Progress};
 use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
+use takt::schedule;
 use takt::telemetry::{
     Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
 };

@@ -8,11 +8,11 @@ use std::thread;
 
 use clap::Args;
 
-use takt::bus::SocketCanOptions;
-use takt::bus::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
-use takt::bus::port::{OpenError, open_configured};
 use takt::config::{Config, Interface};
+use takt::controller::port::open_configured;
 use takt::family::simulated_drives;
+use takt::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
+use takt::link::{OpenError, SocketCanOptions};
 use takt::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};

@@ -1,6 +1,6 @@
 //! Describes frames in words, for the trace of a procedure.
 
-use takt_rt::Frame;
+use takt_rt::{Frame, StoppedHeartbeat};
 
 use super::dictionary::ObjectEntry;
 use super::target::TargetDrive;
@@ -35,7 +35,10 @@ pub fn of(target: &TargetDrive, frame: &Frame) -> String {
     if let Some(message) = ErrorControl::decode(frame) {
         let words = match message.state {
             NmtState::BootUp => "boot-up".to_owned(),
-            NmtState::Stopped if target.drive.shows_alarm_as_stopped && message.node == target.node => {
+            NmtState::Stopped
+                if target.drive.codec.stopped_heartbeat == StoppedHeartbeat::Alarm
+                    && message.node == target.node =>
+            {
                 "heartbeat: alarm".to_owned()
             }
             state => format!("heartbeat: {state}"),

@@ -6,6 +6,8 @@
 
 pub(crate) mod bounds;
 pub(crate) mod defaults;
+#[cfg(feature = "miette")]
+mod diagnostic;
 mod drive_family;
 mod error;
 mod in_code;
@@ -17,7 +19,6 @@ pub(crate) mod quantity;
 mod ranges;
 pub(crate) mod read;
 mod rules;
-mod source_view;
 mod spelling;
 pub(crate) mod spot;
 
@@ -32,33 +33,22 @@ pub use interface::InterfaceError;
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
+pub(crate) use read::{Knowledge, parse};
 
 use thiserror::Error;
 
 use crate::printable::printable_path;
 
+/// Reads a file and checks it, as [`read::parse`] does its text.
+pub(crate) fn load(path: &Path, knowledge: &Knowledge<'_>) -> Result<Config, ConfigError> {
+    let name = printable_path(path);
+    match crate::text_file::read(path) {
+        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, knowledge),
+        Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
+    }
+}
+
 impl Config {
-    /// Reads a file whose drives are of these families, and checks it.
-    pub(crate) fn load_with(
-        path: &Path,
-        families: &[&'static dyn ConfiguredFamily],
-    ) -> Result<Self, ConfigError> {
-        let name = printable_path(path);
-        match crate::text_file::read(path) {
-            Ok(bytes) => Self::parse_with(&name, &ConfigError::text_of(&name, bytes)?, families),
-            Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
-        }
-    }
-
-    /// Reads and checks the text of a configuration whose drives are of these families.
-    pub(crate) fn parse_with(
-        source_name: &str,
-        text: &str,
-        families: &[&'static dyn ConfiguredFamily],
-    ) -> Result<Self, ConfigError> {
-        read::parse(source_name, text, families)
-    }
-
     /// Connects a bus to another interface than the file says, as `--bus NAME=INTERFACE` does.
     pub fn override_interface(&mut self, name: &str, interface: &str) -> Result<(), OverrideError> {
         let interface: Interface = interface.parse()?;

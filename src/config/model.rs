@@ -53,7 +53,7 @@ pub struct Cycle {
     /// Period of SYNC and set-points; 250 µs to 100 ms in whole microseconds. Default 1 ms.
     pub period_ns: u64,
     /// When the command phase begins, after the start of the slot; 5 % to 95 % of the period. Default 55 %. A file
-    /// may leave it to [`automatic_command_phase`](crate::bus::schedule::automatic_command_phase); this is what that finds.
+    /// may leave it to [`automatic_command_phase`](crate::schedule::automatic_command_phase); this is what that finds.
     pub command_phase_ns: u64,
 }
 

@@ -2,7 +2,6 @@
 
 use thiserror::Error;
 
-use crate::bus::schedule::NoCommandPhase;
 use crate::canopen::dcf::DcfError;
 
 use super::interface::InterfaceError;
@@ -276,8 +275,8 @@ pub enum ProblemKind {
     /// `command_phase = "auto"` where none is possible.
     #[error("no command phase suits every bus")]
     NoCommandPhase {
-        /// The sums of the buses that are the cause.
-        cause: NoCommandPhase,
+        /// The sums of the buses that are the cause, and what would help, in words.
+        cause: String,
     },
     /// More than one controller can do.
     #[error("{given} {what} are more than the {limit} that one controller can do")]
@@ -371,7 +370,7 @@ impl ProblemKind {
             Self::EmptyRange { .. } => "the lowest position comes first".into(),
             Self::BeyondCounts { .. } => "check counts_per_turn, gear_ratio, lead and zero_counts".into(),
             Self::Dcf { reason } => reason.help().into(),
-            Self::NoCommandPhase { cause } => cause.to_string(),
+            Self::NoCommandPhase { cause } => cause.clone(),
             Self::TooMany { .. } => "divide the machine between several controllers".into(),
         }
     }

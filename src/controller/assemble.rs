@@ -10,8 +10,8 @@ use takt_rt::{
     SetUpError, SlotPlan, TimingLadder, TorqueLimits,
 };
 
+use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
 use crate::config::{Axis, Compliance, Config, ConfigError, Interface};
-use crate::controller::channels::{GroupAxes, GroupStream};
 use crate::drive::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -230,5 +230,22 @@ pub fn look_ahead(config: &Config, axes: &[usize]) -> LookAheadParameters {
         limits: limits.take(MAX_AXES).collect(),
         period_ns: config.cycle.period_ns,
         delay: config.stream_delay,
+    }
+}
+
+impl ChannelSizes {
+    /// Sizes for a configuration. The record ring is configured. The others hold a burst of SDO traffic of every node, and
+    /// the events of a second in which the logger is late.
+    pub fn of(config: &Config) -> Self {
+        Self {
+            groups: streams(config),
+            axes: config.axes.len(),
+            buses: config.buses.len(),
+            records: config.telemetry.ring_records,
+            events: 1024,
+            requests: 16,
+            service_out: 256,
+            service_in: 1024,
+        }
     }
 }

@@ -2,19 +2,19 @@
 
 mod arrival;
 pub mod assemble;
-pub mod channels;
+mod buses;
 mod handle;
 mod outcome;
 mod point_check;
+pub mod port;
 mod program;
 pub mod realtime_thread;
 pub mod session;
-pub mod sleep_alignment;
 mod supervisor;
 mod time_of_day;
 mod virtual_time;
 
-pub use channels::{CallbackCommand, CallbackState, CallbackTimes};
+pub use crate::channels::{CallbackCommand, CallbackState, CallbackTimes};
 pub use handle::{
     CallbackHandle, CallbackOptions, CommandError, Controller, Events, GroupHandle, Handle, MotionError,
     MotionId, MoveOptions, Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress,

@@ -2,8 +2,8 @@
 
 use takt_rt::{Phase, RequestError, StopReason};
 
-use crate::bus::ownership::Process;
 use crate::drive::BringUpError;
+use crate::link::ownership::Process;
 use crate::telemetry::{Machine, words};
 
 /// How a run ended.

@@ -5,7 +5,7 @@ use takt_rt::{
     RequestId, RequestTarget, Snapshot,
 };
 
-use super::channels::RequestNumbers;
+use crate::channels::RequestNumbers;
 use crate::config::{Program, ProgramMove, ProgramTarget};
 
 /// Runs through the moves of one group of a configuration, one at a time.

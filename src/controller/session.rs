@@ -9,23 +9,24 @@ use takt_rt::linux::{MonotonicClock, ThreadReport};
 use takt_rt::{Clock, Request, SlotPlan, Snapshot, StopCategory};
 
 use super::assemble::{self, AssembleError};
-use super::channels::{
-    CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, TrajectoryGiver,
-    channels,
-};
 use super::outcome::{Interrupt, Outcome, Progress};
+use super::port::Port;
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
-use super::sleep_alignment;
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
-use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
-use crate::bus::port::{OpenError, Port};
-use crate::bus::trace::Trace;
+use crate::channels::{
+    CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, TrajectoryGiver,
+    channels, panic_message,
+};
 use crate::config::Config;
 use crate::faults::FaultInjector;
+use crate::link::OpenError;
+use crate::link::ownership::{ClaimError, IfOwned, Ownership};
+use crate::link::trace::Trace;
+use crate::sleep_alignment;
 use crate::telemetry::{
     BlackBoxOptions, EachCycle, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
-    RecordingDestination, WallClock, panic_message,
+    RecordingDestination, WallClock,
 };
 
 /// The pause between two polls of the controller.
@@ -332,7 +333,7 @@ mod tests {
     use takt_rt::{Phase, StopCategory};
 
     use super::*;
-    use crate::bus::ownership::{InterfaceLock, LockError, Role};
+    use crate::link::ownership::{InterfaceLock, LockError, Role};
 
     /// Simulated buses need no lock: this one stands for that of a real interface.
     #[test]

@@ -16,9 +16,9 @@ use takt_rt::{
 };
 
 use super::arrival::{ARRIVAL_NS, Arrival};
-use super::channels::{HostSide, RequestNumbers};
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramRunner, ProgramStep};
+use crate::channels::{HostSide, RequestNumbers};
 use crate::config::Config;
 use crate::drive::{AxisFacts, BringUp, Shutdown};
 

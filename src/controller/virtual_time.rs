@@ -6,11 +6,11 @@ use std::sync::Arc;
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, Snapshot, Wake};
 
 use super::assemble::{self, AssembleError};
-use super::channels::{CallbackClock, ChannelSizes, HostSide, LogSide, RtSide, channels};
 use super::outcome::{Interrupt, Outcome};
+use super::port::Port;
 use super::supervisor::Supervisor;
 use super::time_of_day::TimeOfDayKeeper;
-use crate::bus::port::Port;
+use crate::channels::{CallbackClock, ChannelSizes, HostSide, LogSide, RtSide, channels};
 use crate::config::Config;
 use crate::faults::FaultInjector;
 use crate::sim::SimulatedBus;

@@ -2,7 +2,7 @@
 
 use takt_rt::{BusPort, Frame, Nanoseconds};
 
-use crate::bus::trace::TracedPort;
+use crate::link::trace::TracedPort;
 use crate::sim::{Defect, DriveFault, InjectDefectError, SimulatedBus, UnknownNode};
 
 /// An effect on a simulated drive.

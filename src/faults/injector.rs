@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds, Snapshot};
 
+use super::injectable::Injectable;
 use super::port::FaultyPort;
 use super::scenario::{Scenario, ScenarioFault};
 use super::trigger::{Trigger, TriggerTimes};
 use super::window::FaultProgress;
-use crate::bus::port::Port;
 
 /// Injects the faults of a scenario in one run.
 #[derive(Debug)]
@@ -27,11 +27,11 @@ impl FaultInjector {
     }
 
     /// Wraps the port of a bus in all of its faults. The first one of the file is nearest to the wire.
-    pub fn wrap(&self, bus: usize, port: Port) -> Port {
+    pub fn wrap<P: Injectable + From<FaultyPort<P>>>(&self, bus: usize, port: P) -> P {
         let own = self.progress().filter(|(fault, _)| fault.bus == bus);
         own.fold(port, |port, (fault, progress)| {
             let trigger_times = Arc::clone(&self.trigger_times);
-            Port::Faulty(Box::new(FaultyPort::new(port, fault, trigger_times, Arc::clone(progress))))
+            FaultyPort::new(port, fault, trigger_times, Arc::clone(progress)).into()
         })
     }
 

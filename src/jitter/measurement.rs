@@ -4,14 +4,15 @@ use std::time::Duration;
 
 use takt_rt::{BusHealth, Request, SlotPlan};
 
-use crate::bus::interface_status;
-use crate::bus::ownership::{ClaimError, IfOwned, Ownership};
-use crate::bus::port::{OpenError, Port};
+use crate::channels::{ChannelSizes, LogSide, channels};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
-use crate::controller::channels::{ChannelSizes, LogSide, channels};
+use crate::controller::port::Port;
 use crate::controller::realtime_thread::{self, Begun, LoopParts, StartError};
-use crate::controller::sleep_alignment;
+use crate::link::OpenError;
+use crate::link::interface_status;
+use crate::link::ownership::{ClaimError, IfOwned, Ownership};
+use crate::sleep_alignment;
 use crate::telemetry::Statistics;
 
 /// The pause between two polls of the loop; the ring of cycle records holds many times as much.

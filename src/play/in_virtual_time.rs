@@ -12,9 +12,9 @@ use takt_rt::{
 use super::groups::PlayedGroup;
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::SetPointLog;
+use crate::channels::{GivenTrajectory, GroupAxes, LogSide};
 use crate::config::Config;
 use crate::controller::assemble::AssembleError;
-use crate::controller::channels::{GivenTrajectory, GroupAxes, LogSide};
 use crate::controller::{Interrupt, Outcome, VirtualRun};
 use crate::sim::SimulatedBus;
 use crate::trajectory::TrajectoryConditions;

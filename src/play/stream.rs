@@ -5,8 +5,8 @@ use takt_rt::{AxisPoint, MAX_AXES, Nanoseconds, PointRole, PositionPoint, Snapsh
 use super::error::{FileProblem, PlayFileError};
 use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
+use crate::channels::GroupAxes;
 use crate::config::{Axis, Config};
-use crate::controller::channels::GroupAxes;
 use crate::controller::check_point;
 
 /// Nanoseconds in a second, to and from the seconds of a file.

@@ -211,7 +211,7 @@ mod tests {
     use proptest::prelude::*;
     use takt_rt::{Id, UnstuffedLength};
 
-    use crate::bus::frame_time::stuff_bits_of;
+    use crate::frame_time::stuff_bits_of;
 
     /// The bits of a classic frame up to and with the CRC, one by one, as the standard writes them.
     fn bits_of(frame: &Frame) -> Vec<bool> {

@@ -21,7 +21,7 @@ use super::machine::Machine;
 use super::recording::Recording;
 use super::wall_clock::WallClock;
 use super::words;
-use crate::bus::trace::{TracedFrame, TracedHealth};
+use crate::link::trace::{TracedFrame, TracedHealth};
 
 /// The most files that a run leaves.
 pub const FILES: usize = 16;

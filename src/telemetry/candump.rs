@@ -8,7 +8,7 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use super::destination::Opened;
 use super::history::OnBus;
 use super::wall_clock::WallClock;
-use crate::bus::trace::{Trace, TracedFrame};
+use crate::link::trace::{Trace, TracedFrame};
 
 /// Frames wait this long before they are written, so that the log is in the order of time. Received frames are read some
 /// time after their arrival, and the buses are read one after the other.

@@ -7,7 +7,7 @@ use takt_rt::{
     Nanoseconds, Phase,
 };
 
-use crate::bus::trace::{TracedFrame, TracedHealth};
+use crate::link::trace::{TracedFrame, TracedHealth};
 
 /// Memory for the frames of one bus in one second. At 1 Mbit/s, a frame of eight bytes takes 111 bits on the wire and 23
 /// bytes here.

@@ -1,11 +1,11 @@
 //! The caller's function that is notified of events and failures. The logger goes on even if this function panics.
 
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, OnceLock};
 
 use super::black_box::Incident;
 use super::logger::Notice;
+use crate::channels::panic_message;
 
 /// A function that is notified of events and failures.
 pub type Notify = Box<dyn FnMut(&Notice) + Send>;
@@ -39,10 +39,4 @@ impl Listener {
     pub fn incident(&self) -> Option<Incident> {
         self.panic.get().cloned().map(Incident::CallbackPanicked)
     }
-}
-
-/// The message of a panic.
-pub fn panic_message(payload: &(dyn Any + Send)) -> String {
-    let text = payload.downcast_ref::<&str>().copied();
-    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message").to_owned()
 }

@@ -18,8 +18,8 @@ use super::recording::Recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use super::words;
-use crate::bus::trace::Trace;
-use crate::controller::channels::LogSide;
+use crate::channels::LogSide;
+use crate::link::trace::Trace;
 use crate::printable::printable_path;
 
 /// What is to be done with the record of each cycle.

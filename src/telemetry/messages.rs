@@ -6,7 +6,7 @@ mod decode;
 use takt_rt::{AxisRecord, CycleRecord, Event, EventKind, FrameKind, GroupRecord};
 
 use super::cdr::CdrEncoder;
-use crate::bus::trace::{TracedFrame, TracedHealth};
+use crate::link::trace::{TracedFrame, TracedHealth};
 
 pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event, decode_group};
 

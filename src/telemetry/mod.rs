@@ -1,7 +1,7 @@
 //! What a run makes visible: statistics, recordings, reports, and texts about events.
 //!
 //! The real-time thread puts a record of every cycle, and an event for each change, into lock-free rings
-//! ([`crate::controller::channels`]). A [`Logger`] empties them, in a thread of its own that is not real-time
+//! ([`crate::channels`]). A [`Logger`] empties them, in a thread of its own that is not real-time
 //! ([`LoggerThread`]), or step by step in virtual time. A failure in this module never reaches the motion. A full ring
 //! drops records and counts them. A full disk ends the recording with one message. A caller's function that panics is not
 //! called again.
@@ -31,7 +31,7 @@ pub mod words;
 
 pub use black_box::{BlackBoxOptions, Incident};
 pub use destination::RecordingDestination;
-pub use listener::{Notify, panic_message};
+pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use recorded::{Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, WalkError};

@@ -17,7 +17,7 @@ use super::history::OnBus;
 use super::machine::Machine;
 use super::messages::{self, MessageType};
 use super::wall_clock::WallClock;
-use crate::bus::trace::{TracedFrame, TracedHealth};
+use crate::link::trace::{TracedFrame, TracedHealth};
 
 /// A chunk is written to the file as a whole. It holds a third of a second of six axes at 1 ms. A crash of the computer
 /// loses at most that.

@@ -13,7 +13,7 @@ use takt_rt::linux::set_nice;
 
 use super::black_box::Incident;
 use super::logger::{LogSummary, Logger};
-use crate::controller::sleep_alignment;
+use crate::sleep_alignment;
 
 /// The pause between two drains of the rings: five records at a cycle of 1 ms.
 const PAUSE: Duration = Duration::from_millis(5);

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use takt::bus::schedule::{self, BusSchedule, Remedy, automatic_command_phase};
 use takt::config::Config;
+use takt::schedule::{self, BusSchedule, Remedy, automatic_command_phase};
 
 use crate::world::parse;
 

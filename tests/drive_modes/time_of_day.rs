@@ -1,8 +1,8 @@
 //! TIME: when it is sent, what it says, and that nobody minds.
 
-use takt::bus::schedule::{self, MessageKind};
 use takt::canopen::time::TimeOfDay;
 use takt::controller::Outcome;
+use takt::schedule::{self, MessageKind};
 use takt_rt::TIME_ID;
 
 use crate::world::{MILLISECOND_NS, World, parse, text_of};

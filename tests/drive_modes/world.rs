@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use takt::channels::LogSide;
 use takt::config::{Axis, Config, ProgramMove, ProgramTarget, Travel};
-use takt::controller::channels::LogSide;
 use takt::controller::{Outcome, VirtualRun};
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{

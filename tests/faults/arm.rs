@@ -4,8 +4,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use takt::bus::port::Port;
 use takt::config::{Axis, Config, Feedback};
+use takt::controller::port::Port;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultEvents, FaultInjector, Scenario};
 use takt::sim::Observation;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use takt::bus::port::Port;
 use takt::config::Config;
 use takt::controller::VirtualRun;
+use takt::controller::port::Port;
 use takt::faults::FaultInjector;
 use takt::sim::SimulatedBus;
 use takt_rt::{Fault, Phase, Request, Rule, StopCause, StopReason};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use takt::bus::port::Port;
 use takt::config::Config;
+use takt::controller::port::Port;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::FaultInjector;
 use takt_rt::{Phase, Rule};

@@ -2,8 +2,8 @@
 //! SDO transfers whenever they like.
 
 use proptest::prelude::*;
-use takt::bus::schedule::{self, BusSchedule, MessageKind, MessageSchedule};
 use takt::config::Config;
+use takt::schedule::{self, BusSchedule, MessageKind, MessageSchedule};
 use takt::sim::WireBitRates;
 use takt_rt::{Frame, FrameKind, Id};
 

@@ -1,8 +1,8 @@
 //! Somebody whose callbacks lead the group anywhere within reason, take too long now and then, and panic.
 
+use takt::channels::GivenCallback;
 use takt::config::{Axis, Compliance, Config, Control};
 use takt::controller::VirtualRun;
-use takt::controller::channels::GivenCallback;
 use takt::{CallbackCommand, CallbackCycle, CallbackState};
 use takt_rt::{AxisLimits, CallbackId, CallbackRun, Follow, Phase, Snapshot};
 

@@ -18,7 +18,7 @@ pub fn let_modes_change(config: &mut Config) {
             *axis = axis.clone().with_other_modes(others);
         }
     }
-    let fits = takt::bus::schedule::analyse(config).iter().all(takt::bus::schedule::BusSchedule::fits);
+    let fits = takt::schedule::analyse(config).iter().all(takt::schedule::BusSchedule::fits);
     if !fits || config.validate().is_err() {
         *config = before;
     }

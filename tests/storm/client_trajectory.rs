@@ -3,9 +3,9 @@
 
 use std::sync::Arc;
 
+use takt::channels::{GivenTrajectory, GroupAxes};
 use takt::config::{Axis, Config};
 use takt::controller::VirtualRun;
-use takt::controller::channels::{GivenTrajectory, GroupAxes};
 use takt::trajectory::{Trajectory, TrajectoryConditions, TrajectoryPoint};
 use takt_rt::plan::State;
 use takt_rt::{

@@ -1,6 +1,5 @@
 //! Whom a fault concerns, from the cycle on in which it begins.
 
-use takt::bus::schedule::analyse;
 use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config};
 use takt::family;
@@ -8,6 +7,7 @@ use takt::faults::{
     Direction, DriveEffect, Effect, FaultInjector, ForeignFrames, FrameEffect, FrameFunction,
     InterfaceEffect, Part, Selection,
 };
+use takt::schedule::analyse;
 use takt::sim::Defect;
 
 use crate::heartbeat::MissedHeartbeat;

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use takt::bus::port::Port;
+use takt::channels::LogSide;
 use takt::config::{Axis, Config};
-use takt::controller::channels::LogSide;
+use takt::controller::port::Port;
 use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario, ScenarioFault};
 use takt::sim::{Observation, SimulatedBus};

@@ -2,11 +2,9 @@
 
 use super::plausibility::{Plausibility, PlausibilityCheck, TravelBound};
 use super::reception::ReportSpan;
-use super::{Jump, SETTLED_CYCLES};
+use super::standstill::Standstill;
+use super::{AT_REST, Jump};
 use crate::units::Scale;
-
-/// A joint slower than this fraction of its velocity limit stands.
-const AT_REST: f64 = 0.02;
 
 /// How the position of the joint is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,8 +28,8 @@ pub(super) struct JointEstimate {
     velocity: f64,
     /// The last report, if the joint cannot have got there.
     jump: Option<Jump>,
-    /// Reports in a row that the joint stands, since the last stop began.
-    standing_reports: u32,
+    /// Whether it has come to rest since the last stop began.
+    standstill: Standstill,
 }
 
 impl JointEstimate {
@@ -53,12 +51,12 @@ impl JointEstimate {
             Plausibility::Plausible { velocity: by_positions } => {
                 self.jump = None;
                 self.velocity = velocity.unwrap_or(by_positions);
+                self.standstill.note(position, span, velocity_limit, bound.count);
                 has_become_known = self.accept(position, counts);
             }
             Plausibility::Implausible { distance, reach } => self.jump = Some(Jump { distance, reach }),
         }
         self.source = Source::ProcessData;
-        self.count_standing(span.is_known, velocity_limit);
         has_become_known
     }
 
@@ -78,19 +76,9 @@ impl JointEstimate {
         !self.is_known()
     }
 
-    /// Counts the reports in a row that show the joint standing. Over slots that were missed it is not known in which time
-    /// the joint has moved how far: a coasting joint may seem to stand in such a report.
-    fn count_standing(&mut self, is_span_known: bool, velocity_limit: f64) {
-        self.standing_reports = match self.is_standing(velocity_limit) {
-            true if is_span_known => self.standing_reports.saturating_add(1),
-            true => self.standing_reports,
-            false => 0,
-        };
-    }
-
     /// A stop begins: from now on it counts for how long the joint has stood.
     pub(super) fn begin_stop(&mut self) {
-        self.standing_reports = 0;
+        self.standstill = Standstill::default();
     }
 
     /// Whether the position is known.
@@ -123,19 +111,20 @@ impl JointEstimate {
         self.jump
     }
 
-    /// Whether the joint is reported to stand.
+    /// Whether the joint is reported to be slow, if only for a moment.
     pub(super) fn is_standing(&self, velocity_limit: f64) -> bool {
         self.velocity.abs() <= AT_REST * velocity_limit
     }
 
-    /// Whether the joint has been reported to stand for some cycles, since the last stop began.
+    /// Whether the joint has been reported in one place for some cycles, since the last stop began.
     pub(super) const fn is_settled(&self) -> bool {
-        self.standing_reports >= SETTLED_CYCLES
+        self.standstill.is_at_rest()
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::standstill::STANDING_REPORTS;
     use super::*;
     use crate::units::ScaleParameters;
     use core::f64::consts::TAU;
@@ -156,7 +145,13 @@ mod tests {
     }
 
     fn report(joint: &mut JointEstimate, counts: i32, is_known: bool) -> bool {
-        joint.take_report(counts, None, ReportSpan { longest_s: 1e-3, is_known }, &scale(), VELOCITY_LIMIT)
+        joint.take_report(
+            counts,
+            None,
+            ReportSpan { longest_s: 1e-3, cycle_s: 1e-3, is_known },
+            &scale(),
+            VELOCITY_LIMIT,
+        )
     }
 
     #[test]
@@ -181,14 +176,12 @@ mod tests {
     }
 
     #[test]
-    fn a_joint_is_settled_after_some_reports_of_known_time_that_it_stands() {
+    fn a_joint_is_settled_after_it_has_stood_for_some_reports_since_the_last_stop_began() {
         let mut joint = JointEstimate::default();
-        for _ in 1..SETTLED_CYCLES {
+        for _ in 0..=STANDING_REPORTS {
+            assert!(!joint.is_settled());
             report(&mut joint, 0, true);
         }
-        report(&mut joint, 0, false);
-        assert!(!joint.is_settled(), "slots were missed before this report");
-        report(&mut joint, 0, true);
         assert!(joint.is_settled());
         joint.begin_stop();
         assert!(!joint.is_settled());

@@ -4,7 +4,8 @@
 //! `stream` (what a source wants, and the set-points that come of it), `torque_loop` (the torque where it is made here),
 //! `mode` (its change at run time), `profile_mode` (targets instead of set-points), `joint` and `plausibility` (where the joint is), `reception` and
 //! `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
-//! `sdo_fallback` (the controlword when process data do not arrive), `command` (the frames), `rest` (has the joint stopped).
+//! `sdo_fallback` (the controlword when process data do not arrive), `command` (the frames), `rest` and `standstill` (has the
+//! joint stopped).
 //!
 //! # Power
 //!
@@ -35,6 +36,7 @@ mod reception;
 mod rest;
 mod sdo_fallback;
 mod set_points;
+mod standstill;
 mod stream;
 mod torque_loop;
 
@@ -68,6 +70,9 @@ pub use parameters::{
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
 const SETTLED_CYCLES: u32 = 4;
+
+/// A joint slower than this fraction of its velocity limit stands.
+const AT_REST: f64 = 0.02;
 
 /// An axis at run time.
 #[derive(Clone, Debug)]

@@ -30,6 +30,8 @@ pub(super) struct Reception {
 pub(super) struct ReportSpan {
     /// Seconds in which the joint may have moved since the report before.
     pub(super) longest_s: f64,
+    /// The period of the bus.
+    pub(super) cycle_s: f64,
     /// Whether no slot was missed, so that the time is known.
     pub(super) is_known: bool,
 }
@@ -90,7 +92,7 @@ impl Reception {
         let longest_s = self.take_span_s(since);
         self.arrived = 0;
         self.age_cycles = 0;
-        Some(ReportSpan { longest_s, is_known: longest_s < USUAL_SPAN * self.cycle_s })
+        Some(ReportSpan { longest_s, cycle_s: self.cycle_s, is_known: longest_s < USUAL_SPAN * self.cycle_s })
     }
 
     /// Seconds in which the joint may have moved since the last complete feedback.
@@ -150,7 +152,7 @@ mod tests {
         reception.note_arrival(0);
         reception.pass(1e-3);
         let span = reception.complete(2, FeedbackSince::Sync);
-        assert_eq!(span, Some(ReportSpan { longest_s: 2e-3, is_known: false }));
+        assert_eq!(span, Some(ReportSpan { longest_s: 2e-3, cycle_s: 1e-3, is_known: false }));
         assert_eq!((reception.age_cycles(), reception.has_any()), (0, false));
     }
 

@@ -11,8 +11,8 @@ impl Axis {
         self.joint.begin_stop();
     }
 
-    /// Whether a stop of the joint is over. It has stood for as long as its drive may take to act on its last command, and in
-    /// profile position it is at its target: a joint that swings back stands for a moment on its way, and so does one before it
+    /// Whether a stop of the joint is over. It has stood for several times what its drive may take to act on its last command, and
+    /// in profile position it is at its target: a joint that swings back stands for a moment on its way, and so does one before it
     /// begins to move. A joint that follows set-points but does not obey is not waited for.
     pub fn has_stopped(&self) -> bool {
         if !self.is_profile() && !self.is_obeying() {
@@ -22,9 +22,9 @@ impl Axis {
         self.joint.is_settled() && (!is_on_its_way || self.is_target_reached())
     }
 
-    /// Whether the joint follows set-points that stand, and is still behind them.
+    /// Whether the joint follows set-points that stand, and has not come to rest on them yet.
     pub fn is_catching_up(&self) -> bool {
-        !self.is_profile() && self.is_obeying() && !self.is_standing()
+        !self.is_profile() && self.is_obeying() && !self.joint.is_settled()
     }
 
     /// Whether the drive must bring its joint to rest by its own quick stop (object 6085) before its power is taken. The
@@ -51,7 +51,7 @@ impl Axis {
         self.joint.is_settled()
     }
 
-    /// Whether the joint is reported to stand.
+    /// Whether the joint is reported to be slow, if only for a moment.
     pub(super) fn is_standing(&self) -> bool {
         self.joint.is_standing(self.parameters.limits.velocity)
     }

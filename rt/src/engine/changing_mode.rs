@@ -14,7 +14,8 @@ use crate::fault::Fault;
 use crate::pdo::{CommandSlot, FeedbackSlot, MappedObject};
 use crate::phase::Phase;
 use crate::record::EventKind;
-use crate::request::{ModeChange, RejectReason, RequestId};
+use crate::rejection::RejectReason;
+use crate::request::{ModeChange, RequestId};
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
 

@@ -47,7 +47,7 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) unsent: UnsentSteps<BUSES>,
     /// Cycles in which its set-points went on.
     pub(super) steps: u64,
-    /// The stop that has begun, or has become harder, and of which the groups that stop with this one do not know yet.
+    /// What the groups that stop with this one do not know yet: a stop that has begun, or has become harder.
     pub(super) untold: Option<StopReason>,
 }
 
@@ -104,6 +104,14 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             stream: self.stream_report(),
             steps: self.steps,
         };
+    }
+
+    /// Keeps a stop for the groups that stop with this one. Of several in one cycle the hardest category counts, and a fault
+    /// before what was asked for: a group without power begins each of them anew.
+    pub(super) fn note_untold(&mut self, stop: StopReason) {
+        let hardest = self.untold.map_or(stop.category, |untold| untold.category.min(stop.category));
+        let reason = self.untold.filter(|untold| !untold.is_requested()).unwrap_or(stop);
+        self.untold = Some(StopReason { category: hardest, ..reason });
     }
 
     /// Ends the cycle, whose commands have left, or were ready too late.

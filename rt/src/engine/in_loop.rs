@@ -16,7 +16,8 @@ use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::plan::State;
 use crate::record::EventKind;
-use crate::request::{RejectReason, RequestId};
+use crate::rejection::RejectReason;
+use crate::request::RequestId;
 use crate::source::{
     AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, StreamSample,
     StreamState,

@@ -9,7 +9,8 @@ use crate::axis::{CommandPdo, Pdo};
 use crate::dispatch::IdTaken;
 use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError};
 use crate::phase::Phase;
-use crate::request::{AxisProcessData, MappedPdo, RejectReason};
+use crate::rejection::RejectReason;
+use crate::request::{AxisProcessData, MappedPdo};
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Changes what is exchanged with an axis' drive. Not where something moves already, the axis is not there, it has no PDO

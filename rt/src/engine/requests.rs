@@ -9,10 +9,8 @@ use crate::axis::Axis;
 use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::record::EventKind;
-use crate::request::{
-    ExecutionStart, RejectReason, Request, RequestEnvelope, RequestError, RequestId, RequestTarget,
-    TrajectoryId,
-};
+use crate::rejection::{RejectReason, RequestError};
+use crate::request::{ExecutionStart, Request, RequestEnvelope, RequestId, RequestTarget, TrajectoryId};
 use crate::source::CallbackRun;
 
 /// Requests that are handled in one cycle; the rest waits, so that a flood of them costs a bounded time.

@@ -4,7 +4,8 @@ use crate::axis::Axis;
 use crate::control::ControlLaw;
 use crate::guard;
 use crate::profile::ProfileTarget;
-use crate::request::{Move, RejectReason};
+use crate::rejection::RejectReason;
+use crate::request::Move;
 
 /// Why a request is rejected, and for which axis.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,11 +3,11 @@
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
-use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
-use takt::bus::port::{OpenError, Port, open_configured};
-use takt::bus::{InterfaceSettings, SocketCanOptions, open_interface};
 use takt::commission::{Failure, TargetDrive, Task, bus_session, procedure};
 use takt::controller::VirtualClock;
+use takt::controller::port::{Port, open_configured};
+use takt::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
+use takt::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
 use takt::sim::SimulatedBus;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, BusState};

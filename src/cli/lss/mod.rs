@@ -7,12 +7,12 @@ use std::sync::atomic::Ordering;
 
 use clap::{Args, Subcommand};
 
-use takt::bus::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
-use takt::bus::{InterfaceSettings, SocketCanOptions, open_socketcan};
 use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 use takt::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings, NO_NODE};
 use takt::config::{Interface, Quantity};
 use takt::controller::VirtualClock;
+use takt::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
+use takt::link::{InterfaceSettings, SocketCanOptions, open_socketcan};
 use takt::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds};

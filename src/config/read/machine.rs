@@ -4,11 +4,9 @@ use std::path::PathBuf;
 
 use super::entry::Entry;
 use super::section::Section;
-use crate::bus::schedule::automatic_command_phase;
 use crate::config::bounds::Bounds;
 use crate::config::defaults;
-use crate::config::model::{Axis, Config, Cycle, Master, Realtime, Simulation, StreamDelay, Telemetry};
-use crate::config::problem_kind::ProblemKind;
+use crate::config::model::{Axis, Cycle, Master, Realtime, Simulation, StreamDelay, Telemetry};
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
 use crate::config::rules;
@@ -27,14 +25,6 @@ pub fn cycle(mut section: Section<'_>) -> (Cycle, Option<Entry<'_>>) {
     section.finish();
     let command_phase_ns = command_phase.unwrap_or_else(|| defaults::command_phase_ns(period_ns));
     (Cycle { period_ns, command_phase_ns }, automatic)
-}
-
-/// Resolves `command_phase = "auto"`, once everything else that counts is known.
-pub fn resolve_command_phase(config: &mut Config, automatic: &Entry<'_>) {
-    match automatic_command_phase(config) {
-        Ok(command_phase_ns) => config.cycle.command_phase_ns = command_phase_ns,
-        Err(cause) => automatic.report(ProblemKind::NoCommandPhase { cause }),
-    }
 }
 
 /// A bare number or a percentage is a fraction of the period, anything else a duration.

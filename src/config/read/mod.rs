@@ -24,13 +24,18 @@ use super::problem_kind::ProblemKind;
 use super::spot::Problems;
 use section::Section;
 
-/// Reads and checks a configuration.
-pub fn parse(
-    source_name: &str,
-    text: &str,
-    families: &[&'static dyn ConfiguredFamily],
-) -> Result<Config, ConfigError> {
-    document(source_name, text, |document, problems| read(document, problems, families))
+/// What the reader needs to know that is not a matter of reading.
+pub(crate) struct Knowledge<'a> {
+    /// Finds what `command_phase = "auto"` stands for in a configuration that is complete otherwise, by an analysis of the buses.
+    /// The error says in words why there is no such phase.
+    pub command_phase: fn(&Config) -> Result<u64, String>,
+    /// The families that a drive may be of.
+    pub families: &'a [&'static dyn ConfiguredFamily],
+}
+
+/// Reads and checks the text of a configuration. `source_name` is what messages call it.
+pub(crate) fn parse(source_name: &str, text: &str, knowledge: &Knowledge<'_>) -> Result<Config, ConfigError> {
+    document(source_name, text, |document, problems| read(document, problems, knowledge))
 }
 
 /// What `read` makes of a TOML document, or else every problem that it has reported.
@@ -60,11 +65,7 @@ fn syntax_problem(error: &toml::de::Error, text: &str) -> Problem {
 }
 
 /// Reads every section, even after one has failed.
-fn read<'a>(
-    document: &'a DeTable<'a>,
-    problems: &'a Problems,
-    families: &[&'static dyn ConfiguredFamily],
-) -> Option<Config> {
+fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowledge<'_>) -> Option<Config> {
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
@@ -87,8 +88,12 @@ fn read<'a>(
     root.require("axis", "at least one [[axis]]");
     let axes =
         root.sections("axis").into_iter().map(|section| section.with_defaults(axis_defaults)).collect();
-    let machine =
-        axis::Machine { buses: &buses, cycle_ns: cycle.period_ns, master_node: master.node, families };
+    let machine = axis::Machine {
+        buses: &buses,
+        cycle_ns: cycle.period_ns,
+        master_node: master.node,
+        families: knowledge.families,
+    };
     let axes = axis::axes(axes, &machine);
 
     let groups = group::groups(root.sections("group"), &axes, problems);
@@ -112,8 +117,12 @@ fn read<'a>(
         telemetry,
         simulation,
     };
+    // Once everything else that counts is known.
     if let Some(automatic_phase) = automatic_phase.filter(|_| problems.is_empty()) {
-        machine::resolve_command_phase(&mut config, &automatic_phase);
+        match (knowledge.command_phase)(&config) {
+            Ok(command_phase_ns) => config.cycle.command_phase_ns = command_phase_ns,
+            Err(cause) => automatic_phase.report(ProblemKind::NoCommandPhase { cause }),
+        }
     }
     Some(config)
 }

@@ -11,8 +11,8 @@ use super::Handle;
 use super::error::{CommandError, Refused};
 use super::motion::{MotionId, MoveOptions};
 use super::waiting::now_ns;
+use crate::channels::{MotionEnd, WAITING_AT_MOST};
 use crate::config::{Axis, Control};
-use crate::controller::channels::{MotionEnd, WAITING_AT_MOST};
 
 impl Handle {
     /// Starts a coordinated move of every axis to its target (rad or m), where the axes come to rest. A move in progress is

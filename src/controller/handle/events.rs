@@ -7,7 +7,7 @@ use takt_rt::Event;
 use super::Handle;
 use super::error::WaitError;
 use super::waiting::Deadline;
-use crate::controller::channels::EventReader;
+use crate::channels::EventReader;
 use crate::telemetry::words;
 
 /// The events of a controller since a beginning: changes of phase, stops, emergency messages, rejections …

@@ -8,7 +8,7 @@ use super::Handle;
 use super::error::{CommandError, WaitError};
 use super::in_loop::{CallbackHandle, CallbackOptions};
 use super::motion::{MotionId, MoveOptions};
-use crate::controller::channels::{CallbackCommand, CallbackState};
+use crate::channels::{CallbackCommand, CallbackState};
 
 /// Commands and observes one group of a running controller, from any thread. Clones are cheap and equal. The drives in profile velocity
 /// and profile torque are commanded by [`Handle::velocity`] and [`Handle::torque`]: the axis names its group.

@@ -11,7 +11,7 @@ use takt_rt::{
 use super::Handle;
 use super::error::{CommandError, MotionError};
 use super::motion::MotionId;
-use crate::controller::channels::{
+use crate::channels::{
     CallbackCommand, CallbackGiver, CallbackRecord, CallbackState, CallbackTimes, GivenCallback,
 };
 

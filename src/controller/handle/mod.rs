@@ -42,9 +42,9 @@ use std::time::Duration;
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Phase, Snapshot, StopCategory};
 
-use super::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use super::outcome::{Interrupt, Outcome};
 use super::session::{self, RemoteHandles, Session, SessionError, SessionOptions};
+use crate::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use crate::config::{Axis, Config, Group};
 use crate::telemetry::{Machine, Notice};
 use in_loop::Callbacks;
@@ -216,7 +216,7 @@ impl Handle {
         &self.0.realtime
     }
 
-    /// The state after the newest complete cycle; after the end, the last one. It says of each axis from when its feedback is:
+    /// The state after the newest complete cycle; after the end, the last one. Before the first one, no drive has reported. It says of each axis from when its feedback is:
     /// [`is_stale`](takt_rt::AxisSnapshot::is_stale), [`feedback_age_ns`](takt_rt::AxisSnapshot::feedback_age_ns).
     pub fn state(&self) -> Snapshot {
         self.0.observer.snapshot()

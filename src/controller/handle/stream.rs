@@ -11,7 +11,7 @@ use takt_rt::{
 
 use super::error::CommandError;
 use super::{GroupHandle, Handle};
-use crate::controller::channels::chunk;
+use crate::channels::chunk;
 use crate::controller::point_check::{PointRefusal, check_point};
 
 /// Why points were not taken; none of them was, then.

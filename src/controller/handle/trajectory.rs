@@ -12,8 +12,8 @@ use takt_rt::{
 use super::error::CommandError;
 use super::motion::MotionId;
 use super::{GroupHandle, Handle};
+use crate::channels::{GivenTrajectory, GroupAxes, TrajectoryGiver};
 use crate::config::Axis;
-use crate::controller::channels::{GivenTrajectory, GroupAxes, TrajectoryGiver};
 use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError, TrajectoryPoint};
 
 /// By how much later than now a trajectory takes the place of another one: first, and at most. It must have been computed and handed

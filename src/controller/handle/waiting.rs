@@ -2,7 +2,7 @@
 //! the next state is expected, and look.
 //!
 //! A cycle shows its state when its set-points have been sent, after about six tenths of the slot. A sleep that ends then does not
-//! disturb the next SYNC; see [`sleep_alignment`](crate::controller::sleep_alignment).
+//! disturb the next SYNC; see [`sleep_alignment`](crate::sleep_alignment).
 
 use std::time::Duration;
 

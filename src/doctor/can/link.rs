@@ -3,7 +3,7 @@
 use serde_json::Value;
 use takt_rt::BusState;
 
-use crate::bus::{self, InterfaceStatus};
+use crate::link::{ControllerTiming, InterfaceStatus};
 
 /// A CAN interface as the kernel describes it. What is not told is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,7 +40,7 @@ pub struct LinkTiming {
 impl Link {
     /// What the kernel tells over netlink without the help of `ip`: less.
     pub fn of_status(status: &InterfaceStatus, queue_length: Option<u64>) -> Self {
-        let timing = |timing: bus::ControllerTiming| LinkTiming {
+        let timing = |timing: ControllerTiming| LinkTiming {
             bit_rate: timing.bit_rate.into(),
             sample_point: timing.sample_point,
         };
@@ -165,7 +165,7 @@ pub mod tests {
             name: "can0".to_owned(),
             is_up: true,
             has_fd: false,
-            timing: Some(bus::ControllerTiming { bit_rate: 1_000_000, sample_point: 0.75 }),
+            timing: Some(ControllerTiming { bit_rate: 1_000_000, sample_point: 0.75 }),
             data_timing: None,
             restart_ms: Some(100),
             state: BusState::ErrorPassive,

@@ -10,7 +10,7 @@ use super::finding::{Check, Finding, Group};
 use super::source::Source;
 use super::subject::{Subject, WantedBus};
 use super::threads::Thread;
-use crate::bus::interface_status;
+use crate::link::interface_status;
 use link::Link;
 
 const INTERFACE: Check = Check {

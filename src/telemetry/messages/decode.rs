@@ -7,7 +7,7 @@ use takt_rt::{
 };
 
 use super::EventFields;
-use crate::bus::trace::TracedHealth;
+use crate::link::trace::TracedHealth;
 use crate::telemetry::cdr::CdrDecoder;
 use crate::telemetry::recorded::RecordedEvent;
 

@@ -21,8 +21,8 @@ use super::messages::{self, MessageType};
 use super::recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
-use crate::bus::trace::TracedHealth;
 use crate::family;
+use crate::link::trace::TracedHealth;
 use crate::printable::printable;
 use records::Record;
 

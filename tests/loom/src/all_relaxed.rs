@@ -1,11 +1,11 @@
 //! The mailbox, the ring and the requests of clients with every access relaxed. The fences are the real ones.
 
-#[path = "../../../src/controller/channels/client_requests.rs"]
+#[path = "../../../src/channels/client_requests.rs"]
 pub mod client_requests;
 
-#[path = "../../../src/controller/channels/latest.rs"]
+#[path = "../../../src/channels/latest.rs"]
 pub mod latest;
-#[path = "../../../src/controller/channels/ring.rs"]
+#[path = "../../../src/channels/ring.rs"]
 pub mod ring;
 
 mod request_numbers {

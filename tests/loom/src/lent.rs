@@ -1,6 +1,6 @@
 //! What the real-time thread borrows: callbacks and trajectories.
 
-#[path = "../../../src/controller/channels/lending.rs"]
+#[path = "../../../src/channels/lending.rs"]
 pub mod lending;
 
 mod primitives {

@@ -21,15 +21,15 @@ pub mod lent_relaxed;
 mod swap_cell;
 pub mod without_fences;
 
-#[path = "../../../src/controller/channels/client_requests.rs"]
+#[path = "../../../src/channels/client_requests.rs"]
 pub mod client_requests;
-#[path = "../../../src/controller/channels/latest.rs"]
+#[path = "../../../src/channels/latest.rs"]
 pub mod latest;
-#[path = "../../../src/controller/channels/records.rs"]
+#[path = "../../../src/channels/records.rs"]
 pub mod records;
-#[path = "../../../src/controller/channels/request_numbers.rs"]
+#[path = "../../../src/channels/request_numbers.rs"]
 pub mod request_numbers;
-#[path = "../../../src/controller/channels/ring.rs"]
+#[path = "../../../src/channels/ring.rs"]
 pub mod ring;
 
 mod primitives {

@@ -1,6 +1,6 @@
 //! The mailbox with fences that have no effect.
 
-#[path = "../../../src/controller/channels/latest.rs"]
+#[path = "../../../src/channels/latest.rs"]
 pub mod latest;
 
 mod primitives {

@@ -1,0 +1,112 @@
+//! Whether a joint has come to rest: for some time it has not left one place.
+//!
+//! A low velocity alone is no rest. A joint that turns round is slow for a moment, and so is one that a torque has only begun to
+//! move. How far such a joint goes in a known time bounds how fast it is in the end.
+
+use super::reception::ReportSpan;
+use super::{AT_REST, SETTLED_CYCLES};
+
+/// Reports that show the joint in one place before it counts as at rest: several times what a drive takes to obey.
+pub(super) const STANDING_REPORTS: u32 = 5 * SETTLED_CYCLES;
+
+/// How large a place may be, as a share of the way at the velocity limit in the time of these reports. A joint that turns round
+/// in the middle of them is four times as fast at their end as its mean speed from end to end of its place. Until its drive has
+/// obeyed the command that takes its power it gets faster by up to half of that again.
+const PLACE: f64 = AT_REST / 6.0;
+
+/// The place where a joint has been reported lately.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Standstill {
+    /// The lowest and the highest position there: rad (m). `None` before the first report.
+    place: Option<(f64, f64)>,
+    /// Reports from there, after the first one.
+    reports: u32,
+}
+
+impl Standstill {
+    /// Takes a reported position. `count` is the resolution of the drive's encoder, by which the position of a standing joint may
+    /// change. Over slots that were missed it is not known in which time the joint has moved how far: such a report does not count.
+    #[inline]
+    pub(super) fn note(&mut self, position: f64, span: ReportSpan, velocity_limit: f64, count: f64) {
+        let farthest = PLACE * velocity_limit * f64::from(STANDING_REPORTS) * span.cycle_s;
+        let (lowest, highest) = self.place.unwrap_or((position, position));
+        let (lowest, highest) = (lowest.min(position), highest.max(position));
+        if highest - lowest > farthest.max(1.5 * count) {
+            *self = Self { place: Some((position, position)), reports: 0 };
+            return;
+        }
+        let has_counted = self.place.is_some() && span.is_known;
+        self.reports = self.reports.saturating_add(u32::from(has_counted));
+        self.place = Some((lowest, highest));
+    }
+
+    /// Whether the joint has been in one place for as long as is needed.
+    pub(super) const fn is_at_rest(&self) -> bool {
+        self.reports >= STANDING_REPORTS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CYCLE_S: f64 = 1e-3;
+    const VELOCITY_LIMIT: f64 = 1.0;
+    const COUNT: f64 = 1.2e-5;
+
+    fn note(standstill: &mut Standstill, position: f64, is_known: bool) {
+        let counts = (position / COUNT).round();
+        let span = ReportSpan { longest_s: CYCLE_S, cycle_s: CYCLE_S, is_known };
+        standstill.note(counts * COUNT, span, VELOCITY_LIMIT, COUNT);
+    }
+
+    /// How fast the joint is, as a share of its limit, when it is first taken to be at rest; `None` if it never is.
+    fn speed_at_rest(position: impl Fn(f64) -> f64) -> Option<f64> {
+        let mut standstill = Standstill::default();
+        let at_s = |cycle: u32| f64::from(cycle) * CYCLE_S;
+        let cycle = (0..2_000).find(|cycle| {
+            note(&mut standstill, position(at_s(*cycle)), true);
+            standstill.is_at_rest()
+        })?;
+        Some((position(at_s(cycle + 1)) - position(at_s(cycle))).abs() / CYCLE_S / VELOCITY_LIMIT)
+    }
+
+    #[test]
+    fn a_joint_that_turns_round_is_slow_whenever_it_is_taken_to_be_at_rest() {
+        for acceleration in [0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0] {
+            for turns_at_ms in 5..60 {
+                let turns_at_s = f64::from(turns_at_ms) * 1e-3;
+                let turning = |at_s: f64| acceleration / 2.0 * (at_s - turns_at_s).powi(2);
+                let speed = speed_at_rest(turning).unwrap_or(0.0);
+                assert!(speed <= AT_REST, "{acceleration}, after {turns_at_ms} ms: {speed}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_joint_is_at_rest_that_its_encoder_reports_one_count_to_and_fro() {
+        let flickering = |at_s: f64| COUNT * f64::from((at_s / CYCLE_S).round() as u32 % 2);
+        assert!(speed_at_rest(flickering).is_some());
+    }
+
+    #[test]
+    fn a_joint_that_swings_or_creeps_is_not_at_rest() {
+        for frequency_hz in [5.0, 20.0, 50.0, 100.0, 200.0] {
+            let swinging = |at_s: f64| 2e-3 * (core::f64::consts::TAU * frequency_hz * at_s).sin();
+            assert_eq!(speed_at_rest(swinging), None, "{frequency_hz} Hz");
+        }
+        assert_eq!(speed_at_rest(|at_s| 0.01 * at_s), None);
+    }
+
+    #[test]
+    fn reports_after_slots_that_were_missed_do_not_count() {
+        let mut standstill = Standstill::default();
+        for report in 0..=STANDING_REPORTS {
+            assert!(!standstill.is_at_rest());
+            note(&mut standstill, 0.0, report != 7);
+        }
+        assert!(!standstill.is_at_rest(), "one of them was not counted");
+        note(&mut standstill, 0.0, true);
+        assert!(standstill.is_at_rest());
+    }
+}

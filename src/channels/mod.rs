@@ -1,0 +1,547 @@
+//! The channels between the real-time thread and the rest of the program. [`channels`] allocates all of them, and returns
+//! their three sides.
+//!
+//! ```text
+//! HostSide ── requests, trajectories, service frames ──▶ RtSide (takt_rt::HostInterface)
+//! clients  ── requests, stops, trajectories, points of a stream, from any number of threads ──▶ RtSide
+//! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
+//! clients  ◀── trajectories that are done with ── RtSide
+//! LogSide  ◀── cycle records, events ── RtSide
+//! ```
+//!
+//! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
+
+mod callback_panic;
+mod callback_record;
+mod callbacks;
+mod client_requests;
+mod event_words;
+mod group_axes;
+mod latest;
+mod lending;
+mod motion_words;
+mod observed_events;
+mod primitives;
+mod records;
+mod request_numbers;
+mod ring;
+mod stream;
+mod trajectories;
+mod words;
+
+use std::sync::Arc;
+
+use takt_rt::{
+    AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CallbackRun, CycleRecord, Event,
+    ExecutionStart, Frame, HostInterface, MAX_AXES, Nanoseconds, Received, Request, RequestEnvelope,
+    RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
+};
+
+use callbacks::CallbackTaker;
+use client_requests::{TakenRequests, client_requests};
+use latest::{Attempt, Reader, Writer};
+use observed_events::{EventWriter, observed_events};
+use records::{RecordConsumer, RecordProducer};
+use stream::{StreamReceiver, stream_channels};
+use trajectories::TrajectoryTaker;
+
+pub(crate) use callback_panic::panic_message;
+pub use callback_record::{CallbackRecord, CallbackTimes};
+pub use callbacks::{
+    CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
+};
+pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub use group_axes::GroupAxes;
+pub use observed_events::EventReader;
+pub use request_numbers::RequestNumbers;
+pub use ring::{Consumer, Producer, ring};
+pub use stream::{GroupStream, Streamer, chunk};
+pub use trajectories::{GivenTrajectory, TrajectoryGiver};
+
+/// The capacity of each channel.
+#[derive(Clone, Debug)]
+pub struct ChannelSizes {
+    /// The stream of each group of the controller, up to [`takt_rt::MAX_GROUPS`].
+    pub groups: Vec<GroupStream>,
+    /// Axes of the controller, up to [`takt_rt::MAX_AXES`].
+    pub axes: usize,
+    /// Buses of the controller, up to [`takt_rt::MAX_BUSES`].
+    pub buses: usize,
+    /// Cycle records that wait for the logger.
+    pub records: usize,
+    /// Events that wait for the logger, and events that an observer can be behind.
+    pub events: usize,
+    /// Requests that wait for the next cycle.
+    pub requests: usize,
+    /// Service frames that wait to be sent, for each bus.
+    pub service_out: usize,
+    /// Received service frames that wait for the host, of all buses together.
+    pub service_in: usize,
+}
+
+/// Why a request or frame was not accepted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ChannelError {
+    /// The channel is full: the real-time thread does not run, or gets too much.
+    #[error("the channel to the real-time thread is full")]
+    Full,
+    /// No bus has this number.
+    #[error("there is no bus {bus}: the controller has {buses} buses")]
+    NoSuchBus {
+        /// The number of the bus.
+        bus: usize,
+        /// The number of buses.
+        buses: usize,
+    },
+}
+
+/// Makes the channels, and allocates and touches all their memory.
+pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
+    let (request_in, request_out) = ring(sizes.requests);
+    let (streamer, streams) = stream_channels(&sizes.groups);
+    let (snapshot_in, snapshot_out) =
+        latest::latest(words::snapshot_words(sizes.groups.len(), sizes.axes, sizes.buses));
+    let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
+    let (received_in, received_out) = ring(sizes.service_in);
+    let (record_in, record_out) = records::record_ring(sizes.records);
+    let (event_in, event_out) = ring(sizes.events);
+    let (giver, taker) = trajectories::trajectories();
+    let (callback_giver, callback_taker) = callbacks::callbacks();
+    let (observed_in, observed_out) = observed_events(sizes.events);
+    let numbers = RequestNumbers::default();
+    let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups.len());
+    let mut rt = RtSide {
+        requests: request_out,
+        clients: taken,
+        is_client_next: true,
+        streams,
+        trajectories: taker,
+        callbacks: callback_taker,
+        service: service_out,
+        received: received_in,
+        records: record_in,
+        events: event_in,
+        observed: observed_in,
+        snapshot: snapshot_in,
+    };
+    rt.publish(&snapshot_before_first_cycle(sizes));
+    let host = HostSide {
+        requests: request_in,
+        trajectories: giver,
+        callbacks: callback_giver,
+        numbers,
+        clients,
+        observed: observed_out,
+        streamer,
+        service: service_in,
+        received: received_out,
+        observer: Observer { snapshot: snapshot_out },
+    };
+    (rt, host, LogSide { records: record_out, events: event_out })
+}
+
+/// A passive controller of so many groups, axes and buses, whose drives have reported nothing.
+fn snapshot_before_first_cycle(sizes: &ChannelSizes) -> Snapshot {
+    Snapshot {
+        group_count: sizes.groups.len() as u8,
+        axis_count: sizes.axes as u8,
+        bus_count: sizes.buses as u8,
+        ..words::NO_SNAPSHOT
+    }
+}
+
+/// The real-time thread's side.
+pub struct RtSide {
+    requests: Consumer<RequestEnvelope>,
+    clients: TakenRequests,
+    /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
+    /// the other.
+    is_client_next: bool,
+    streams: Vec<StreamReceiver>,
+    trajectories: TrajectoryTaker,
+    callbacks: CallbackTaker,
+    service: Vec<Consumer<Frame>>,
+    received: Producer<(usize, Received)>,
+    records: RecordProducer,
+    events: Producer<Event>,
+    observed: EventWriter,
+    snapshot: Writer,
+}
+
+impl RtSide {
+    /// From now on the calls of callbacks are measured so.
+    pub fn measure_callbacks_by(&mut self, clock: CallbackClock) {
+        self.callbacks.measure_by(clock);
+    }
+}
+
+impl HostInterface for RtSide {
+    fn request(&mut self) -> Option<RequestEnvelope> {
+        self.is_client_next = !self.is_client_next;
+        if self.is_client_next {
+            self.requests.pop().or_else(|| self.clients.take())
+        } else {
+            self.clients.take().or_else(|| self.requests.pop())
+        }
+    }
+
+    fn begin_stream(&mut self, group: u8) {
+        if let Some(stream) = self.streams.get_mut(usize::from(group)) {
+            stream.begin();
+        }
+    }
+
+    fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
+        let stream = self.streams.get_mut(usize::from(group));
+        stream.map_or_else(StreamSample::default, |stream| stream.sample(slot_start_ns))
+    }
+
+    fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
+        self.trajectories.sample(group, trajectory, at_s)
+    }
+
+    fn keep_trajectories(&mut self, group: u8, needed: [Option<TrajectoryId>; 2]) {
+        self.trajectories.keep(group, needed);
+    }
+
+    fn take_callback(&mut self, group: u8, callback: CallbackId) -> bool {
+        self.callbacks.take(group, callback)
+    }
+
+    fn callback(
+        &mut self,
+        group: u8,
+        callback: CallbackId,
+        cycle: &CallbackCycle,
+        axes: &[AxisSnapshot; MAX_AXES],
+        targets: &mut [Option<AxisTarget>; MAX_AXES],
+    ) -> CallbackReturn {
+        self.callbacks.call(group, callback, cycle, axes, targets)
+    }
+
+    fn keep_callback(&mut self, group: u8, needed: Option<CallbackId>) {
+        self.callbacks.keep(group, needed);
+    }
+
+    fn service_frame(&mut self, bus: usize) -> Option<Frame> {
+        self.service.get_mut(bus)?.pop()
+    }
+
+    fn received(&mut self, bus: usize, frame: &Received) -> bool {
+        self.received.push((bus, *frame))
+    }
+
+    fn record(&mut self, record: &CycleRecord) -> bool {
+        self.records.push(record)
+    }
+
+    fn event(&mut self, event: &Event) -> bool {
+        self.observed.write(event);
+        self.events.push(*event)
+    }
+
+    fn publish(&mut self, snapshot: &Snapshot) {
+        self.snapshot.write(|words| words::put_snapshot(snapshot, words));
+    }
+}
+
+/// The side of the program that commands the controller.
+pub struct HostSide {
+    requests: Producer<RequestEnvelope>,
+    numbers: RequestNumbers,
+    trajectories: TrajectoryGiver,
+    callbacks: CallbackGiver,
+    clients: ClientRequests,
+    observed: EventReader,
+    streamer: Streamer,
+    service: Vec<Producer<Frame>>,
+    received: Consumer<(usize, Received)>,
+    observer: Observer,
+}
+
+impl HostSide {
+    /// Sends a request. The engine handles the requests in their order, from its next cycle on. Returns the id of the request,
+    /// for [`Snapshot::answers`] and [`Snapshot::motions`].
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; the request is not sent then.
+    pub fn request(&mut self, request: Request) -> Result<RequestId, ChannelError> {
+        self.request_of(RequestTarget::All, request)
+    }
+
+    /// The same, for one group.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; the request is not sent then.
+    pub fn request_of(&mut self, target: RequestTarget, request: Request) -> Result<RequestId, ChannelError> {
+        let id = self.numbers.next();
+        self.submit(RequestEnvelope { id, target, request }).map(|()| id)
+    }
+
+    /// Sends a request with an id of [`HostSide::numbers`].
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; the request is not sent then.
+    pub fn submit(&mut self, envelope: RequestEnvelope) -> Result<(), ChannelError> {
+        if self.requests.push(envelope) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// Asks for a trajectory of a group to be carried out. Returns the number of the request.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing is sent then.
+    pub fn execute(
+        &mut self,
+        group: u8,
+        given: &Arc<GivenTrajectory>,
+        start: ExecutionStart,
+    ) -> Result<RequestId, ChannelError> {
+        let trajectory = self.trajectories.give(group, given).ok_or(ChannelError::Full)?;
+        let requested = self.request_of(RequestTarget::Group(group), Request::Execute { trajectory, start });
+        if requested.is_err() {
+            self.trajectories.take_back(trajectory);
+        }
+        requested
+    }
+
+    /// Asks for a callback to lead its group, as `run` says but for the number. Returns the number of the request.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`]; nothing is sent then.
+    pub fn run_callback(
+        &mut self,
+        given: GivenCallback,
+        run: CallbackRun,
+    ) -> Result<RequestId, ChannelError> {
+        let target = RequestTarget::Group(given.group());
+        let callback = self.callbacks.give(given).ok_or(ChannelError::Full)?;
+        let id = self.numbers.next();
+        let request = Request::RunCallback(CallbackRun { callback, ..run });
+        let submitted = self.submit(RequestEnvelope { id, target, request });
+        if submitted.is_err() {
+            self.callbacks.take_back(callback);
+        }
+        submitted.map(|()| id)
+    }
+
+    /// Frees the callbacks that the real-time thread needs no longer.
+    pub fn free_callbacks(&self) {
+        self.callbacks.release();
+    }
+
+    /// The end that gives callbacks, for another thread.
+    pub fn callbacks(&self) -> CallbackGiver {
+        self.callbacks.clone()
+    }
+
+    /// The end that gives trajectories, for another thread.
+    pub fn trajectories(&self) -> TrajectoryGiver {
+        self.trajectories.clone()
+    }
+
+    /// The source of request ids.
+    pub fn numbers(&self) -> RequestNumbers {
+        self.numbers.clone()
+    }
+
+    /// The way for requests from other threads.
+    pub fn clients(&self) -> ClientRequests {
+        self.clients.clone()
+    }
+
+    /// The events from now on, for another thread.
+    pub fn events(&self) -> EventReader {
+        self.observed.from_now_on()
+    }
+
+    /// The writing ends of the points of streams, for any thread.
+    pub fn streamer(&self) -> Streamer {
+        self.streamer.clone()
+    }
+
+    /// Queues a service frame. It is sent after the set-points of a later cycle.
+    ///
+    /// # Errors
+    /// [`ChannelError::Full`] or [`ChannelError::NoSuchBus`]; the frame will not be sent then.
+    pub fn send_service(&mut self, bus: usize, frame: Frame) -> Result<(), ChannelError> {
+        let buses = self.service.len();
+        let ring = self.service.get_mut(bus).ok_or(ChannelError::NoSuchBus { bus, buses })?;
+        if ring.push(frame) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// The oldest received frame that is not process data, with its bus.
+    pub fn take_service(&mut self) -> Option<(usize, Received)> {
+        self.received.pop()
+    }
+
+    /// The state after the newest complete cycle.
+    pub fn snapshot(&self) -> Snapshot {
+        self.observer.snapshot()
+    }
+
+    /// A handle to the state for another thread.
+    pub fn observer(&self) -> Observer {
+        self.observer.clone()
+    }
+}
+
+/// Reads the state of the controller at any time, without disturbing it. Clone it for every thread.
+#[derive(Clone)]
+pub struct Observer {
+    snapshot: Reader,
+}
+
+impl Observer {
+    /// The state after the newest complete cycle. Before the first one, it is a passive controller whose drives have reported nothing.
+    pub fn snapshot(&self) -> Snapshot {
+        loop {
+            match self.snapshot.attempt(0, words::take_snapshot) {
+                Attempt::Whole(snapshot, _) => return snapshot,
+                // Three cycles have passed during the read, because this thread was preempted. There is one from the beginning.
+                Attempt::Torn | Attempt::Nothing => std::hint::spin_loop(),
+            }
+        }
+    }
+}
+
+/// The logger's side.
+pub struct LogSide {
+    records: RecordConsumer,
+    events: Consumer<Event>,
+}
+
+impl LogSide {
+    /// Passes the oldest waiting cycle record to `read`, in place. Axes beyond `axis_count` hold arbitrary values.
+    pub fn next_record<T>(&mut self, read: impl FnOnce(&CycleRecord) -> T) -> Option<T> {
+        self.records.next(read)
+    }
+
+    /// The oldest waiting event.
+    pub fn take_event(&mut self) -> Option<Event> {
+        self.events.pop()
+    }
+
+    /// The number of records written since the start.
+    pub fn records_written(&self) -> u64 {
+        self.records.pushed()
+    }
+
+    /// The number of records dropped since the start.
+    pub fn records_dropped(&self) -> u64 {
+        self.records.dropped()
+    }
+
+    /// The number of events dropped since the start.
+    pub fn events_dropped(&self) -> u64 {
+        self.events.dropped()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use takt_rt::{EventKind, Phase, StopCategory};
+    use takt_rt::{Id, LookAheadParameters};
+
+    fn envelope(id: RequestId, request: Request) -> RequestEnvelope {
+        RequestEnvelope { id, target: RequestTarget::All, request }
+    }
+
+    fn sizes() -> ChannelSizes {
+        ChannelSizes {
+            groups: vec![GroupStream {
+                axes: GroupAxes::new(vec![0, 1]),
+                look_ahead: LookAheadParameters::default(),
+            }],
+            axes: 2,
+            buses: 2,
+            records: 4,
+            events: 2,
+            requests: 2,
+            service_out: 2,
+            service_in: 2,
+        }
+    }
+
+    #[test]
+    fn requests_arrive_in_order_and_one_too_many_is_an_error() {
+        let (mut rt, mut host, _log) = channels(&sizes());
+        let first = host.request(Request::Enable).unwrap();
+        let second = host.request(Request::Stop(StopCategory::Two)).unwrap();
+        assert!(first < second);
+        assert_eq!(host.request(Request::Shutdown), Err(ChannelError::Full));
+        assert_eq!(rt.request(), Some(envelope(first, Request::Enable)));
+        let request = Request::Stop(StopCategory::Two);
+        assert_eq!(rt.request(), Some(envelope(second, request)));
+        assert_eq!(rt.request(), None);
+    }
+
+    #[test]
+    fn neither_the_host_nor_a_client_holds_up_the_other() {
+        let (mut rt, mut host, _log) = channels(&sizes());
+        let client = host.clients();
+        let own: Vec<_> = (0..2).map(|_| host.request(Request::Enable).unwrap()).collect();
+        let theirs: Vec<_> = (0..4).map(|_| client.submit(Request::ResetFaults).unwrap()).collect();
+        let taken: Vec<_> = std::iter::from_fn(|| rt.request()).map(|envelope| envelope.id).collect();
+        assert_eq!(taken, [theirs[0], own[0], theirs[1], own[1], theirs[2], theirs[3]]);
+    }
+
+    #[test]
+    fn service_frames_keep_to_their_bus_in_both_directions() {
+        let (mut rt, mut host, _log) = channels(&sizes());
+        let frame = Frame::of(Id::canopen(0x600, 5), [0x40, 0x00, 0x10, 0x00]);
+        host.send_service(1, frame).unwrap();
+        assert_eq!(host.send_service(2, frame), Err(ChannelError::NoSuchBus { bus: 2, buses: 2 }));
+        assert_eq!((rt.service_frame(0), rt.service_frame(2)), (None, None));
+        assert_eq!(rt.service_frame(1), Some(frame));
+
+        let received = Received { frame, at_ns: 77 };
+        assert_eq!([0, 1, 1].map(|bus| rt.received(bus, &received)), [true, true, false]);
+        assert_eq!(host.take_service(), Some((0, received)));
+        assert_eq!(host.take_service(), Some((1, received)));
+        assert_eq!(host.take_service(), None);
+    }
+
+    #[test]
+    fn the_state_before_the_first_cycle_has_every_group_axis_and_bus() {
+        let group = |axis| GroupStream {
+            axes: GroupAxes::new(vec![axis]),
+            look_ahead: LookAheadParameters::default(),
+        };
+        let sizes = ChannelSizes { groups: (0..3).map(group).collect(), axes: 3, ..sizes() };
+        let (_rt, host, _log) = channels(&sizes);
+        let first = host.snapshot();
+        assert_eq!((first.groups().len(), first.axis_count, first.bus_count), (3, 3, 2));
+        assert!(first.groups().iter().all(|group| group.phase == Phase::Passive));
+    }
+
+    #[test]
+    fn every_observer_sees_the_newest_snapshot() {
+        let (mut rt, host, _log) = channels(&sizes());
+        let observer = host.observer();
+        let mut snapshot = Snapshot { slot: 9, axis_count: 2, ..words::NO_SNAPSHOT };
+        snapshot.groups[0].phase = Phase::Holding;
+        rt.publish(&snapshot);
+        assert_eq!((observer.snapshot(), host.snapshot()), (snapshot, snapshot));
+    }
+
+    #[test]
+    fn the_log_side_gets_records_and_events_and_the_numbers_of_dropped_ones() {
+        let (mut rt, host, mut log) = channels(&sizes());
+        let record = CycleRecord { axis_count: 2, ..CycleRecord::default() };
+        assert_eq!((0..6).filter(|_| rt.record(&record)).count(), 4);
+        let mut observer = host.events();
+        let event = |slot| Event {
+            slot,
+            at_ns: 0,
+            group: None,
+            kind: EventKind::MotionFinished { request: RequestId(1) },
+        };
+        assert_eq!((0..3).filter(|slot| rt.event(&event(*slot))).count(), 2);
+        assert_eq!(log.next_record(|seen| *seen), Some(record));
+        assert_eq!(log.take_event(), Some(event(0)));
+        assert_eq!(observer.by_ref().map(|seen| seen.slot).collect::<Vec<_>>(), [1, 2]);
+        assert_eq!((observer.missed(), log.events_dropped()), (1, 1));
+        assert_eq!((log.records_written(), log.records_dropped(), log.events_dropped()), (4, 2, 1));
+    }
+}

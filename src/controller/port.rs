@@ -1,0 +1,159 @@
+//! The port of a configured bus, of any kind.
+
+use arrayvec::ArrayVec;
+use takt_rt::Frame;
+use takt_rt::linux::SocketCanPort;
+use takt_rt::{BusHealth, BusPort, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
+
+use super::buses::socket_options;
+use crate::config::{Config, Interface};
+use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
+use crate::link::trace::{Trace, TracedPort, traced};
+use crate::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
+use crate::sim::SimulatedBus;
+
+/// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
+const TRACE_FRAMES: usize = 1 << 13;
+
+/// A bus port of any kind.
+pub enum Port {
+    /// A bus with simulated drives inside this process.
+    Simulated(Box<SimulatedBus>),
+    /// A CAN interface of this machine.
+    SocketCan(Box<SocketCanPort>),
+    /// Any port whose frames are copied to the logger.
+    Traced(Box<TracedPort<Port>>),
+    /// Any port with injected faults.
+    Faulty(Box<FaultyPort<Port>>),
+}
+
+impl Port {
+    /// Opens bus number `bus` of a configuration.
+    ///
+    /// # Errors
+    /// See [`OpenError`].
+    pub fn open(config: &Config, bus: usize) -> Result<Self, OpenError> {
+        let options = socket_options(config, bus);
+        match open_configured(config, bus, &options)? {
+            Some(port) => Ok(Self::SocketCan(Box::new(port))),
+            None => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
+        }
+    }
+
+    /// The simulated bus behind this port, if it is a simulated one.
+    pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
+        match self {
+            Self::Simulated(bus) => Some(bus),
+            Self::SocketCan(_) => None,
+            Self::Traced(port) => port.inner_mut().simulated_mut(),
+            Self::Faulty(port) => port.inner_mut().simulated_mut(),
+        }
+    }
+
+    /// This port with a trace, which receives a copy of every frame, and the trace.
+    pub fn traced(self, name: &str) -> (Self, Trace) {
+        let (port, trace) = traced(self, name, TRACE_FRAMES);
+        (Self::Traced(Box::new(port)), trace)
+    }
+}
+
+/// Brings the interface of bus number `bus` up, as far as needed and permitted, and opens it. Returns `None` for a simulated
+/// bus.
+///
+/// # Errors
+/// See [`OpenError`].
+pub fn open_configured(
+    config: &Config,
+    bus: usize,
+    options: &SocketCanOptions,
+) -> Result<Option<SocketCanPort>, OpenError> {
+    let Some(bus) = config.buses.get(bus) else { return Ok(None) };
+    let Interface::SocketCan(interface) = &bus.interface else { return Ok(None) };
+    open_interface(&bus.name, interface, &InterfaceSettings::of(bus), options).map(Some)
+}
+
+impl From<FaultyPort<Port>> for Port {
+    fn from(port: FaultyPort<Self>) -> Self {
+        Self::Faulty(Box::new(port))
+    }
+}
+
+impl BusPort for Port {
+    fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
+        match self {
+            Self::Simulated(port) => port.send(now_ns, frames),
+            Self::SocketCan(port) => port.send(now_ns, frames),
+            Self::Traced(port) => port.send(now_ns, frames),
+            Self::Faulty(port) => port.send(now_ns, frames),
+        }
+    }
+
+    fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
+        let mut sockets = ArrayVec::<_, MAX_BUSES>::new();
+        let mut traced = ArrayVec::<_, MAX_BUSES>::new();
+        for Outgoing { port, frames, taken } in outgoing.iter_mut().take(MAX_BUSES) {
+            match port {
+                Self::SocketCan(port) => sockets.push(Outgoing { port: port.as_mut(), frames, taken }),
+                Self::Traced(port) => traced.push(Outgoing { port: port.as_mut(), frames, taken }),
+                Self::Simulated(port) => **taken = port.send(now_ns, frames),
+                Self::Faulty(port) => **taken = port.send(now_ns, frames),
+            }
+        }
+        if !sockets.is_empty() {
+            SocketCanPort::send_together(now_ns, &mut sockets);
+        }
+        if !traced.is_empty() {
+            TracedPort::send_together(now_ns, &mut traced);
+        }
+    }
+
+    fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
+        match self {
+            Self::Simulated(port) => port.receive(now_ns, batch),
+            Self::SocketCan(port) => port.receive(now_ns, batch),
+            Self::Traced(port) => port.receive(now_ns, batch),
+            Self::Faulty(port) => port.receive(now_ns, batch),
+        }
+    }
+
+    fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
+        match self {
+            Self::Simulated(port) => port.unconfirmed(now_ns),
+            Self::SocketCan(port) => port.unconfirmed(now_ns),
+            Self::Traced(port) => port.unconfirmed(now_ns),
+            Self::Faulty(port) => port.unconfirmed(now_ns),
+        }
+    }
+
+    fn health(&mut self) -> BusHealth {
+        match self {
+            Self::Simulated(port) => port.health(),
+            Self::SocketCan(port) => port.health(),
+            Self::Traced(port) => port.health(),
+            Self::Faulty(port) => port.health(),
+        }
+    }
+}
+
+impl Injectable for Port {
+    fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Delivery {
+        match self {
+            Self::Simulated(port) => Injectable::send_foreign(port.as_mut(), now_ns, frame),
+            Self::SocketCan(port) => {
+                port.send(now_ns, &[*frame]);
+                Delivery::ToOthers
+            }
+            Self::Traced(port) => port.send_foreign(now_ns, frame),
+            Self::Faulty(port) => port.send_foreign(now_ns, frame),
+        }
+    }
+
+    fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
+        match self {
+            Self::Simulated(port) => port.inject(node, effect, is_present),
+            Self::SocketCan(_) => Err(InjectError::NotSimulated),
+            Self::Traced(port) => port.inject(node, effect, is_present),
+            Self::Faulty(port) => port.inject(node, effect, is_present),
+        }
+    }
+}

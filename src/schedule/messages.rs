@@ -1,0 +1,191 @@
+//! Every message that a configuration puts on a bus.
+
+use serde::Serialize;
+use takt_rt::{Id, TIME_ID, TransmissionType};
+
+use crate::canopen::function_code;
+use crate::config::{Axis, Config, Master};
+use crate::drive::{PdoPlan, ProcessData, Reply};
+use crate::frame_time::FrameShape;
+
+/// What a message is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MessageKind {
+    /// SYNC of the controller (CiA 301, 7.2.5).
+    Sync,
+    /// Emergency of a drive (7.2.7).
+    Emergency,
+    /// TPDO of a drive.
+    Feedback,
+    /// RPDO of a drive.
+    SetPoint,
+    /// TPDO with which a drive answers a set-point at once.
+    Answer,
+    /// Answer of a drive's SDO server.
+    SdoResponse,
+    /// Request of the controller's SDO client.
+    SdoRequest,
+    /// Heartbeat of a drive (7.2.8).
+    DriveHeartbeat,
+    /// Heartbeat of the controller.
+    MasterHeartbeat,
+    /// TIME of the controller (7.2.6).
+    Time,
+}
+
+impl MessageKind {
+    /// Sent besides the process data. What drives send of it is less important by its identifier; the controller's own
+    /// follows its set-points in one queue, so that TIME, whose identifier is more important, is none the sooner for it.
+    pub(super) fn is_background(self) -> bool {
+        match self {
+            Self::SdoResponse
+            | Self::SdoRequest
+            | Self::DriveHeartbeat
+            | Self::MasterHeartbeat
+            | Self::Time => true,
+            Self::Sync | Self::Emergency | Self::Feedback | Self::SetPoint | Self::Answer => false,
+        }
+    }
+
+    /// Sent by the controller, so that it stands in the controller's own queue.
+    pub(super) fn is_ours(self) -> bool {
+        matches!(self, Self::Sync | Self::SetPoint | Self::SdoRequest | Self::MasterHeartbeat | Self::Time)
+    }
+
+    pub(super) fn is_sdo(self) -> bool {
+        matches!(self, Self::SdoResponse | Self::SdoRequest)
+    }
+}
+
+/// A message before it is analysed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct BusMessage {
+    pub kind: MessageKind,
+    /// The index of the axis that sends or is sent to.
+    pub axis: Option<usize>,
+    pub id: Id,
+    pub shape: FrameShape,
+    /// Shortest time between two.
+    pub period_ns: u64,
+    /// How much later than its period it may be queued.
+    pub jitter_ns: u64,
+    /// The deadline after it was queued; `None` where being late does no harm, or where the slot sets the deadline.
+    pub deadline_ns: Option<u64>,
+    /// Whether the drive sends it on its own events instead of at SYNC.
+    pub is_asynchronous: bool,
+}
+
+/// Shortest time between two emergency messages: the first one stops the group, so that a later one disturbs nothing.
+const EMERGENCY_INTERVAL_NS: u64 = 1_000_000_000;
+
+const SDO_BYTES: usize = 8;
+const EMERGENCY_BYTES: usize = 8;
+const HEARTBEAT_BYTES: usize = 1;
+const TIME_BYTES: usize = 6;
+/// Transmission types above this are sent on events of the drive (CiA 301, 7.5.2.38).
+const LAST_SYNCHRONOUS_TYPE: u8 = 240;
+
+/// The messages of a bus by priority, highest first.
+pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
+    let Some(bus) = config.buses.get(bus_index) else { return vec![] };
+    let period_ns = config.bus_cycle(bus_index).period_ns;
+    let mut messages = vec![message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns)];
+    let Master { node, heartbeat_ns, time_ns, .. } = config.master;
+    let heartbeat = heartbeat_ns.map(|period_ns| {
+        message(
+            MessageKind::MasterHeartbeat,
+            None,
+            Id::canopen(function_code::ERROR_CONTROL, node),
+            HEARTBEAT_BYTES,
+            period_ns,
+        )
+    });
+    let time = time_ns.map(|period_ns| message(MessageKind::Time, None, TIME_ID, TIME_BYTES, period_ns));
+    // They are sent in a cycle of the controller, so up to one cycle late.
+    let own = heartbeat.into_iter().chain(time);
+    messages.extend(own.map(|message| BusMessage { jitter_ns: config.cycle.period_ns, ..message }));
+    let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
+    for (index, axis) in axes() {
+        messages.extend(axis_messages(index, axis, period_ns));
+    }
+    messages.extend(
+        axes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
+    );
+    messages.sort_by_key(|message| message.id.arbitration_key());
+    messages
+}
+
+fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period_ns: u64) -> BusMessage {
+    BusMessage {
+        kind,
+        axis,
+        id,
+        shape: FrameShape::classic(length),
+        period_ns,
+        jitter_ns: 0,
+        deadline_ns: kind.is_background().then_some(period_ns),
+        is_asynchronous: false,
+    }
+}
+
+fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
+    let data = ProcessData::of(axis);
+    let of_axis =
+        |kind, pdo: &PdoPlan, period_ns| message(kind, Some(index), pdo.id, pdo.length(), period_ns);
+    let mut messages = vec![];
+    if axis.drive.sends_emergencies {
+        let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
+        messages.push(message(kind, Some(index), id, EMERGENCY_BYTES, EMERGENCY_INTERVAL_NS));
+    }
+    messages.extend(data.feedback.iter().map(|pdo| {
+        let is_asynchronous = pdo.transmission_type > LAST_SYNCHRONOUS_TYPE;
+        let answers_set_points = pdo.reply != Reply::No && is_asynchronous;
+        // Which SYNCs a drive answers that answers every second one cannot be known: the slot counts its feedback
+        // always.
+        let syncs = if is_asynchronous { 1 } else { u64::from(pdo.transmission_type.max(1)) };
+        let kind = if answers_set_points { MessageKind::Answer } else { MessageKind::Feedback };
+        BusMessage {
+            jitter_ns: axis.feedback_delay_ns,
+            is_asynchronous: is_asynchronous && !answers_set_points,
+            ..of_axis(kind, pdo, syncs * period_ns)
+        }
+    }));
+    messages.extend(data.answer().map(|pdo| BusMessage {
+        jitter_ns: axis.feedback_delay_ns,
+        ..of_axis(MessageKind::Answer, pdo, period_ns)
+    }));
+    // A controlword that is sent when it changes goes to one axis in a cycle while they are enabled, and the group
+    // stands still then: its delay does no harm, and it is not part of the sums.
+    let every_cycle = data.commands.iter().filter(|pdo| pdo.transmission == TransmissionType::EveryCycle);
+    messages.extend(every_cycle.map(|pdo| of_axis(MessageKind::SetPoint, pdo, period_ns)));
+    messages.extend(axis.heartbeat_ns.map(|heartbeat_ns| {
+        let id = Id::canopen(function_code::ERROR_CONTROL, axis.node);
+        message(MessageKind::DriveHeartbeat, Some(index), id, HEARTBEAT_BYTES, heartbeat_ns)
+    }));
+    messages
+}
+
+/// One transfer at a time for each node, at most one request in a cycle for each service frame that the bus allows;
+/// the controller's heartbeat comes in addition.
+/// A drive answers after 0.3 to 1 ms, so two of its answers may follow each other more closely than a cycle.
+fn sdo(index: usize, axis: &Axis, period_ns: u64) -> [BusMessage; 2] {
+    let request = message(
+        MessageKind::SdoRequest,
+        Some(index),
+        Id::canopen(function_code::SDO_REQUEST, axis.node),
+        SDO_BYTES,
+        period_ns,
+    );
+    let response = message(
+        MessageKind::SdoResponse,
+        Some(index),
+        Id::canopen(function_code::SDO_RESPONSE, axis.node),
+        SDO_BYTES,
+        period_ns,
+    );
+    [
+        BusMessage { deadline_ns: None, ..request },
+        BusMessage { deadline_ns: None, jitter_ns: period_ns, ..response },
+    ]
+}

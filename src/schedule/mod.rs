@@ -1,0 +1,317 @@
+//! Whether the buses can carry what a configuration asks of them, in the worst case, before anything moves.
+//!
+//! Two questions are answered for each bus. How long can any message take, with everything else queued at the worst
+//! moment (`response_time`)? And does the slot hold: all feedback there before the command phase, all set-points
+//! sent before the next SYNC (`slot`)? The second decides about process data, since their moments in the slot are
+//! known; the first about all else.
+//!
+//! Emergency messages are not part of the sums. A drive that sends one has stopped obeying or is about to, the group
+//! stops, and one such frame does no harm: feedback that misses the command phase is one missed cycle of the several
+//! that `missed_feedback_cycles` allows, and set-points that are pushed beyond the slot are sent before the SYNC that
+//! then leaves late. To demand room for an emergency in every slot would cost every third eRob its place on a bus at
+//! 1 ms. What one does to a slot is shown beside the regular case ([`EmergencyEffect`]).
+//!
+//! The sums are those of a punctual controller, and what they leave is shown as its reserve; a fit with less than
+//! [`WAKE_UP_RESERVE_NS`] (and [`COMPUTE_RESERVE_NS`] before the set-points) is called narrow, not refused, since what
+//! is enough depends on the machine: `takt jitter` measures it.
+
+mod bound;
+mod command_phase;
+mod loading;
+mod messages;
+mod remedy;
+mod response_time;
+mod slot;
+pub mod text;
+
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::config::{Config, Cycle};
+use crate::frame_time::{BitRates, worst_case_bits};
+use bound::Traffic;
+use messages::BusMessage;
+
+pub use command_phase::{NoCommandPhase, automatic_command_phase};
+pub use messages::MessageKind;
+pub use remedy::Remedy;
+pub use response_time::{Message, response_time};
+pub use slot::Slot;
+
+/// The result of the analysis of one bus. Times are in ns.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct BusSchedule {
+    /// Its name.
+    pub name: String,
+    /// Its bit rate in bit/s.
+    pub bit_rate: u32,
+    /// The period of the cycle.
+    pub period_ns: u64,
+    /// When the command phase begins.
+    pub command_phase_ns: u64,
+    /// Every message by priority, highest first.
+    pub messages: Vec<MessageSchedule>,
+    /// Share of the time that the bus is busy in regular operation, with frames of worst-case length.
+    pub load_percent: f64,
+    /// The worst slot.
+    pub slot: Slot,
+    /// What one emergency message does to that slot; `None` on a bus without drives.
+    pub emergency: Option<EmergencyEffect>,
+    /// What does not fit; empty when all does.
+    pub shortfalls: Vec<Shortfall>,
+    /// What would make it fit; empty when it does.
+    pub remedies: Vec<Remedy>,
+}
+
+impl BusSchedule {
+    /// Whether the bus carries everything in time.
+    pub fn fits(&self) -> bool {
+        self.shortfalls.is_empty()
+    }
+
+    /// Whether it fits with less reserve than a controller can be expected to need.
+    pub fn is_narrow(&self) -> bool {
+        let is_sync_narrow = self.slot.sync_reserve_ns < WAKE_UP_RESERVE_NS;
+        let is_rest_narrow = self.slot.set_points_reserve_ns < WAKE_UP_RESERVE_NS + COMPUTE_RESERVE_NS;
+        self.fits() && (is_sync_narrow || is_rest_narrow)
+    }
+}
+
+/// The wake-up latency that a slot should allow for: somewhat more than the worst of a PREEMPT_RT kernel on a machine
+/// that is set up for it.
+pub const WAKE_UP_RESERVE_NS: u64 = 20_000;
+/// What a slot should allow for between the second wake-up and the set-points in the queue: receiving, computing and
+/// the system calls.
+pub const COMPUTE_RESERVE_NS: u64 = 20_000;
+
+/// What one emergency message does to the worst slot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct EmergencyEffect {
+    /// How long it is on the wire.
+    pub transmission_ns: u64,
+    /// By how much feedback can then miss the command phase; 0 where it is still in time.
+    pub feedback_late_ns: u64,
+    /// By how much the next SYNC can then be late, behind the last of what was queued before it; 0 where it is not.
+    pub next_sync_late_ns: u64,
+}
+
+impl EmergencyEffect {
+    /// Whether it finds room in the slot.
+    pub fn fits(self) -> bool {
+        self.feedback_late_ns == 0 && self.next_sync_late_ns == 0
+    }
+
+    fn on(slot: &Slot, command_phase_ns: u64) -> Option<Self> {
+        let transmission_ns = slot.emergency_ns;
+        (transmission_ns > 0).then(|| Self {
+            transmission_ns,
+            feedback_late_ns: (slot.feedback_done_ns + transmission_ns).saturating_sub(command_phase_ns),
+            next_sync_late_ns: transmission_ns.saturating_sub(slot.set_points_reserve_ns),
+        })
+    }
+}
+
+/// The result of the analysis of one message. Times are in ns.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct MessageSchedule {
+    /// What it is.
+    pub kind: MessageKind,
+    /// The axis that sends it or that it is sent to.
+    pub axis: Option<String>,
+    /// Its identifier; the smaller it is, the more important the message.
+    pub id: u32,
+    /// Its payload in bytes.
+    pub length: usize,
+    /// Its longest frame in bits, stuff bits and intermission included.
+    pub bits: u32,
+    /// Shortest time between two of its kind.
+    pub period_ns: u64,
+    /// How much later than its period it may be queued.
+    pub jitter_ns: u64,
+    /// Its longest time on the wire.
+    pub transmission_ns: u64,
+    /// Whether it is sent while the axes are enabled, and counted.
+    pub is_sent_while_enabled: bool,
+    /// The longest time from the event that queues it until it has been received; `None` where there is no bound, or
+    /// where it is not sent while the axes are enabled.
+    pub response_ns: Option<u64>,
+    /// The latest moment, counted from the start of the slot, at which it has arrived; `None` where it is not tied to
+    /// a moment in the slot.
+    pub in_slot_ns: Option<u64>,
+    /// What `in_slot_ns`, or the response time where that is `None`, must not exceed; `None` where being late does no
+    /// harm.
+    pub deadline_ns: Option<u64>,
+}
+
+/// Something that does not fit. Times are in ns.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "what")]
+pub enum Shortfall {
+    /// Feedback can arrive after the command phase has begun.
+    FeedbackLate {
+        /// When all of it has arrived.
+        done_ns: u64,
+        /// When it must have.
+        command_phase_ns: u64,
+    },
+    /// Set-points can still be waiting when the next SYNC is due.
+    SetPointsLate {
+        /// When all of them have been sent.
+        done_ns: u64,
+        /// When they must have been.
+        period_ns: u64,
+    },
+    /// Another message can take longer than it may.
+    MessageLate {
+        /// What it is.
+        kind: MessageKind,
+        /// Its axis.
+        axis: Option<String>,
+        /// How long it can take; `None` where there is no bound.
+        response_ns: Option<u64>,
+        /// How long it may take.
+        deadline_ns: u64,
+    },
+}
+
+/// Buses that cannot carry what a configuration asks of them. `Display` gives the sums and what would fit.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error("{}", text::refusal(.buses))]
+pub struct ScheduleError {
+    /// All buses of the configuration, those that fit too.
+    pub buses: Vec<BusSchedule>,
+}
+
+/// Analyses every bus, in the order of the configuration.
+pub fn analyse(config: &Config) -> Vec<BusSchedule> {
+    (0..config.buses.len())
+        .map(|index| {
+            let mut schedule = analyse_bus(config, index);
+            if !schedule.fits() {
+                schedule.remedies = remedy::remedies(config, index);
+            }
+            schedule
+        })
+        .collect()
+}
+
+/// Analyses every bus and refuses a configuration with one that does not fit.
+pub fn verify(config: &Config) -> Result<Vec<BusSchedule>, ScheduleError> {
+    let buses = analyse(config);
+    if buses.iter().all(BusSchedule::fits) { Ok(buses) } else { Err(ScheduleError { buses }) }
+}
+
+fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
+    let bus = config.buses.get(index);
+    let cycle = config.bus_cycle(index);
+    let bit_rate = bus.map_or(0, |bus| bus.bit_rate);
+    let rates =
+        BitRates { nominal: bit_rate, data: bus.and_then(|bus| bus.data_bit_rate).unwrap_or(bit_rate) };
+    let allows_sdo = bus.is_some_and(|bus| bus.sdo_while_enabled);
+    let all = messages::messages(config, index);
+    let is_sent_while_enabled = |message: &BusMessage| allows_sdo || !message.kind.is_sdo();
+    let enabled: Vec<&BusMessage> = all.iter().filter(|message| is_sent_while_enabled(message)).collect();
+
+    let on_bus = config.axes.iter().filter(|axis| axis.bus == index);
+    let feedback_delay_ns = on_bus.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
+    let slot = slot::worst_slot(&enabled, feedback_delay_ns, cycle, rates);
+    let is_queue_empty_at_sync = slot.is_queue_empty_at_sync;
+    let response_ns = |at: usize| {
+        let (messages, place) = beside(&enabled, at);
+        Traffic { messages: &messages, is_queue_empty_at_sync, rates }.response_time(place)
+    };
+    let messages: Vec<MessageSchedule> = all
+        .iter()
+        .map(|message| {
+            let bits = worst_case_bits(message.shape);
+            let at = enabled.iter().position(|other| std::ptr::eq(*other, message));
+            let (in_slot_ns, deadline_ns) = in_slot(message, &enabled, &slot, cycle, rates);
+            MessageSchedule {
+                kind: message.kind,
+                axis: message.axis.and_then(|axis| config.axes.get(axis)).map(|axis| axis.name.clone()),
+                id: message.id.value(),
+                length: message.shape.length,
+                bits: bits.nominal + bits.data,
+                period_ns: message.period_ns,
+                jitter_ns: message.jitter_ns,
+                transmission_ns: rates.duration_ns(bits),
+                is_sent_while_enabled: at.is_some(),
+                response_ns: at.and_then(response_ns),
+                in_slot_ns,
+                deadline_ns,
+            }
+        })
+        .collect();
+    BusSchedule {
+        name: bus.map(|bus| bus.name.clone()).unwrap_or_default(),
+        bit_rate,
+        period_ns: cycle.period_ns,
+        command_phase_ns: cycle.command_phase_ns,
+        load_percent: load_percent(&messages),
+        shortfalls: shortfalls(&messages, &slot, cycle),
+        messages,
+        slot,
+        emergency: EmergencyEffect::on(&slot, cycle.command_phase_ns),
+        remedies: vec![],
+    }
+}
+
+/// When a message has arrived in the slot, if it has a moment there, and when it must have.
+fn in_slot(
+    message: &BusMessage,
+    all: &[&BusMessage],
+    slot: &Slot,
+    cycle: Cycle,
+    rates: BitRates,
+) -> (Option<u64>, Option<u64>) {
+    match message.kind {
+        // Its lateness is part of the feedback's.
+        MessageKind::Sync => (Some(slot.wait_before_sync_ns + slot.sync_ns), None),
+        MessageKind::Feedback => (Some(slot.feedback_done_ns), Some(cycle.command_phase_ns)),
+        MessageKind::SetPoint => {
+            let counts = |kind| matches!(kind, MessageKind::SetPoint | MessageKind::Answer);
+            let up_to = all.iter().filter(|other| counts(other.kind) && other.axis <= message.axis);
+            let sent_ns: u64 = up_to.map(|other| rates.duration_ns(worst_case_bits(other.shape))).sum();
+            let done_ns = cycle.command_phase_ns + slot.wait_before_set_points_ns + sent_ns;
+            (Some(done_ns), Some(cycle.period_ns))
+        }
+        MessageKind::Answer => (Some(slot.set_points_done_ns), Some(cycle.period_ns)),
+        _ => (None, message.deadline_ns),
+    }
+}
+
+fn load_percent(messages: &[MessageSchedule]) -> f64 {
+    messages
+        .iter()
+        .filter(|message| message.is_sent_while_enabled && message.kind != MessageKind::Emergency)
+        .map(|message| 100.0 * message.transmission_ns as f64 / message.period_ns as f64)
+        .sum()
+}
+
+fn shortfalls(messages: &[MessageSchedule], slot: &Slot, cycle: Cycle) -> Vec<Shortfall> {
+    let (period_ns, command_phase_ns) = (cycle.period_ns, cycle.command_phase_ns);
+    let feedback = (slot.feedback_done_ns > command_phase_ns)
+        .then_some(Shortfall::FeedbackLate { done_ns: slot.feedback_done_ns, command_phase_ns });
+    let set_points = (slot.set_points_done_ns > period_ns)
+        .then_some(Shortfall::SetPointsLate { done_ns: slot.set_points_done_ns, period_ns });
+    let others = messages.iter().filter_map(|message| {
+        let deadline_ns = message.deadline_ns.filter(|_| message.kind.is_background())?;
+        let is_late = message.response_ns.is_none_or(|response| response > deadline_ns);
+        is_late.then(|| Shortfall::MessageLate {
+            kind: message.kind,
+            axis: message.axis.clone(),
+            response_ns: message.response_ns,
+            deadline_ns,
+        })
+    });
+    feedback.into_iter().chain(set_points).chain(others).collect()
+}
+
+/// The messages that count for the response time of one message, and the place of that message among them. An emergency
+/// message is analysed as the only one of its kind; all others are analysed without emergency messages.
+fn beside<'a>(all: &[&'a BusMessage], at: usize) -> (Vec<&'a BusMessage>, usize) {
+    let counts = |index: usize, message: &BusMessage| index == at || message.kind != MessageKind::Emergency;
+    let counted = || all.iter().enumerate().filter(|(index, message)| counts(*index, message));
+    let place = counted().take_while(|(index, _)| *index < at).count();
+    (counted().map(|(_, message)| *message).collect(), place)
+}

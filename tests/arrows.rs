@@ -1,0 +1,313 @@
+//! The folders of src/ stand in one order, and use only what is below them.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
+const ORDER: [&str; 23] = [
+    "cli",
+    "doctor",
+    "jitter",
+    "play",
+    "error",
+    "controller",
+    "telemetry",
+    "schedule",
+    "family",
+    "commission",
+    "drive",
+    "faults",
+    "link",
+    "sim",
+    "config",
+    "procedure",
+    "canopen",
+    "channels",
+    "trajectory",
+    "frame_time",
+    "sleep_alignment",
+    "source_text",
+    "printable",
+    "text_file",
+];
+
+/// Arrows that still point back.
+const KNOWN: [(&str, &str); 0] = [];
+
+/// One use of a folder by another.
+#[derive(Clone, Debug, PartialEq, Eq)]
+struct Arrow {
+    from: String,
+    to: String,
+    place: String,
+}
+
+#[test]
+fn no_folder_uses_one_that_stands_above_it() {
+    let back: Vec<String> = arrows()
+        .into_iter()
+        .filter(|arrow| points_back(arrow) && !KNOWN.iter().any(|known| is_known(arrow, known)))
+        .map(|Arrow { from, to, place }| format!("{place}: {from} uses {to}, which is above it"))
+        .collect();
+    assert!(back.is_empty(), "arrows that point back:\n{}", back.join("\n"));
+}
+
+#[test]
+fn every_known_arrow_that_points_back_is_still_there() {
+    let arrows = arrows();
+    for known in &KNOWN {
+        let is_there = arrows.iter().any(|arrow| points_back(arrow) && is_known(arrow, known));
+        assert!(is_there, "{} uses {} no more: remove it from KNOWN", known.0, known.1);
+    }
+}
+
+#[test]
+fn the_folders_of_src_are_those_of_the_order() {
+    let there: BTreeSet<String> = sources().iter().map(|path| module_path(path)[0].clone()).collect();
+    let roots = ["lib", "main"].map(str::to_owned);
+    let ordered: BTreeSet<String> = ORDER.map(str::to_owned).into_iter().chain(roots).collect();
+    assert_eq!(there, ordered);
+}
+
+#[test]
+fn the_picture_in_the_tour_shows_the_order() {
+    let tour = fs::read_to_string(source_root().join("lib.rs")).unwrap();
+    let picture = tour.split("//! ```text\n").nth(1).and_then(|rest| rest.split("//! ```").next()).unwrap();
+    // The names of a line are before its words, which begin behind two blanks.
+    let line = |line: &str| line.trim_start_matches("//! ").split("  ").next().unwrap().to_owned();
+    let shown: Vec<String> = picture
+        .lines()
+        .flat_map(|text| line(text).split(' ').map(str::to_owned).collect::<Vec<_>>())
+        .collect();
+    assert_eq!(shown, ORDER);
+}
+
+#[test]
+fn uses_are_found_wherever_they_stand_in_a_file_and_not_in_comments_or_texts() {
+    let text = r##"
+        //! [`crate::cli`]
+        use crate::{config::{self, Bus}, sim};
+        use super::super::controller::Handle;
+        /* crate::doctor */
+        const TEXT: &str = "crate::jitter \" crate::jitter"; const RAW: &str = r#"crate::jitter"#;
+        fn f<'a>(c: char) -> bool { c == '"' || crate::link::is_up::<'a>() }
+        mod tests {
+            use super::super::super::play;
+            use super::super::inner;
+            mod deeper { use super::super::super::super::schedule::Slot; }
+        }
+        use super::beside;
+        use crate::faults;
+    "##;
+    let found = arrows_in(text, &["here", "inner"].map(str::to_owned), "x.rs");
+    let seen: Vec<_> = found.iter().map(|arrow| (arrow.to.as_str(), arrow.place.as_str())).collect();
+    let expected = [
+        ("config", "x.rs:3"),
+        ("sim", "x.rs:3"),
+        ("controller", "x.rs:4"),
+        ("link", "x.rs:7"),
+        ("play", "x.rs:9"),
+        ("schedule", "x.rs:11"),
+        ("faults", "x.rs:14"),
+    ];
+    assert_eq!(seen, expected);
+    assert!(found.iter().all(|arrow| arrow.from == "here"));
+}
+
+fn is_known(arrow: &Arrow, (from, to): &(&str, &str)) -> bool {
+    arrow.from == *from && arrow.to == *to
+}
+
+/// An arrow to something that is no folder, such as a name that lib.rs re-exports, hides where it leads: it points back too.
+fn points_back(arrow: &Arrow) -> bool {
+    let place = |name: &str| ORDER.iter().position(|folder| *folder == name);
+    match (place(&arrow.from), place(&arrow.to)) {
+        (Some(from), Some(to)) => to < from,
+        // lib.rs and main.rs stand above all.
+        (None, _) => false,
+        // The program sees the library from outside.
+        (Some(_), None) => arrow.from != "cli",
+    }
+}
+
+fn arrows() -> Vec<Arrow> {
+    let mut all = vec![];
+    for path in sources() {
+        let text = fs::read_to_string(&path).unwrap();
+        let shown = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string();
+        all.extend(arrows_in(&text, &module_path(&path), &shown));
+    }
+    all
+}
+
+fn source_root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+fn sources() -> Vec<PathBuf> {
+    fn add(directory: &Path, to: &mut Vec<PathBuf>) {
+        for entry in fs::read_dir(directory).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                add(&path, to);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                to.push(path);
+            }
+        }
+    }
+    let mut all = vec![];
+    add(&source_root(), &mut all);
+    all.sort();
+    assert!(all.len() > 100, "src/ was not found");
+    all
+}
+
+/// The names of the module of a file, as in `["link", "ownership"]`.
+fn module_path(path: &Path) -> Vec<String> {
+    let relative = path.strip_prefix(source_root()).unwrap().with_extension("");
+    let mut names: Vec<String> = relative.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+    if names.last().is_some_and(|name| name == "mod") {
+        names.pop();
+    }
+    names
+}
+
+/// Every path of a file that leads to another top-level module of its crate, or from the program to one of the library.
+fn arrows_in(text: &str, module: &[String], shown: &str) -> Vec<Arrow> {
+    let words = words(text);
+    let word = |at: usize| words.get(at).map_or("", |(word, _)| word.as_str());
+    let is_path_end = |at: usize| word(at) != "::";
+    // Open braces, and whether each is that of a module.
+    let mut braces: Vec<bool> = vec![];
+    let mut found = vec![];
+    let mut at = 0;
+    while at < words.len() {
+        let line = words[at].1;
+        let is_begin = at == 0 || is_path_end(at - 1);
+        let depth = module.len() + braces.iter().filter(|is_module| **is_module).count();
+        let mut to_root = None;
+        match word(at) {
+            "{" => braces.push(at >= 2 && word(at - 2) == "mod"),
+            "}" => {
+                braces.pop();
+            }
+            "crate" if is_begin => to_root = Some(at + 1),
+            "takt" if is_begin && matches!(module[0].as_str(), "cli" | "main") => to_root = Some(at + 1),
+            "super" if is_begin => {
+                let mut end = at;
+                while word(end) == "super" && word(end + 1) == "::" {
+                    end += 2;
+                }
+                // `super::name`: as many steps up as there are `super`.
+                if (end - at) / 2 == depth {
+                    to_root = Some(end - 1);
+                }
+            }
+            _ => {}
+        }
+        if let Some(separator) = to_root.filter(|separator| word(*separator) == "::") {
+            for to in first_names(&words, separator + 1) {
+                if to != module[0] {
+                    let place = format!("{shown}:{line}");
+                    found.push(Arrow { from: module[0].clone(), to, place });
+                }
+            }
+        }
+        at += 1;
+    }
+    found
+}
+
+/// The name at a place of a path, or those at the beginning of each path in `{…}`.
+fn first_names(words: &[(String, usize)], at: usize) -> Vec<String> {
+    let word = |at: usize| words.get(at).map_or("", |(word, _)| word.as_str());
+    if word(at) != "{" {
+        return vec![word(at).to_owned()].into_iter().filter(|name| name != "*").collect();
+    }
+    let (mut names, mut depth, mut end) = (vec![], 1, at + 1);
+    while depth > 0 && end < words.len() {
+        let is_first = depth == 1 && matches!(word(end - 1), "{" | ",");
+        match word(end) {
+            "{" => depth += 1,
+            "}" => depth -= 1,
+            name if is_first => names.push(name.to_owned()),
+            _ => {}
+        }
+        end += 1;
+    }
+    names
+}
+
+/// The names and signs of a Rust text with their lines, without comments, texts and characters.
+fn words(text: &str) -> Vec<(String, usize)> {
+    let letters: Vec<char> = text.chars().collect();
+    let letter = |at: usize| letters.get(at).copied().unwrap_or('\0');
+    let is_of_name = |letter: char| letter.is_alphanumeric() || letter == '_';
+    let (mut words, mut at, mut line) = (vec![], 0, 1);
+    while at < letters.len() {
+        let begin = at;
+        match (letter(at), letter(at + 1)) {
+            ('/', '/') => {
+                while at < letters.len() && letter(at) != '\n' {
+                    at += 1;
+                }
+            }
+            ('/', '*') => {
+                let mut depth = 1;
+                at += 2;
+                while depth > 0 && at < letters.len() {
+                    match (letter(at), letter(at + 1)) {
+                        ('/', '*') => (depth, at) = (depth + 1, at + 2),
+                        ('*', '/') => (depth, at) = (depth - 1, at + 2),
+                        _ => at += 1,
+                    }
+                }
+            }
+            ('r', '"' | '#') if letter(at + 1) == '"' || matches!(letter(at + 2), '"' | '#') => {
+                let hashes = (at + 1..).take_while(|place| letter(*place) == '#').count();
+                let end: String = std::iter::once('"').chain("#".repeat(hashes).chars()).collect();
+                at += hashes + 2;
+                while at < letters.len()
+                    && !end.chars().zip(at..).all(|(of_end, place)| of_end == letter(place))
+                {
+                    at += 1;
+                }
+                at += end.len();
+            }
+            ('"', _) => {
+                at += 1;
+                while at < letters.len() && letter(at) != '"' {
+                    at += if letter(at) == '\\' { 2 } else { 1 };
+                }
+                at += 1;
+            }
+            ('\'', '\\') => {
+                at += 3;
+                while at < letters.len() && letter(at) != '\'' {
+                    at += 1;
+                }
+                at += 1;
+            }
+            ('\'', _) if letter(at + 2) == '\'' => at += 3,
+            (':', ':') => {
+                words.push(("::".to_owned(), line));
+                at += 2;
+            }
+            (first, _) if is_of_name(first) => {
+                while is_of_name(letter(at)) {
+                    at += 1;
+                }
+                words.push((letters[begin..at].iter().collect(), line));
+            }
+            (sign, _) => {
+                if !sign.is_whitespace() {
+                    words.push((sign.to_string(), line));
+                }
+                at += 1;
+            }
+        }
+        line += letters[begin..at.min(letters.len())].iter().filter(|letter| **letter == '\n').count();
+    }
+    words
+}
