@@ -18,6 +18,8 @@
 //! 7. `cia402`, `cia402_codec`, `profile`, `control`, `units`, `pdo`: how a drive is spoken to: its state machine ([`DriveState`]),
 //!    deviations of a drive ([`Cia402Codec`]), the handshake of profile position, the loops closed here ([`ControlLaw`]), SI to
 //!    drive units ([`Scale`]), and PDO mappings compiled to shifts and masks ([`Mapping`]).
+//! 8. `bit_fields`: the same for drives without an object dictionary, which are spoken to by frames of fixed bit fields
+//!    ([`FieldDrive`], [`FrameLayout`]). The engine does not use it yet.
 //!
 //! What crosses the border of the real-time thread:
 //!

@@ -416,7 +416,8 @@ mod tests {
                     prop_assert!(!may_have_torque && wish == LifeWish::Zero);
                 }
                 // By fields, a command without run takes the torque away.
-                may_have_torque &= step != "FD" && !(!has_own_frames && step.starts_with("run=0"));
+                let is_stopped = if has_own_frames { step == "FD" } else { step.starts_with("run=0") };
+                may_have_torque &= !is_stopped;
                 is_aligned = starts || step.starts_with("run=0") && step.ends_with("rest");
                 if let Some(has_torque) = reply {
                     life.receive(has_torque);
