@@ -64,7 +64,7 @@ pub enum Request<const AXES: usize = MAX_AXES> {
         /// Object 6064 in counts.
         counts: i32,
     },
-    /// Leave [`Phase::Passive`]: begin to send set-points, with the drives disabled.
+    /// Leave [`Phase::Passive`](crate::Phase::Passive): begin to send set-points, with the drives disabled.
     Activate,
     /// Bring every drive to operation enabled; set-points follow the actual positions until it is.
     Enable,

@@ -110,7 +110,7 @@ impl AxisRun {
         Ok(())
     }
 
-    /// Whether an error means that the object does not exist. A YZ-AIM does not answer then.
+    /// Whether an error means that the object does not exist. Some SDO servers do not answer then.
     fn means_absent(&self, error: SdoError) -> bool {
         match error {
             SdoError::Aborted(code) => code.means_absent(),
@@ -243,7 +243,7 @@ impl AxisRun {
         match outcome {
             Ok(Completed::Uploaded(uploaded)) => {
                 let received = uploaded.bytes.len();
-                // The manual of a YZ-AIM gives 606C two lengths (A27), so the length of its response counts.
+                // Where a manual gives an object two lengths, that of the response counts.
                 let of_other_length = || {
                     let data_type = object.data_type.of_length(received)?;
                     uploaded
