@@ -6,7 +6,6 @@ use takt_rt::{Nanoseconds, Scale, ScaleError, ScaleParameters};
 
 use super::failure::Failure;
 use crate::config::{Axis, DriveFamily, Limits, Quantity, Travel};
-use crate::controller::assemble;
 use crate::family::{self, Family, is_rounded};
 
 /// A value as the user wrote it.
@@ -54,7 +53,7 @@ impl TargetDrive {
             drive: axis.drive.clone(),
             travel: axis.travel,
             counts_per_turn: axis.counts_per_turn,
-            scale: assemble::scale(axis)?,
+            scale: axis.scale()?,
             limits: Some(axis.limits),
             patience_ns: PATIENCE_NS.saturating_add(axis.power_up_ns),
         })
