@@ -1,6 +1,26 @@
 //! takt: a hard-real-time joint-motion controller for CAN drives.
 //!
-//! This is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
+//! A configuration, here of one joint on a simulated bus:
+//!
+#![doc = concat!("```toml\n", include_str!("../configs/first.toml"), "```")]
+//!
+//! and a program that carries it out, here in virtual time, without hardware and without waiting:
+//!
+//! ```
+//! fn main() -> takt::Result {
+//!     let config = takt::Config::load("configs/first.toml".as_ref())?;
+//!     let (mut run, _log) = takt::VirtualRun::simulated(&config)?;
+//!     let outcome = run.run(100_000, |_run| {});
+//!     let joint = run.snapshot().axes[0];
+//!     println!("{outcome:?}: the joint is at {:.4} rad", joint.position);
+//!     assert!((joint.position - std::f64::consts::FRAC_PI_2).abs() < 0.01);
+//!     Ok(())
+//! }
+//! ```
+//!
+//! [`Controller`] does the same in real time, on the buses that the configuration names, and takes commands from any thread.
+//!
+//! This crate is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
 //! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
 //! bounded, lock-free channels ([`channels`]), and nothing else.
 //!

@@ -19,6 +19,7 @@ pub(crate) mod quantity;
 mod ranges;
 pub(crate) mod read;
 mod rules;
+mod scale;
 mod spelling;
 pub(crate) mod spot;
 
