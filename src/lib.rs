@@ -8,17 +8,18 @@
 //!
 //! ```text
 //! cli                                 the program `takt`
-//! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
+//! doctor jitter play                  is the machine fit, and how evenly it paces the loop; motion from a file
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
-//! drive                               the families of drives: bring-up, facts, words
+//! family                              one folder a family of drives: everything that takt knows of it outside the cycle
+//! commission drive                    commissioning; bring-up and shutdown, over the services of CiA 301, without I/O
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! canopen                             the protocols of CiA 301, 305 and 306, without I/O
 //! channels                            the lock-free door to the real-time thread
-//! trajectory frame_time printable sleep_alignment text_file
+//! trajectory frame_time sleep_alignment source_text printable text_file
 //! ```
 //!
 //! A tour, in the order in which a run meets the parts:
@@ -61,6 +62,7 @@ pub mod procedure;
 pub mod schedule;
 pub mod sim;
 pub mod sleep_alignment;
+mod source_text;
 pub mod telemetry;
 mod text_file;
 pub mod trajectory;

@@ -38,8 +38,8 @@ pub static FACTS: DriveFacts = DriveFacts {
         revision: None,
     },
     // 15 bits on the motor side.
-    counts_per_turn: 32_768.0,
-    velocity_unit: VelocityUnit::RevolutionsPerMinute,
+    counts_per_turn: Some(32_768.0),
+    velocity_unit: VelocityUnit::RevolutionsPerMinute(1.0),
     modes: ModeSet::of(&[
         OperationMode::InterpolatedPosition,
         OperationMode::ProfilePosition,
@@ -54,6 +54,7 @@ pub static FACTS: DriveFacts = DriveFacts {
     // Manual, 5.13.
     bit_rates: &[125_000, 250_000, 500_000, 1_000_000],
     has_fixed_process_data: true,
+    reports_mode: false,
     may_ignore_sync: true,
     sends_emergencies: false,
     // The manual does not say which NMT state real units have after power-up.
