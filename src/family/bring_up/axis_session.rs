@@ -53,8 +53,6 @@ pub struct AxisSession<'a> {
     /// The remedy of the current step.
     advice: Cell<&'static str>,
     first_failure: Cell<Option<StepFailure>>,
-    /// The number of boot-ups of the node that do not count as a restart; `None` before it has obeyed its master.
-    pub(super) expected_boot_ups: Cell<Option<u32>>,
     /// In a rehearsal: every number that was written, in order.
     rehearsed: Option<RefCell<Vec<(ObjectAddress, i64)>>>,
 }
@@ -78,7 +76,6 @@ impl<'a> AxisSession<'a> {
             facts: RefCell::new(facts),
             advice: Cell::new(""),
             first_failure: Cell::new(None),
-            expected_boot_ups: Cell::new(None),
             rehearsed: None,
         }
     }

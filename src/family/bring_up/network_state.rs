@@ -30,22 +30,18 @@ struct StateChange {
 impl AxisSession<'_> {
     /// Resets the communication of the drive and waits for its boot-up. A drive that has restarted does not need it again.
     pub async fn restart_communication(&self) -> StepResult {
-        let restarted = match self.expected_boot_ups.get() {
-            Some(_) => Ok(()),
-            None => {
-                let boot_ups = self.bus.boot_ups();
-                let restarted = self
-                    .reach(StateChange {
-                        command: NmtCommand::ResetCommunication,
-                        awaited: NmtState::BootUp,
-                        within_ns: self.timing.boot_up_timeout_ns,
-                        repeat_ns: self.timing.reset_repeat_ns,
-                    })
-                    .await;
-                self.expected_boot_ups.set(Some(boot_ups.saturating_add(1)));
-                restarted
-            }
+        if self.bus.watches_restarts() {
+            return self.settled(Ok(()));
+        }
+        let boot_ups = self.bus.boot_ups();
+        let reset = StateChange {
+            command: NmtCommand::ResetCommunication,
+            awaited: NmtState::BootUp,
+            within_ns: self.timing.boot_up_timeout_ns,
+            repeat_ns: self.timing.reset_repeat_ns,
         };
+        let restarted = self.reach(reset).await;
+        self.bus.watch_restarts(boot_ups.saturating_add(1));
         self.settled(restarted)
     }
 
@@ -60,7 +56,7 @@ impl AxisSession<'_> {
                 Ok(())
             }
         };
-        self.expect_no_restart();
+        self.bus.watch_restarts(self.bus.boot_ups());
         self.settled(reached)
     }
 
@@ -77,27 +73,8 @@ impl AxisSession<'_> {
                 }
             }
         };
-        self.expect_no_restart();
+        self.bus.watch_restarts(self.bus.boot_ups());
         self.settled(woken)
-    }
-
-    /// From now on, a boot-up of the node is a restart.
-    fn expect_no_restart(&self) {
-        let expected = self.expected_boot_ups.get().unwrap_or(self.bus.boot_ups());
-        self.expected_boot_ups.set(Some(expected));
-    }
-
-    /// Whether the node has restarted, and so has lost its configuration.
-    pub(super) fn has_restarted(&self) -> bool {
-        self.expected_boot_ups.get().is_some_and(|expected| self.bus.boot_ups() > expected)
-    }
-
-    /// Notes a restart in the facts, and returns how many there were.
-    pub(super) fn note_restart(&self) -> u8 {
-        let expected = self.expected_boot_ups.get().unwrap_or(0);
-        self.expected_boot_ups.set(Some(expected.saturating_add(1)));
-        self.keep(|facts| facts.restarts = facts.restarts.saturating_add(1));
-        self.facts().restarts
     }
 
     async fn reach(&self, change: StateChange) -> StepResult {

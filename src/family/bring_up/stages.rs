@@ -340,10 +340,12 @@ fn session(axis: &Axis, timing: BringUpTiming) -> CanopenSession {
 async fn carry_out<'a>(part: Part, c: &'a AxisSession<'a>) -> StepResult {
     loop {
         let work = part.of_family(c);
-        if let Some(result) = c.bus.give_up_when(|| c.has_restarted(), work).await {
+        if let Some(result) = c.bus.give_up_when(|| c.bus.has_restarted(), work).await {
             return result;
         }
-        let times = c.note_restart();
+        c.bus.accept_restart();
+        c.keep(|facts| facts.restarts = facts.restarts.saturating_add(1));
+        let times = c.facts().restarts;
         if part != Part::Configure || times > MAX_RESTARTS {
             return Err(FailureCause::Restarted { times });
         }
