@@ -1,9 +1,13 @@
 //! Quirks of a drive: in what it deviates from its electronic data sheet and from CiA 402. They are data, in a small file
 //! beside the data sheet (`drives/*.toml`).
 
+mod read;
+
 use takt_rt::{Nanoseconds, OperationMode};
 
 use crate::canopen::object::ObjectAddress;
+
+pub use read::{load, parse};
 
 /// Whether anybody has tried what a quirk file says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -435,7 +435,8 @@ fn commission_open(dictionary: &mut SimulatedDictionary, place: Option<usize>, v
     }
 }
 
-/// The modes of an axis, as bits of object 6502: by the quirks, by that object, or by the targets that it has.
+/// The modes of an axis, as bits of object 6502: by the quirks, by that object, or by the objects that only one mode has. No
+/// object tells of a cyclic mode.
 fn modes_of(dictionary: &SimulatedDictionary, places: &Places, quirks: &Quirks) -> u32 {
     if let Some(modes) = &quirks.modes {
         return modes.iter().fold(0, |bits, mode| bits | mode.supported_bit());
@@ -446,13 +447,9 @@ fn modes_of(dictionary: &SimulatedDictionary, places: &Places, quirks: &Quirks) 
     let of = |mode: OperationMode, demanded: &[Option<usize>]| {
         if demanded.iter().all(Option::is_some) { mode.supported_bit() } else { 0 }
     };
-    let target_position = places.target_position;
-    of(OperationMode::ProfilePosition, &[target_position, places.profile_velocity])
+    of(OperationMode::ProfilePosition, &[places.target_position, places.profile_velocity])
         | of(OperationMode::ProfileVelocity, &[places.target_velocity, places.profile_acceleration])
         | of(OperationMode::ProfileTorque, &[places.target_torque, places.torque_slope])
         | of(OperationMode::Homing, &[places.homing_method])
         | of(OperationMode::InterpolatedPosition, &[places.interpolation_data])
-        | of(OperationMode::CyclicSynchronousPosition, &[target_position])
-        | of(OperationMode::CyclicSynchronousVelocity, &[places.target_velocity])
-        | of(OperationMode::CyclicSynchronousTorque, &[places.target_torque])
 }
