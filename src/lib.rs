@@ -8,16 +8,18 @@
 //!
 //! ```text
 //! cli                                 the program `takt`
-//! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
+//! doctor jitter play                  is the machine fit, and how evenly it paces the loop; motion from a file
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
-//! drive                               the families of drives: bring-up, facts, words
+//! family                              one folder a family of drives: everything that takt knows of it outside the cycle
+//! commission drive                    commissioning; bring-up and shutdown, over the services of CiA 301, without I/O
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
+//! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! canopen                             the protocols of CiA 301, 305 and 306, without I/O
 //! channels                            the lock-free door to the real-time thread
-//! trajectory frame_time printable sleep_alignment text_file
+//! trajectory frame_time sleep_alignment source_text printable text_file
 //! ```
 //!
 //! A tour, in the order in which a run meets the parts:
@@ -26,6 +28,7 @@
 //! - [`link`]: what a bus is connected to, and who commands it.
 //! - [`schedule`]: whether everything fits on the buses in the worst case.
 //! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
+//! - [`procedure`]: the engine of procedures on drives, for bring-up, shutdown and [`commission`]ing.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
 //! - [`commission`]: what a single drive is set up, moved and looked at with, apart from any run.
@@ -55,9 +58,11 @@ pub mod jitter;
 pub mod link;
 pub mod play;
 pub mod printable;
+pub mod procedure;
 pub mod schedule;
 pub mod sim;
 pub mod sleep_alignment;
+mod source_text;
 pub mod telemetry;
 mod text_file;
 pub mod trajectory;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 22] = [
+const ORDER: [&str; 23] = [
     "cli",
     "doctor",
     "jitter",
@@ -21,12 +21,14 @@ const ORDER: [&str; 22] = [
     "link",
     "sim",
     "config",
+    "procedure",
     "canopen",
     "channels",
     "trajectory",
     "frame_time",
-    "printable",
     "sleep_alignment",
+    "source_text",
+    "printable",
     "text_file",
 ];
 

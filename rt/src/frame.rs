@@ -112,6 +112,29 @@ pub enum FrameKind {
     FdBitRateSwitch,
 }
 
+/// The three kinds of frame that carry data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum FrameFormat {
+    /// A classic data frame, 0 to 8 bytes.
+    #[default]
+    Classic,
+    /// A CAN FD frame at one bit rate.
+    Fd,
+    /// A CAN FD frame with bit-rate switching (BRS).
+    FdBitRateSwitch,
+}
+
+impl FrameFormat {
+    /// The kind of such a frame.
+    pub const fn kind(self) -> FrameKind {
+        match self {
+            Self::Classic => FrameKind::Data,
+            Self::Fd => FrameKind::Fd,
+            Self::FdBitRateSwitch => FrameKind::FdBitRateSwitch,
+        }
+    }
+}
+
 /// One CAN or CAN FD frame.
 #[derive(Clone, Copy)]
 pub struct Frame {
@@ -136,9 +159,9 @@ impl Frame {
         Ok(Self::filled(id, FrameKind::Data, bytes))
     }
 
-    /// A classic data frame of the first `length` of these bytes; of all of them if it is larger.
+    /// A data frame of the first `length` of these bytes; of all of them if it is larger.
     #[inline]
-    pub(crate) fn packed(id: Id, bytes: [u8; 8], length: usize) -> Self {
+    pub(crate) fn packed(id: Id, format: FrameFormat, bytes: [u8; 8], length: usize) -> Self {
         let length = length.min(bytes.len());
         let unused_bits = 64 - 8 * length as u32;
         let kept = u64::MAX.checked_shr(unused_bits).unwrap_or(0);
@@ -147,7 +170,7 @@ impl Frame {
         if let Some(first) = data.first_chunk_mut() {
             *first = word.to_le_bytes();
         }
-        Self { id, kind: FrameKind::Data, length: length as u8, data }
+        Self { id, kind: format.kind(), length: length as u8, data }
     }
 
     /// A classic data frame of 0 to 8 bytes. The compiler checks the length.

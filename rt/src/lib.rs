@@ -53,6 +53,7 @@ mod profile;
 mod record;
 mod rejection;
 mod request;
+mod rule;
 mod source;
 mod stop;
 mod stop_category;
@@ -65,7 +66,7 @@ mod wire;
 pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
-    ModeCondition, Pdo, TorqueLimits,
+    ModeCondition, Pdo, SenderByte, TorqueLimits,
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
@@ -78,8 +79,8 @@ pub use engine::{
     BusParameters, CanopenNetwork, CycleCount, CycleInput, Deadline, Engine, EngineParameters,
     GroupParameters, Heartbeat, Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
-pub use fault::{Fault, Rule};
-pub use frame::{Frame, FrameError, FrameKind, Id};
+pub use fault::Fault;
+pub use frame::{Frame, FrameError, FrameFormat, FrameKind, Id};
 pub use guard::{AxisLimits, LimitError, braking_distance};
 pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
@@ -99,6 +100,7 @@ pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
     RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
+pub use rule::Rule;
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
     LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,

@@ -1,11 +1,11 @@
 //! Why a request is rejected.
 
 use crate::cia402::OperationMode;
-use crate::fault::Rule;
 use crate::frame::Id;
 use crate::pdo::MappedObject;
 use crate::phase::Phase;
 use crate::request::RequestKind;
+use crate::rule::Rule;
 
 /// Why a request is rejected. Lengths in rad (m), velocities in rad/s (m/s), torques in N·m (N).
 #[derive(Clone, Copy, Debug, PartialEq)]

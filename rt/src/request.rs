@@ -3,7 +3,6 @@
 use crate::cia402::OperationMode;
 use crate::frame::Id;
 use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, TransmissionType};
-use crate::phase::Phase;
 use crate::profile::ProfileTarget;
 use crate::record::MAX_AXES;
 use crate::source::CallbackRun;
@@ -65,7 +64,7 @@ pub enum Request<const AXES: usize = MAX_AXES> {
         /// Object 6064 in counts.
         counts: i32,
     },
-    /// Leave [`Phase::Passive`]: begin to send set-points, with the drives disabled.
+    /// Leave [`Phase::Passive`](crate::Phase::Passive): begin to send set-points, with the drives disabled.
     Activate,
     /// Bring every drive to operation enabled; set-points follow the actual positions until it is.
     Enable,

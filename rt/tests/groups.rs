@@ -217,6 +217,28 @@ fn a_fault_reaches_the_groups_that_stop_with_another_one_beside_a_harder_stop_of
 }
 
 #[test]
+fn a_stop_that_is_asked_to_be_harder_does_not_bring_back_a_fault_that_another_group_has_reset() {
+    let mut parameters = three();
+    parameters.groups[0].stops_with.push(1);
+    parameters.groups[1].stops_with.push(0);
+    parameters.categories.set(Rule::ImplausibleFeedback, StopCategory::Two);
+    let mut rig = enabled(parameters);
+    ask(&mut rig, 1, Request::Move(move_to(2.5)));
+    rig.run(300);
+    rig.drive(0).lies.push_back((DriveState::OperationEnabled, 500_000));
+    rig.run(3);
+    assert_eq!(stops(&rig), [0, 1].map(|group| (group, Rule::ImplausibleFeedback)));
+    ask(&mut rig, 0, Request::ResetFaults);
+    ask(&mut rig, 0, Request::Move(move_to(1.0)));
+    assert_eq!([0, 1].map(|group| rig.phase_of(group)), [Phase::Moving, Phase::Stopping]);
+    ask(&mut rig, 1, Request::Stop(StopCategory::One));
+    let shown = [0, 1].map(|group: usize| rig.host.snapshot.groups()[group].stop.unwrap());
+    assert_eq!(shown.map(|stop| stop.category), [StopCategory::One; 2]);
+    assert_eq!(shown.map(|stop| stop.rule()), [Rule::Requested, Rule::ImplausibleFeedback]);
+    rig.assert_limits_kept();
+}
+
+#[test]
 fn a_coupling_has_one_direction() {
     let mut parameters = three();
     parameters.groups[1].stops_with.push(0);

@@ -6,7 +6,7 @@ use super::target::TargetDrive;
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::objects::{DEVICE_TYPE, VENDOR_ID};
 use crate::canopen::sdo::SdoError;
-use crate::drive::Access;
+use crate::procedure::Access;
 
 /// How long to wait for an answer in the vendor's own protocol.
 const OTHER_PROTOCOL_NS: u64 = 50_000_000;

@@ -6,7 +6,7 @@ use crate::canopen::nmt::NmtState;
 use crate::canopen::object::{Object, ObjectAddress};
 use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::config::Quantity;
-use crate::drive::Access;
+use crate::procedure::Access;
 
 /// Why a procedure failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

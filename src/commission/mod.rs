@@ -18,7 +18,6 @@ pub mod command_value;
 mod contact;
 pub mod dictionary;
 pub mod erob_canopen;
-mod event;
 mod failure;
 mod guarded;
 pub mod layer_settings;
@@ -26,35 +25,38 @@ pub mod meaning;
 mod motion_profile;
 mod objects;
 mod polling;
-mod procedure;
 mod report;
 mod scan;
 mod sdo_session;
-mod session_state;
 mod target;
 mod task;
 pub mod yz_aim;
 
-pub use event::{AxisReading, ProcedureEvent};
+use crate::procedure::{self, CanopenClient, CanopenSession};
+
+pub use crate::procedure::{AxisReading, ProcedureEvent, SdoQuirks};
 pub use failure::Failure;
 pub use motion_profile::{DEFAULT_SHARE, DriveProfile, MotionProfile};
-pub use procedure::{Procedure, ProcedureError};
 pub use report::{Report, ReportItem};
 pub use sdo_session::SdoSession;
-pub use session_state::SdoQuirks;
 pub use target::{CommandValue, TargetDrive};
 pub use task::{MoveKind, ReadObject, Task};
 
+/// A running procedure of commissioning.
+pub type Procedure = procedure::Procedure<CanopenClient, Report, Failure>;
+
+/// Why a procedure failed, and in which step.
+pub type ProcedureError = procedure::ProcedureError<Failure>;
+
 /// The procedure that carries out a task with this drive.
 pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
-    let (node, sdo_quirks) = (target.node, target.family().sdo_quirks());
-    Procedure::new(node, sdo_quirks, move |session| async move {
+    let session = CanopenSession::new(CanopenClient::new(target.node, target.family().sdo_quirks()));
+    let c = SdoSession::new(session.clone());
+    Procedure::new(session, async move {
         match task {
-            Task::Read { objects } => objects::read(&session, &target, &objects).await,
-            Task::Write { object, value, entry } => {
-                objects::write(&session, &target, object, value, entry).await
-            }
-            task => target.family().carry_out(&session, &target, task).await,
+            Task::Read { objects } => objects::read(&c, &target, &objects).await,
+            Task::Write { object, value, entry } => objects::write(&c, &target, object, value, entry).await,
+            task => target.family().carry_out(&c, &target, task).await,
         }
     })
 }

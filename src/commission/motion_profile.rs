@@ -2,9 +2,9 @@
 
 use takt_rt::Nanoseconds;
 
-use super::event::AxisReading;
 use super::failure::Failure;
 use super::target::{CommandValue, TargetDrive};
+use crate::procedure::AxisReading;
 
 /// The requested profile in SI or drive units; missing values are [`DEFAULT_SHARE`] of the limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

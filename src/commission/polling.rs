@@ -3,13 +3,13 @@
 use takt_rt::Nanoseconds;
 
 use super::contact;
-use super::event::AxisReading;
 use super::failure::Failure;
 use super::report::Report;
 use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
 use super::task::MoveKind;
 use crate::canopen::objects::POSITION_ACTUAL_VALUE;
+use crate::procedure::AxisReading;
 
 /// Shows a reading at each interval until the time is over.
 pub async fn watch(

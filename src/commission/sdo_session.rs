@@ -1,120 +1,32 @@
 //! An SDO session with one drive: the interface through which a procedure reads, writes, waits and reports.
 //!
-//! A procedure is sequential async code. It never blocks: [`Procedure`](super::Procedure) polls it with the current
+//! A procedure is sequential async code. It never blocks: [`Procedure`](crate::procedure::Procedure) polls it with the current
 //! time and passes the received frames to it.
 
-use std::cell::{Ref, RefCell, RefMut};
-use std::future::poll_fn;
-use std::rc::Rc;
-use std::task::Poll;
+use std::ops::Deref;
 
 use takt_rt::{Frame, Nanoseconds};
 
-use super::event::{AxisReading, ProcedureEvent};
 use super::failure::Failure;
-use super::session_state::{OwnHeartbeat, SdoQuirks, SessionState};
-use crate::canopen::emcy::Emergency;
-use crate::canopen::nmt::{NmtCommand, NmtState, NmtTarget};
 use crate::canopen::object::{Object, ObjectAddress};
-use crate::canopen::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
-use crate::drive::Access;
+use crate::canopen::sdo::{Completed, SdoError, Transfer, Uploaded};
+use crate::procedure::{Access, CanopenSession, POLL_NS};
 
-/// An SDO session with one drive. Clones share the same state.
-#[derive(Clone, Debug)]
-pub struct SdoSession(Rc<RefCell<SessionState>>);
+/// An SDO session with one drive. An interruption ends each wait, and is refused by each new transfer.
+#[derive(Debug)]
+pub struct SdoSession(CanopenSession);
+
+impl Deref for SdoSession {
+    type Target = CanopenSession;
+
+    fn deref(&self) -> &CanopenSession {
+        &self.0
+    }
+}
 
 impl SdoSession {
-    pub(super) fn new(node: u8, sdo_quirks: SdoQuirks) -> Self {
-        Self(Rc::new(RefCell::new(SessionState::new(node, sdo_quirks))))
-    }
-
-    // No borrow outlives its statement and none is held across an await, so these cannot panic.
-    pub(super) fn state(&self) -> Ref<'_, SessionState> {
-        self.0.borrow()
-    }
-
-    pub(super) fn state_mut(&self) -> RefMut<'_, SessionState> {
-        self.0.borrow_mut()
-    }
-
-    /// Begins a step and reports it.
-    pub fn step(&self, name: &'static str) {
-        let mut state = self.state_mut();
-        state.step = name;
-        state.events.push_back(ProcedureEvent::Step(name));
-    }
-
-    /// Continues an earlier step without reporting it again.
-    pub fn resume_step(&self, name: &'static str) {
-        self.state_mut().step = name;
-    }
-
-    /// Keeps the current step as the failing one, although clean-up steps follow.
-    pub fn keep_failing_step(&self) {
-        let mut state = self.state_mut();
-        state.failing_step = state.failing_step.or(Some(state.step));
-    }
-
-    /// Reports a note for the operator.
-    pub fn note(&self, text: impl Into<String>) {
-        self.state_mut().events.push_back(ProcedureEvent::Note(text.into()));
-    }
-
-    /// Reports a reading of the axis.
-    pub fn show(&self, reading: AxisReading) {
-        self.state_mut().events.push_back(ProcedureEvent::Reading(reading));
-    }
-
-    /// The node ID.
-    pub fn node(&self) -> u8 {
-        self.state().node
-    }
-
-    /// The current time.
-    pub fn now_ns(&self) -> Nanoseconds {
-        self.state().now_ns
-    }
-
-    /// The NMT state in the node's last heartbeat, if one was received.
-    pub fn nmt_state(&self) -> Option<NmtState> {
-        self.state().nmt
-    }
-
-    /// The drive's last emergency message, unless an "error reset" message (code 00xx) followed.
-    pub fn emergency(&self) -> Option<Emergency> {
-        self.state().emergency
-    }
-
-    /// Ignores the interruptions so far (at least one); only a further one counts.
-    pub fn ignore_interruptions(&self) {
-        let mut state = self.state_mut();
-        state.ignored_interruptions = state.interruptions.max(state.ignored_interruptions).max(1);
-    }
-
-    /// Sends a frame.
-    pub fn send(&self, frame: Frame) {
-        self.state_mut().outgoing.push_back(frame);
-    }
-
-    /// Sends an NMT command to the node.
-    pub fn command(&self, command: NmtCommand) {
-        let node = self.node();
-        self.send(command.frame(NmtTarget::Node(node)));
-    }
-
-    /// Starts the heartbeat of this program under the node ID `node`, or stops it (`None`).
-    pub fn set_heartbeat(&self, node: u8, period_ns: Option<Nanoseconds>) {
-        let mut state = self.state_mut();
-        let due_ns = state.now_ns;
-        state.heartbeat = period_ns.map(|period_ns| OwnHeartbeat { node, period_ns, due_ns });
-    }
-
-    async fn until<T>(&self, mut check: impl FnMut(&mut SessionState) -> Option<T>) -> T {
-        poll_fn(|_| match check(&mut self.state_mut()) {
-            Some(value) => Poll::Ready(value),
-            None => Poll::Pending,
-        })
-        .await
+    pub(super) fn new(session: CanopenSession) -> Self {
+        Self(session)
     }
 
     /// Waits for a time.
@@ -122,11 +34,8 @@ impl SdoSession {
     /// # Errors
     /// [`Failure::Interrupted`]
     pub async fn pause(&self, duration_ns: Nanoseconds) -> Result<(), Failure> {
-        let end_ns = self.now_ns().saturating_add(duration_ns);
-        let is_interrupted = self.until(|state| {
-            (state.is_interrupted() || state.now_ns >= end_ns).then_some(state.is_interrupted())
-        });
-        if is_interrupted.await { Err(Failure::Interrupted) } else { Ok(()) }
+        let pause = self.give_up_when(|| self.is_interrupted(), self.sleep(duration_ns));
+        pause.await.ok_or(Failure::Interrupted)
     }
 
     /// Collects all frames on the bus for a time.
@@ -140,32 +49,13 @@ impl SdoSession {
         paused.map(|()| collected)
     }
 
-    /// Starts to collect all frames on the bus.
-    pub fn begin_collecting(&self) {
-        self.state_mut().collected = Some(vec![]);
-    }
-
-    /// Stops collecting and returns the frames.
-    pub fn end_collecting(&self) -> Vec<Frame> {
-        self.state_mut().collected.take().unwrap_or_default()
-    }
-
     /// Performs one SDO transfer.
     ///
     /// # Errors
     /// [`Failure::Interrupted`] when it was interrupted before it began. The inner result is that of the transfer.
     pub async fn transfer(&self, transfer: Transfer) -> Result<Result<Completed, SdoError>, Failure> {
-        self.until(|state| (state.now_ns >= state.free_ns).then_some(())).await;
-        if self.state().is_interrupted() {
-            return Err(Failure::Interrupted);
-        }
-        // The client is free, because every transfer is awaited to its end here.
-        let started = self.state_mut().client.start(transfer);
-        debug_assert!(started.is_ok());
-        let outcome = self.until(|state| state.client.take_outcome()).await;
-        let mut state = self.state_mut();
-        state.free_ns = state.now_ns.saturating_add(state.sdo_quirks.gap_ns);
-        Ok(outcome)
+        self.gap().await;
+        if self.is_interrupted() { Err(Failure::Interrupted) } else { Ok(self.exchange(transfer).await) }
     }
 
     /// Reads the bytes of an object.
@@ -173,11 +63,8 @@ impl SdoSession {
     /// # Errors
     /// See [`SdoSession::transfer`].
     pub async fn upload(&self, address: ObjectAddress) -> Result<Result<Uploaded, SdoError>, Failure> {
-        let completed = self.transfer(Transfer::Upload { object: address }).await?;
-        Ok(completed.map(|completed| match completed {
-            Completed::Uploaded(uploaded) => uploaded,
-            Completed::Downloaded => Uploaded { bytes: vec![], is_size_known: true },
-        }))
+        self.gap().await;
+        if self.is_interrupted() { Err(Failure::Interrupted) } else { Ok(self.read_bytes(address).await) }
     }
 
     /// Reads a number. The drive decides the length, the object's type the sign.
@@ -233,10 +120,9 @@ impl SdoSession {
     /// # Errors
     /// As [`SdoSession::write`].
     pub async fn write_once(&self, object: &Object, value: i64) -> Result<(), Failure> {
-        let (node, timing) = (self.node(), self.state().sdo_quirks.timing);
-        self.state_mut().client = SdoClient::new(node, SdoTiming { retries: 0, ..timing });
+        self.set_retries(0);
         let written = self.write(object, value).await;
-        self.state_mut().client = SdoClient::new(node, timing);
+        self.set_retries(self.quirks().timing.retries);
         written
     }
 
@@ -291,15 +177,8 @@ impl SdoSession {
     }
 }
 
-/// Interval between two reads of a polled object.
-const POLL_NS: Nanoseconds = 5_000_000;
-
 /// Decodes the number in an object's bytes by the object's type, or by the length that the drive sent.
 pub(super) fn number(object: &Object, uploaded: &Uploaded) -> Result<i64, Failure> {
-    let of_other_length = || uploaded.number(object.data_type.of_length(uploaded.bytes.len())?);
     let received = uploaded.bytes.len();
-    uploaded
-        .number(object.data_type)
-        .or_else(of_other_length)
-        .ok_or(Failure::Length { object: *object, received })
+    uploaded.number_of_any_length(object.data_type).ok_or(Failure::Length { object: *object, received })
 }

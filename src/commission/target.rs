@@ -65,7 +65,7 @@ impl TargetDrive {
     /// # Errors
     /// None in practice: the family's own units are valid.
     pub fn unconfigured(node: u8, drive: DriveFamily) -> Result<Self, ScaleError> {
-        let counts_per_turn = drive.counts_per_turn;
+        let counts_per_turn = drive.counts_per_turn.unwrap_or(1.0);
         let velocity_units_per_turn = drive.velocity_units_per_turn(counts_per_turn);
         Ok(Self {
             name: format!("node {node}"),

@@ -6,6 +6,8 @@
 
 pub(crate) mod bounds;
 pub(crate) mod defaults;
+#[cfg(feature = "miette")]
+mod diagnostic;
 mod drive_family;
 mod error;
 mod in_code;
@@ -18,7 +20,6 @@ pub mod quirks;
 mod ranges;
 pub(crate) mod read;
 mod rules;
-mod source_view;
 mod spelling;
 pub(crate) mod spot;
 

@@ -134,10 +134,10 @@ fn axis_parameters(
     let data = ProcessData::of(axis);
     let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
     let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
-        let pdo = Pdo { id: plan.id, mapping: Mapping::commands(&plan.objects)? };
+        let pdo = Pdo::classic(plan.id, Mapping::commands(&plan.objects)?);
         Ok(CommandPdo { pdo, transmission: plan.transmission })
     };
-    let feedback = |plan: &PdoPlan| Ok(Pdo { id: plan.id, mapping: Mapping::feedback(&plan.objects)? });
+    let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&plan.objects)?));
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,

@@ -10,16 +10,23 @@
 //! If the configuration gives the master a heartbeat, the drives monitor it from the end of [`Stage::Configure`] on.
 //! The caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
 
+use std::rc::Rc;
+use std::task::{Context, Waker};
+
 use takt_rt::{Frame, Nanoseconds};
 
-use super::axis_run::{AxisRun, Policy};
+use super::axis_session::{AxisSession, OnFailure, StepFailure, StepResult};
 use super::facts::AxisFacts;
-use super::failure::{AxisFailure, BringUpError};
-use super::step::{Action, ProcedureStep, ValueSource};
+use super::failure::{AxisFailure, BringUpError, FailureCause};
+use super::network_state::RESTART_STEP;
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config};
-use crate::family;
+use crate::family::{self, SettingUp};
+use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, SdoQuirks};
+
+/// Number of restarts of a drive after which its configuration gives up.
+const MAX_RESTARTS: u8 = 3;
 
 /// The timeouts of bring-up and shutdown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,8 +76,9 @@ pub struct BringUpProgress {
 /// Brings up every axis of a configuration.
 #[derive(Debug)]
 pub struct BringUp {
+    config: Rc<Config>,
+    timing: BringUpTiming,
     group: Group,
-    start_steps: Vec<Vec<ProcedureStep>>,
     stage: Stage,
 }
 
@@ -79,30 +87,18 @@ pub struct BringUp {
 #[error("the drives are not configured yet, or have already been started")]
 pub struct NotConfigured;
 
-/// The steps from any state to configured, without torque.
-fn configure(config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-    family::of(&axis.drive).configure(config, axis, timing)
-}
-
 /// The objects to which bring-up writes another value than the configuration file of an axis (`dcf`) has for them.
 pub fn overwritten(config: &Config, axis: &Axis) -> Vec<ObjectAddress> {
     let Some(file) = &axis.dcf else { return vec![] };
-    let steps = configure(config, axis, &BringUpTiming::default());
-    let after_file = steps.iter().skip_while(|step| !matches!(step.action, Action::WriteBytes(_)));
     // The last write of each object counts: a PDO is made invalid before it is made valid.
-    let mut last: Vec<(ObjectAddress, ValueSource)> = vec![];
-    for step in after_file {
-        if let Action::Write { object, value, .. } = step.action {
-            last.retain(|(address, _)| *address != object.address);
-            last.push((object.address, value));
-        }
+    let mut last: Vec<(ObjectAddress, i64)> = vec![];
+    for (object, value) in rehearse(Part::Configure, config, axis).writes {
+        last.retain(|(address, _)| *address != object);
+        last.push((object, value));
     }
-    let is_other = |(address, value): &(ObjectAddress, ValueSource)| {
+    let is_other = |(address, value): &(ObjectAddress, i64)| {
         let in_file = file.downloads.iter().rev().find(|download| download.object == *address);
-        in_file.is_some_and(|download| match value {
-            ValueSource::Value(value) => !value.to_le_bytes().starts_with(&download.data),
-            ValueSource::ActualPosition => true,
-        })
+        in_file.is_some_and(|download| !value.to_le_bytes().starts_with(&download.data))
     };
     last.into_iter().filter(is_other).map(|(address, _)| address).collect()
 }
@@ -115,26 +111,22 @@ impl BringUp {
 
     /// As [`BringUp::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
-        let group = Group::new(config, |axis| {
-            let steps = configure(config, axis, &timing);
-            let other_protocol = family::of(&axis.drive).other_protocol(axis.node);
-            // The first step is the reset; a drive that has restarted does not need it again.
-            AxisRun::new(axis, timing.sdo, steps, Policy::RestartFrom(1), other_protocol)
-        });
-        let start_steps = config.axes.iter().map(|axis| family::of(&axis.drive).start(axis, &timing));
-        Self { group, start_steps: start_steps.collect(), stage: Stage::Configure }
+        let config = Rc::new(config.clone());
+        let mut group = Group::new(&config, timing);
+        group.begin(Part::Configure, &config, timing, &[]);
+        Self { config, timing, group, stage: Stage::Configure }
     }
 
     /// Begins [`Stage::Start`]. The outcome is `None` again until this stage is done. Operational nodes wait for SYNC.
     pub fn start(&mut self) -> Result<(), NotConfigured> {
-        if self.stage != Stage::Configure || !matches!(self.outcome(), Some(Ok(_))) {
-            return Err(NotConfigured);
+        match (self.stage, self.outcome()) {
+            (Stage::Configure, Some(Ok(facts))) => {
+                self.stage = Stage::Start;
+                self.group.begin(Part::Start, &self.config, self.timing, &facts);
+                Ok(())
+            }
+            _ => Err(NotConfigured),
         }
-        self.stage = Stage::Start;
-        for (member, steps) in self.group.members.iter_mut().zip(std::mem::take(&mut self.start_steps)) {
-            member.run.continue_with(steps, Policy::Strict);
-        }
-        Ok(())
     }
 
     /// The current or last stage.
@@ -181,10 +173,8 @@ impl Shutdown {
 
     /// As [`Shutdown::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
-        let group = Group::new(config, |axis| {
-            let steps = family::of(&axis.drive).shut_down(axis, &timing);
-            AxisRun::new(axis, timing.sdo, steps, Policy::BestEffort, None)
-        });
+        let mut group = Group::new(config, timing);
+        group.begin(Part::ShutDown, &Rc::new(config.clone()), timing, &[]);
         Self { group }
     }
 
@@ -209,10 +199,11 @@ impl Shutdown {
     }
 }
 
-/// The axes of a configuration, each with its steps.
+/// The axes of a configuration, and their running procedures.
 #[derive(Debug)]
 struct Group {
     members: Vec<Member>,
+    procedures: Parallel<CanopenClient, AxisFacts, StepFailure>,
 }
 
 #[derive(Debug)]
@@ -221,71 +212,159 @@ struct Member {
     bus: usize,
     bus_name: String,
     node: u8,
-    run: AxisRun,
+    session: CanopenSession,
+    /// The number of accesses without restarts and repetitions, for the progress.
+    accesses: usize,
 }
 
 impl Group {
-    fn new(config: &Config, run_of: impl Fn(&Axis) -> AxisRun) -> Self {
+    fn new(config: &Config, timing: BringUpTiming) -> Self {
         let members = config.axes.iter().map(|axis| Member {
             name: axis.name.clone(),
             bus: axis.bus,
             bus_name: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
             node: axis.node,
-            run: run_of(axis),
+            session: session(axis, timing),
+            accesses: 0,
         });
-        Self { members: members.collect() }
+        Self { members: members.collect(), procedures: Parallel::new([]) }
+    }
+
+    /// Begins a part of every axis. `facts` is what is known of each drive; without it, nothing is known.
+    fn begin(&mut self, part: Part, config: &Rc<Config>, timing: BringUpTiming, facts: &[AxisFacts]) {
+        let mut facts = facts.iter().cloned();
+        let begun = self.members.iter_mut().zip(&config.axes).map(|(member, axis)| {
+            let unknown = || AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
+            let facts = facts.next().unwrap_or_else(unknown);
+            member.accesses = rehearse(part, config, axis).accesses;
+            member.session.begin_again();
+            // The progress shows it before the first poll.
+            member.session.resume_step(RESTART_STEP);
+            let (session, config, axis) = (member.session.clone(), Rc::clone(config), axis.clone());
+            let work = async move {
+                let c = AxisSession::new(session, &config, &axis, timing, part.on_failure(), facts);
+                let result = carry_out(part, &c).await;
+                c.end(result)
+            };
+            (member.bus, Procedure::new(member.session.clone(), work))
+        });
+        self.procedures = Parallel::new(begun);
     }
 
     fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(usize, Frame)) {
-        for Member { bus, run, .. } in &mut self.members {
-            run.poll(now_ns, &mut |frame| send(*bus, frame));
-        }
+        self.procedures.poll(now_ns, send);
     }
 
     fn receive(&mut self, bus: usize, frame: &Frame) {
-        for member in self.members.iter_mut().filter(|member| member.bus == bus) {
-            member.run.receive(frame);
-        }
+        self.procedures.receive(bus, frame);
     }
 
     fn progress(&self) -> BringUpProgress {
-        let fraction_of = |(done, all): (usize, usize)| if all == 0 { 1.0 } else { done as f64 / all as f64 };
-        let open = self.members.iter().enumerate().filter(|(_, member)| !member.run.is_over());
-        let slowest = open.min_by_key(|(_, member)| member.run.progress().0);
-        let sum: f64 = self.members.iter().map(|member| fraction_of(member.run.progress())).sum();
+        let of_axes = self.members.iter().zip(self.procedures.procedures()).enumerate();
+        let open = of_axes.filter(|(_, (_, procedure))| procedure.outcome().is_none());
+        let slowest = open.min_by_key(|(_, (member, _))| member.session.done());
+        let sum: f64 = self.members.iter().map(Member::fraction).sum();
         BringUpProgress {
             fraction: if slowest.is_none() { 1.0 } else { sum / self.members.len() as f64 },
-            step: slowest.and_then(|(_, member)| member.run.step_name()).unwrap_or(""),
+            step: slowest.map_or("", |(_, (member, _))| member.session.step_name()),
             axis: slowest.map_or(0, |(index, _)| index),
         }
     }
 
     fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
-        if self.members.iter().any(|member| !member.run.is_over()) {
-            return None;
+        let (mut facts, mut failures) = (vec![], vec![]);
+        for (axis, (member, procedure)) in self.members.iter().zip(self.procedures.procedures()).enumerate() {
+            match procedure.outcome()? {
+                Ok(of_axis) => facts.push(of_axis.clone()),
+                Err(error) => failures.push(member.failure(axis, error.step, error.failure)),
+            }
         }
-        let failures: Vec<AxisFailure> =
-            self.members.iter().enumerate().filter_map(|(axis, member)| member.failure(axis)).collect();
-        Some(if failures.is_empty() {
-            Ok(self.members.iter().map(|member| member.run.facts().clone()).collect())
-        } else {
-            Err(BringUpError { failures })
-        })
+        Some(if failures.is_empty() { Ok(facts) } else { Err(BringUpError { failures }) })
     }
 }
 
 impl Member {
-    fn failure(&self, axis: usize) -> Option<AxisFailure> {
-        let (step, cause) = self.run.failure()?;
-        Some(AxisFailure {
+    /// The finished part, 0 to 1.
+    fn fraction(&self) -> f64 {
+        if self.accesses == 0 { 1.0 } else { (self.session.done() as f64 / self.accesses as f64).min(1.0) }
+    }
+
+    fn failure(&self, axis: usize, step: &'static str, failure: StepFailure) -> AxisFailure {
+        AxisFailure {
             axis,
             name: self.name.clone(),
             bus: self.bus_name.clone(),
             node: self.node,
-            step: step.name,
-            cause,
-            emergency: self.run.facts().emergency,
-            step_advice: step.advice,
-        })
+            step,
+            cause: failure.cause,
+            emergency: self.session.emergency(),
+            step_advice: failure.advice,
+        }
     }
+}
+
+/// A part of a drive's life that has a procedure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Configure,
+    Start,
+    ShutDown,
+}
+
+impl Part {
+    /// The procedure of the drive's family.
+    fn of_family<'a>(self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        let family = family::of(&c.axis.drive);
+        match self {
+            Self::Configure => family.configure(c),
+            Self::Start => family.start(c),
+            Self::ShutDown => family.shut_down(c),
+        }
+    }
+
+    const fn on_failure(self) -> OnFailure {
+        match self {
+            Self::Configure | Self::Start => OnFailure::End,
+            Self::ShutDown => OnFailure::GoOn,
+        }
+    }
+}
+
+fn session(axis: &Axis, timing: BringUpTiming) -> CanopenSession {
+    let quirks = SdoQuirks { timing: timing.sdo, ..family::of(&axis.drive).sdo_quirks() };
+    CanopenSession::new(CanopenClient::new(axis.node, quirks))
+}
+
+/// Carries out a part, and watches for restarts of the drive: its configuration is then done again, and another part
+/// fails.
+async fn carry_out<'a>(part: Part, c: &'a AxisSession<'a>) -> StepResult {
+    loop {
+        let work = part.of_family(c);
+        if let Some(result) = c.bus.give_up_when(|| c.has_restarted(), work).await {
+            return result;
+        }
+        let times = c.note_restart();
+        if part != Part::Configure || times > MAX_RESTARTS {
+            return Err(FailureCause::Restarted { times });
+        }
+        c.bus.reset_transfer();
+        c.bus.begin_again();
+    }
+}
+
+/// What a part does when the drive answers as expected.
+struct Rehearsal {
+    accesses: usize,
+    /// Every number that it writes, in order. Values of a configuration file are not listed.
+    writes: Vec<(ObjectAddress, i64)>,
+}
+
+fn rehearse(part: Part, config: &Config, axis: &Axis) -> Rehearsal {
+    let timing = BringUpTiming::default();
+    let session = session(axis, timing);
+    let facts = AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
+    let c = AxisSession::new(session.clone(), config, axis, timing, part.on_failure(), facts).rehearsal();
+    // Nothing is waited for without a drive, so one poll is enough.
+    let _ = part.of_family(&c).as_mut().poll(&mut Context::from_waker(Waker::noop()));
+    Rehearsal { accesses: session.done(), writes: c.rehearsed() }
 }

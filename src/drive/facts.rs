@@ -3,7 +3,6 @@
 use takt_rt::{Cia402Codec, DriveState};
 
 use super::process_data::ProcessData;
-use super::step::{Fact, TextFact};
 use crate::canopen::emcy::{Emergency, ErrorCode};
 use crate::canopen::object::ObjectAddress;
 
@@ -80,38 +79,5 @@ impl AxisFacts {
             code => code,
         };
         self.state().is_faulted().then_some(reported)
-    }
-
-    /// Stores a number. It fits, because it was decoded by the object's type.
-    pub(super) fn keep(&mut self, fact: Fact, value: i64) {
-        let thousandths = |value: i64| (value > 0).then_some(value as f64 / 1000.0);
-        match fact {
-            Fact::DeviceType => self.identity.device_type = value as u32,
-            Fact::VendorId => self.identity.vendor_id = value as u32,
-            Fact::ProductCode => self.identity.product_code = value as u32,
-            Fact::RevisionNumber => self.identity.revision_number = value as u32,
-            Fact::SupportedModes => self.supported_modes = value as u32,
-            Fact::Statusword => self.statusword = value as u16,
-            Fact::ErrorCode => self.error_code = ErrorCode(value as u16),
-            Fact::Position => self.position_counts = value as i32,
-            Fact::RatedCurrent => self.rated_current_a = thousandths(value),
-            Fact::RatedTorque => self.rated_torque = thousandths(value),
-            Fact::MaxTorque => self.max_torque_per_mille = Some(value as u16),
-            Fact::QuickStopOptionCode => self.quick_stop_option_code = Some(value as i16),
-        }
-    }
-
-    pub(super) fn keep_text(&mut self, fact: TextFact, text: String) {
-        let place = match fact {
-            TextFact::DeviceName => &mut self.texts.device_name,
-            TextFact::HardwareVersion => &mut self.texts.hardware_version,
-            TextFact::SoftwareVersion => &mut self.texts.software_version,
-        };
-        *place = Some(text);
-    }
-
-    pub(super) fn keep_emergency(&mut self, emergency: Emergency) {
-        let is_gone = emergency.code.0 & 0xFF00 == 0;
-        self.emergency = (!is_gone).then_some(emergency);
     }
 }

@@ -4,13 +4,14 @@ use std::fmt;
 
 use takt_rt::Nanoseconds;
 
+use super::check::Check;
 use super::reported_mapping::MappingProblem;
-use super::step::{Access, Check};
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::object::{Object, ObjectAddress};
 use crate::canopen::pdo_reader::PdoReadError;
 use crate::canopen::sdo::{AbortCode, SdoError};
+use crate::procedure::Access;
 
 /// The drives that failed during bring-up or shutdown.
 #[derive(Clone, Debug, PartialEq)]

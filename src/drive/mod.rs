@@ -1,26 +1,35 @@
 //! What differs between drive families: process data, bring-up, parameters.
 //!
-//! A family describes its procedures as lists of steps (`erob_canopen`, `yz_aim`, `step_list`, `step`). One engine runs
-//! them for every family (`axis_run`), for all axes in parallel ([`BringUp`], [`Shutdown`]). [`AxisFacts`] has what the
-//! drive has reported, [`BringUpError`] what failed. [`ProcessData`] says which objects each PDO carries: as written to
-//! the drive, or as the drive reports it (`reported_mapping`).
+//! Bring-up and shutdown of a [family](crate::family) are plain async functions over an [`AxisSession`], which read like the
+//! manual's own list. What CiA 402 drives have in common is in functions that any family may call: [`identity`],
+//! [`configuration_file`], [`pdo_mapping`], [`heartbeat`], [`actual_position`]. [`BringUp`] and [`Shutdown`] run them for all
+//! axes in parallel, with the engine of [`procedure`](crate::procedure).
+//!
+//! [`AxisFacts`] has what the drive has reported, [`BringUpError`] what failed. [`ProcessData`] says which objects each PDO
+//! carries: as written to the drive, or as the drive reports it (`reported_mapping`).
 
-mod axis_run;
+pub mod actual_position;
+mod axis_session;
+pub mod axis_units;
 mod bring_up;
-pub mod erob_canopen;
+mod check;
+pub mod configuration_file;
 mod facts;
 mod failure;
+pub mod heartbeat;
+pub mod identity;
 pub(crate) mod mapped_objects;
+mod network_state;
+pub mod pdo_mapping;
 mod process_data;
 mod reported_mapping;
-pub(crate) mod step;
-mod step_list;
-pub mod yz_aim;
 
+pub use crate::procedure::Access;
+pub use axis_session::{AxisSession, StepResult};
 pub use bring_up::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage, overwritten};
+pub use check::Check;
 pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
 pub use failure::{AxisFailure, BringUpError, Content, FailureCause, ProbeResult};
+pub use network_state::RESTART_STEP;
 pub use process_data::{PdoPlan, ProcessData, Reply};
 pub use reported_mapping::MappingProblem;
-pub use step::ProcedureStep;
-pub use step::{Access, Check};

@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 7] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 9] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -264,6 +264,14 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 7] = [
         "A joint in cyclic velocity turned round to its set-point, and its power was taken on the way",
     ),
     (60_000_018_304, "Before the first cycle, the state of a controller of several groups had only one"),
+    (
+        61_000_002_145,
+        "A YZ-AIM took its power when it missed the heartbeat, and coasted for longer than a stop may last",
+    ),
+    (
+        61_000_000_883,
+        "A stop was asked to be harder, and brought back its fault to a group that had reset it and moved again",
+    ),
 ];
 
 /// The same of those whose streams command every kind of point.

@@ -166,8 +166,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let present = self.group.stop.filter(|present| is_under_way || !present.is_requested());
         let hardest = present.map_or(wanted, |present| present.category.min(wanted));
         let kept = present.filter(|present| !present.is_requested() || cause == StopCause::Requested);
-        let reason = kept.unwrap_or(StopReason { category: wanted, cause, origin, slot, phase });
-        let reason = StopReason { category: hardest, ..reason };
+        let begun = StopReason { category: hardest, cause, origin, slot, phase };
+        let reason = kept.map_or(begun, |kept| StopReason { category: hardest, ..kept });
         self.group.stop = Some(reason);
         if kept.is_none() {
             if cause != StopCause::Requested {
@@ -179,7 +179,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
         let is_harder = present.is_none_or(|present| wanted < present.category);
         if is_harder || kept.is_none() {
-            self.group.note_untold(reason);
+            // What is new, not what is kept: a group may have reset the fault that this one still stops for.
+            self.group.note_untold(begun);
         }
         if is_harder {
             self.carry_out(wanted);

@@ -123,7 +123,7 @@ pub enum Deadline {
 /// }
 ///
 /// let object = MappedObject::new;
-/// let pdo = |function, mapping| Pdo { id: Id::canopen(function, 1), mapping };
+/// let pdo = |function, mapping| Pdo::classic(Id::canopen(function, 1), mapping);
 /// let commands = Mapping::commands(&[object(0x6040, 0, 16), object(0x607A, 0, 32)]).unwrap();
 /// let feedback = Mapping::feedback(&[object(0x6041, 0, 16), object(0x6064, 0, 32)]).unwrap();
 /// let axis = AxisParameters {

@@ -184,7 +184,7 @@ pub fn check(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fault::Rule;
+    use crate::rule::Rule;
     use proptest::prelude::*;
 
     const LIMITS: AxisLimits = AxisLimits {

@@ -6,7 +6,6 @@ use super::objects::TORQUE_ACTUAL_VALUE;
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::event::AxisReading;
 use crate::commission::failure::Failure;
 use crate::commission::polling;
 use crate::commission::report::Report;
@@ -14,6 +13,7 @@ use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
 use crate::family::erob_canopen::{FACTS, error_text};
 use crate::family::error_cure;
+use crate::procedure::AxisReading;
 
 /// The rated torque (6076) in N·m; `None` when the drive does not report it.
 pub async fn rated_torque(c: &SdoSession) -> Result<Option<f64>, Failure> {

@@ -13,8 +13,8 @@ use crate::commission::motion_profile::DriveProfile;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::yz_aim::{NO_RAMP, STANDSTILL};
 use crate::family::yz_aim::Alarm;
+use crate::family::yz_aim::{NO_RAMP, STANDSTILL};
 
 /// Pause between controlwords; a drive that has just booted ignores controlwords that follow sooner.
 const CONTROL_NS: Nanoseconds = 20_000_000;

@@ -8,7 +8,6 @@ use super::objects::ACCELERATION;
 use super::reading;
 use super::words::{self, control};
 use crate::canopen::objects::*;
-use crate::commission::event::AxisReading;
 use crate::commission::failure::Failure;
 use crate::commission::guarded::{add_final_position, guarded};
 use crate::commission::motion_profile::{DriveProfile, MotionProfile};
@@ -17,6 +16,7 @@ use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::{CommandValue, TargetDrive};
 use crate::commission::task::MoveKind;
+use crate::procedure::AxisReading;
 
 /// Interval between two readings of a moving axis.
 const POLL_NS: Nanoseconds = 20_000_000;

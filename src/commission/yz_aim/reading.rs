@@ -6,13 +6,13 @@ use super::objects::{ALARM, CURRENT, VELOCITY};
 use super::words;
 use crate::canopen::objects::*;
 use crate::commission::contact;
-use crate::commission::event::AxisReading;
 use crate::commission::failure::Failure;
 use crate::commission::polling;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
 use crate::family::yz_aim::Alarm;
+use crate::procedure::AxisReading;
 
 /// The scale of 606C by SDO: 0.1 r/min by the object table, although the manual's example of TPDO3 contradicts it.
 pub const TENTHS: f64 = 0.1;

@@ -9,7 +9,7 @@ use crate::commission::failure::Failure;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::TargetDrive;
-use crate::drive::yz_aim::NO_RAMP;
+use crate::family::yz_aim::NO_RAMP;
 
 /// 2619 = 6: return to the multi-turn zero at power-up.
 const RETURN_TO_ZERO: i64 = 6;

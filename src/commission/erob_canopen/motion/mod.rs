@@ -7,7 +7,6 @@ use takt_rt::{Nanoseconds, OperationMode};
 
 use super::{enabling, reading};
 use crate::canopen::objects::*;
-use crate::commission::event::AxisReading;
 use crate::commission::failure::Failure;
 use crate::commission::guarded::{add_final_position, guarded};
 use crate::commission::motion_profile::{DriveProfile, MotionProfile};
@@ -15,6 +14,7 @@ use crate::commission::polling;
 use crate::commission::report::Report;
 use crate::commission::sdo_session::SdoSession;
 use crate::commission::target::{CommandValue, TargetDrive};
+use crate::procedure::AxisReading;
 
 /// Interval between two readings of a moving axis.
 const POLL_NS: Nanoseconds = 20_000_000;
