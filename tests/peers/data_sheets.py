@@ -20,6 +20,7 @@ DRIVES = (
 
 
 def run(network, interface, case):
+    network.sync.start(0.01)
     for name, velocity, acceleration in DRIVES:
         data_sheet = f"{FOLDER}/{name}.eds"
         node = BaseNode402(NODE, data_sheet)
@@ -36,27 +37,29 @@ def run(network, interface, case):
             case(f"moves as {name} in profile position", lambda: move(node, velocity, acceleration))
             case(f"faults as {name} on the loss of its master, and is reset", lambda: master_lost(network, node))
         del network[NODE]
+    network.sync.stop()
 
 
 def objects(node):
     for index in range(0x6000, 0x6100):
         if index not in node.object_dictionary:
             expect_abort(f"reading {index:04X}", NO_OBJECT, lambda: node.sdo.upload(index, 0))
-    expect("vendor", node.sdo[0x1018][1].raw, node.object_dictionary[0x1018][1].default)
+    expect("vendor", node.sdo[0x1018][1].raw, node.object_dictionary[0x1018][1].default or 0)
 
 
 def state_machine(node):
     for pdo in (node.rpdo[1], node.tpdo[1]):
         pdo.read()
-    for pdo, index in ((node.rpdo[1], 0x6040), (node.tpdo[1], 0x6041)):
+    # The controlword acts at once; the statusword comes with every SYNC.
+    for pdo, index, transmission_type in ((node.rpdo[1], 0x6040, 255), (node.tpdo[1], 0x6041, 1)):
         pdo.clear()
         pdo.add_variable(index)
-        pdo.trans_type = 255
+        pdo.trans_type = transmission_type
         pdo.enabled = True
         pdo.save()
     node.setup_402_state_machine()
     node.nmt.state = "OPERATIONAL"
-    expect("state after power-up", node.state, "SWITCH ON DISABLED")
+    wait_until("state after power-up", lambda: node.state == "SWITCH ON DISABLED")
     node.op_mode = "PROFILED POSITION"
     expect("mode", node.op_mode, "PROFILED POSITION")
     node.sdo[0x607A].raw = node.sdo[0x6064].raw
@@ -84,6 +87,8 @@ def master_lost(network, node):
     network.send_message(0x77F, [5])
     wait_until("fault", lambda: node.sdo[0x6041].raw & 0x08)
     node.sdo[0x1016][1].raw = 0
+    # Without object 1029 the loss makes the node pre-operational, where it sends no feedback.
+    node.nmt.state = "OPERATIONAL"
     node.reset_from_fault()
     expect("state after the reset", node.state, "OPERATION ENABLED")
     node.state = "SWITCH ON DISABLED"
