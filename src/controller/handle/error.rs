@@ -11,6 +11,7 @@ use crate::trajectory::{RateError, TrajectoryError};
 
 /// Why a controller could not be started.
 #[derive(thiserror::Error)]
+#[non_exhaustive]
 pub enum StartFailure {
     /// The session could not be started: nothing was sent to the drives.
     #[error(transparent)]
@@ -60,6 +61,7 @@ impl Stopped {
 
 /// Why a command was not executed. It has changed nothing.
 #[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CommandError {
     /// The number of values is not the number of axes.
     #[error("{given} values were given for {axes} axes")]
@@ -153,6 +155,7 @@ pub enum CommandError {
 
 /// Why a motion did not reach its targets.
 #[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MotionError {
     /// The callback has panicked, and the group has stopped.
     #[error("the callback has panicked ({message}): {stopped}")]
@@ -187,6 +190,7 @@ pub enum MotionError {
 
 /// Why a wait has not ended with what it was for.
 #[derive(Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum WaitError {
     /// It did not happen in time.
     #[error("what was waited for has not happened in time")]
