@@ -28,14 +28,14 @@
 //!
 //! ```text
 //! cli                                 the program `takt`
-//! doctor jitter play                  is the machine fit, and how evenly it paces the loop; motion from a file
+//! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
-//! commission drive                    commissioning; bring-up and shutdown, over the services of CiA 301, without I/O
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
+//! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! canopen                             the protocols of CiA 301, 305 and 306, without I/O
 //! channels                            the lock-free door to the real-time thread
 //! trajectory frame_time sleep_alignment source_text printable text_file
@@ -46,7 +46,8 @@
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`link`]: what a bus is connected to, and who commands it.
 //! - [`schedule`]: whether everything fits on the buses in the worst case.
-//! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
+//! - [`family`], [`procedure`] and [`canopen`]: what takt knows of each family of drives, and how it sets one up, without I/O.
+//! - [`procedure`]: the engine of procedures on drives, for bring-up, shutdown and [`commission`]ing.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
 //! - [`commission`]: what a single drive is set up, moved and looked at with, apart from any run.
@@ -67,7 +68,6 @@ pub mod commission;
 pub mod config;
 pub mod controller;
 pub mod doctor;
-pub mod drive;
 mod error;
 pub mod family;
 pub mod faults;
@@ -77,6 +77,7 @@ pub mod link;
 pub mod play;
 #[doc(hidden)]
 pub mod printable;
+pub mod procedure;
 pub mod schedule;
 pub mod sim;
 mod sleep_alignment;

@@ -5,22 +5,22 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 23] = [
+const ORDER: [&str; 24] = [
     "cli",
     "doctor",
     "jitter",
+    "commission",
     "play",
     "error",
     "controller",
     "telemetry",
     "schedule",
     "family",
-    "commission",
-    "drive",
     "faults",
     "link",
     "sim",
     "config",
+    "procedure",
     "canopen",
     "channels",
     "trajectory",

@@ -16,6 +16,7 @@ mod model;
 mod problem_kind;
 pub(crate) mod quantities;
 pub(crate) mod quantity;
+pub mod quirks;
 mod ranges;
 pub(crate) mod read;
 mod rules;

@@ -12,7 +12,7 @@ use takt_rt::{
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
 use crate::config::{Axis, Compliance, Config, ConfigError, Interface};
-use crate::drive::{PdoPlan, ProcessData, Reply};
+use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
