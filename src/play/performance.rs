@@ -58,7 +58,6 @@ pub trait Stage {
 
 /// Why a performance ended before the end of the file.
 #[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum PlayError {
     /// The run has ended; its outcome says why.
     Ended,

@@ -62,7 +62,6 @@ pub enum LssOutcome {
 
 /// Why a task failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum LssError {
     /// No device has replied.
     #[error("no device answered within {} ms", reply_timeout_ns / 1_000_000)]
