@@ -24,7 +24,7 @@
 
 use std::path::PathBuf;
 
-use takt_rt::{FeedForward, Follow, Scale, ScaleError, ScaleParameters, StopCategories, StreamDelay};
+use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use super::drive_family::DriveFamily;
@@ -222,23 +222,6 @@ impl Joint {
 }
 
 impl Axis {
-    /// The conversion of SI units to the drive units of the axis. The rated torque is the configured one until the drive has
-    /// reported its own.
-    ///
-    /// # Errors
-    /// An impossible parameter. A checked configuration has none.
-    pub fn scale(&self) -> Result<Scale, ScaleError> {
-        Scale::new(ScaleParameters {
-            counts_per_turn: self.counts_per_turn,
-            velocity_units_per_turn: self.drive.velocity_units_per_turn(self.counts_per_turn),
-            gear_ratio: self.gear_ratio,
-            travel_per_turn: self.travel.per_turn(),
-            reversed: self.reversed,
-            zero_counts: self.zero_counts.into(),
-            rated_torque: self.rated_torque(),
-        })
-    }
-
     /// The rated torque of the drive at the joint, as long as the drive has not reported its own: N·m (N).
     pub fn rated_torque(&self) -> f64 {
         self.joint.rated_torque.unwrap_or(self.limits.torque)
