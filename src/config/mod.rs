@@ -20,6 +20,7 @@ pub mod quirks;
 mod ranges;
 pub(crate) mod read;
 mod rules;
+mod scale;
 mod spelling;
 pub(crate) mod spot;
 

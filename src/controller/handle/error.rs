@@ -189,7 +189,6 @@ pub enum MotionError {
 
 /// Why a wait has not ended with what it was for.
 #[derive(Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
 pub enum WaitError {
     /// It did not happen in time.
     #[error("what was waited for has not happened in time")]
