@@ -26,6 +26,7 @@ pub struct Warning {
 
 /// What is implausible.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum WarningKind {
     /// At its velocity limit the drive turns faster than drives of its family do.
     DriveSpeed {
