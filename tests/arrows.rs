@@ -9,14 +9,13 @@ const ORDER: [&str; 24] = [
     "cli",
     "doctor",
     "jitter",
+    "commission",
     "play",
     "error",
     "controller",
     "telemetry",
     "schedule",
     "family",
-    "commission",
-    "drive",
     "faults",
     "link",
     "sim",
@@ -33,7 +32,11 @@ const ORDER: [&str; 24] = [
 ];
 
 /// Arrows that still point back.
-const KNOWN: [(&str, &str); 0] = [];
+const KNOWN: [(&str, &str); 2] = [
+    // What is special to a family in bring-up and in commissioning has not moved to the folder of the family yet.
+    ("drive", "family"),
+    ("commission", "family"),
+];
 
 /// One use of a folder by another.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -49,7 +49,7 @@ impl ConfigError {
     }
 
     /// A file that cannot be read.
-    pub(super) fn unreadable(name: &str, reason: String) -> Self {
+    pub(in crate::config) fn unreadable(name: &str, reason: String) -> Self {
         let kind = ProblemKind::Unreadable { reason };
         let problems = vec![Problem { kind, location: Location::Nowhere }];
         Self::new(printable(name), None, LineStarts::of(""), problems)

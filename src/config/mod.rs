@@ -16,9 +16,11 @@ mod model;
 mod problem_kind;
 pub(crate) mod quantities;
 pub(crate) mod quantity;
+pub mod quirks;
 mod ranges;
 pub(crate) mod read;
 mod rules;
+mod scale;
 mod spelling;
 pub(crate) mod spot;
 

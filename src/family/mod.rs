@@ -4,6 +4,8 @@
 //! its errors, and the drive that simulates it. Nothing outside its folder and `sim/` says its name. [`register`] adds a family
 //! of your own, so that configurations may name it.
 
+pub mod bring_up;
+pub mod commission;
 pub mod erob_canopen;
 mod error_words;
 mod registry;
@@ -22,10 +24,11 @@ pub use warning::{Warning, WarningKind, is_rounded};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
-use crate::commission::dictionary::ObjectEntry;
-use crate::commission::{Failure, Report, SdoQuirks, SdoSession, TargetDrive, Task};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily};
-use crate::drive::{AxisSession, ProcessData, StepResult};
+use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
+use crate::family::commission::dictionary::ObjectEntry;
+use crate::family::commission::{Failure, Report, SdoSession, TargetDrive, Task};
+use crate::procedure::SdoQuirks;
 use crate::sim::Drive;
 
 /// ZeroErr eRob with CANopen firmware.

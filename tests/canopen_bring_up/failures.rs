@@ -3,7 +3,7 @@
 use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
-use takt::drive::{BringUp, FailureCause, ProbeResult, Shutdown};
+use takt::family::bring_up::{BringUp, FailureCause, ProbeResult, Shutdown};
 use takt_rt::DriveState;
 
 use super::scripted_drive::{ScriptedDrive, at};

@@ -8,10 +8,10 @@ use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::config::{Axis, Control, PdoMapping};
-use crate::drive::axis_units::{counts, rounded_up};
-use crate::drive::configuration_file::write_unless_in_file;
-use crate::drive::{AxisSession, Check, ProcessData, RESTART_STEP, StepResult};
-use crate::drive::{actual_position, configuration_file, heartbeat, identity, pdo_mapping};
+use crate::family::bring_up::axis_units::{counts, rounded_up};
+use crate::family::bring_up::configuration_file::write_unless_in_file;
+use crate::family::bring_up::{AxisSession, Check, ProcessData, RESTART_STEP, StepResult};
+use crate::family::bring_up::{actual_position, configuration_file, heartbeat, identity, pdo_mapping};
 
 /// Number of RPDOs, and of TPDOs.
 const PDO_COUNT: u8 = 4;
