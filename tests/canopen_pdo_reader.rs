@@ -7,7 +7,7 @@ use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
 use takt::canopen::pdo_configuration::PdoConfiguration;
 use takt::canopen::pdo_reader::{PdoReadError, PdoReader};
-use takt::canopen::sdo::{Expedited, SdoError, SdoRequest, SdoTiming};
+use takt::canopen::sdo::{Completed, Expedited, SdoClient, SdoError, SdoRequest, SdoTiming, Transfer};
 use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{SimulatedBus, WireBitRates};
@@ -64,16 +64,27 @@ impl Bench {
         received
     }
 
-    fn ask(&mut self, mut reader: PdoReader) -> Result<Vec<PdoConfiguration>, PdoReadError> {
+    /// Uploads what the reader asks for.
+    fn ask(&mut self, node: u8, mut reader: PdoReader) -> Result<Vec<PdoConfiguration>, PdoReadError> {
+        let mut client = SdoClient::new(node, SdoTiming::default());
         for _ in 0..10_000 {
-            while let Some(frame) = reader.poll(self.now_ns) {
-                self.bus.send(self.now_ns, &[frame]);
-            }
             if let Some(outcome) = reader.outcome() {
                 return outcome;
             }
+            if let (false, Some(object)) = (client.is_busy(), reader.question()) {
+                client.start(Transfer::Upload { object }).unwrap();
+            }
+            while let Some(frame) = client.poll(self.now_ns) {
+                self.bus.send(self.now_ns, &[frame]);
+            }
             for frame in self.pass(1) {
-                reader.receive(&frame);
+                client.receive(&frame);
+            }
+            if let Some(outcome) = client.take_outcome() {
+                reader.answer(outcome.map(|completed| match completed {
+                    Completed::Uploaded(uploaded) => uploaded,
+                    Completed::Downloaded => panic!("it was an upload"),
+                }));
             }
         }
         panic!("no end after 10 s");
@@ -84,7 +95,7 @@ impl Bench {
 fn the_drive_reports_the_configuration_of_its_eds() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
     let described = eds::load(&path).unwrap().dictionary.pdos(Some(NODE));
-    let reported = Bench::new().ask(PdoReader::of_first_four(NODE, SdoTiming::default())).unwrap();
+    let reported = Bench::new().ask(NODE, PdoReader::of_first_four()).unwrap();
     assert_eq!(reported.len(), 8);
     for (reported, described) in reported.iter().zip(&described) {
         // The EDS leaves these open.
@@ -106,8 +117,8 @@ fn process_data_is_decoded_by_the_reported_mapping() {
     }
     bench.bus.send(bench.now_ns, &[Frame::of(Id::canopen(0, 0), [1, NODE])]);
     bench.pass(5);
-    let reader = PdoReader::new(NODE, SdoTiming::default(), [(PdoDirection::Transmit, 2)]);
-    let tpdo2 = bench.ask(reader).unwrap().remove(0);
+    let reader = PdoReader::new([(PdoDirection::Transmit, 2)]);
+    let tpdo2 = bench.ask(NODE, reader).unwrap().remove(0);
     assert_eq!((tpdo2.is_valid, tpdo2.length()), (true, 6));
     bench.bus.send(bench.now_ns, &[Frame::of(Id::canopen(0x80, 0), [])]);
     let received = bench.pass(3);
@@ -122,9 +133,9 @@ fn process_data_is_decoded_by_the_reported_mapping() {
 fn missing_pdos_are_left_out_and_a_missing_reply_is_an_error() {
     let mut bench = Bench::new();
     let pdos = [(PdoDirection::Receive, 5), (PdoDirection::Receive, 2)];
-    let reported = bench.ask(PdoReader::new(NODE, SdoTiming::default(), pdos)).unwrap();
+    let reported = bench.ask(NODE, PdoReader::new(pdos)).unwrap();
     assert_eq!(reported.iter().map(|pdo| pdo.number).collect::<Vec<_>>(), [2]);
-    let failure = bench.ask(PdoReader::of_first_four(9, SdoTiming::default())).unwrap_err();
+    let failure = bench.ask(9, PdoReader::of_first_four()).unwrap_err();
     assert_eq!(failure.object.to_string(), "1400:00");
     assert!(matches!(failure.error, SdoError::NoReply { .. }));
 }

@@ -175,6 +175,7 @@ mod tests {
     #[test]
     fn the_standard_is_followed_where_a_drive_follows_it() {
         let standard = Cia402Codec::default();
+        assert_eq!(standard, Cia402Codec::STANDARD);
         for state in DriveState::ALL {
             for goal in [Goal::NoVoltage, Goal::Disabled, Goal::Enabled, Goal::QuickStop] {
                 assert_eq!(standard.controlword(state, goal, 0x07), state.controlword_towards(goal));

@@ -101,15 +101,40 @@ impl core::error::Error for FrameError {}
 
 /// The four kinds of frame on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum FrameKind {
     /// A classic data frame, 0 to 8 bytes.
-    Data,
+    Data = 0,
     /// A classic remote frame (RTR): a length, no data.
-    Remote,
+    Remote = 1,
     /// A CAN FD frame at one bit rate.
-    Fd,
+    Fd = 2,
     /// A CAN FD frame with bit-rate switching (BRS): its data phase has the second, faster bit rate.
-    FdBitRateSwitch,
+    FdBitRateSwitch = 3,
+}
+
+/// The three kinds of frame that carry data, with the numbers of [`FrameKind`]: then one becomes the other without an instruction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum FrameFormat {
+    /// A classic data frame, 0 to 8 bytes.
+    #[default]
+    Classic = 0,
+    /// A CAN FD frame at one bit rate.
+    Fd = 2,
+    /// A CAN FD frame with bit-rate switching (BRS).
+    FdBitRateSwitch = 3,
+}
+
+impl FrameFormat {
+    /// The kind of such a frame.
+    pub const fn kind(self) -> FrameKind {
+        match self {
+            Self::Classic => FrameKind::Data,
+            Self::Fd => FrameKind::Fd,
+            Self::FdBitRateSwitch => FrameKind::FdBitRateSwitch,
+        }
+    }
 }
 
 /// One CAN or CAN FD frame.
@@ -136,9 +161,9 @@ impl Frame {
         Ok(Self::filled(id, FrameKind::Data, bytes))
     }
 
-    /// A classic data frame of the first `length` of these bytes; of all of them if it is larger.
+    /// A data frame of the first `length` of these bytes; of all of them if it is larger.
     #[inline]
-    pub(crate) fn packed(id: Id, bytes: [u8; 8], length: usize) -> Self {
+    pub(crate) fn packed(id: Id, format: FrameFormat, bytes: [u8; 8], length: usize) -> Self {
         let length = length.min(bytes.len());
         let unused_bits = 64 - 8 * length as u32;
         let kept = u64::MAX.checked_shr(unused_bits).unwrap_or(0);
@@ -147,7 +172,7 @@ impl Frame {
         if let Some(first) = data.first_chunk_mut() {
             *first = word.to_le_bytes();
         }
-        Self { id, kind: FrameKind::Data, length: length as u8, data }
+        Self { id, kind: format.kind(), length: length as u8, data }
     }
 
     /// A classic data frame of 0 to 8 bytes. The compiler checks the length.
@@ -181,7 +206,7 @@ impl Frame {
     }
 
     #[inline]
-    fn filled(id: Id, kind: FrameKind, bytes: &[u8]) -> Self {
+    pub(crate) fn filled(id: Id, kind: FrameKind, bytes: &[u8]) -> Self {
         let mut data = [0; Self::MAX_BYTES];
         for (to, from) in data.iter_mut().zip(bytes) {
             *to = *from;

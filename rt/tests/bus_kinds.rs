@@ -4,10 +4,10 @@ mod fixture;
 
 use std::collections::BTreeSet;
 
-use fixture::{PERIOD_NS, Rig, parameters, scale};
+use fixture::{PERIOD_NS, Rig, flexible, parameters, scale};
 use takt_rt::{
-    DriveState, Engine, EngineParameters, FeedbackSince, Frame, Id, MAX_AXES, MAX_BUSES, Phase, Request,
-    Rule, SetUpError, nmt_command,
+    DriveState, Engine, EngineParameters, Fault, FeedbackSince, Frame, Id, MAX_AXES, MAX_BUSES, Phase,
+    Request, Rule, SetUpError, StopCause, nmt_command,
 };
 
 /// Three axes on a CANopen bus, three on one that is none, whose drives answer set-points. The drives are told the time of day.
@@ -20,7 +20,10 @@ fn two_kinds() -> EngineParameters {
 }
 
 fn rig() -> Rig {
-    let mut rig = Rig::of(two_kinds());
+    prepared(Rig::of(two_kinds()))
+}
+
+fn prepared(mut rig: Rig) -> Rig {
     rig.buses[1].drives.iter_mut().for_each(|drive| drive.answers_set_points = true);
     // A drive that answers set-points gets the first one where it has said that it is.
     for axis in 3..6 {
@@ -86,6 +89,51 @@ fn a_silent_drive_that_never_had_a_heartbeat_is_not_taken_to_have_stopped_for_wa
     assert_eq!(rig.phase(), Phase::Disabling, "the controller goes on to tell it");
     rig.run_until(Phase::Disabled, 500);
     assert_eq!(rig.drive(4).state, DriveState::OperationEnabled);
+}
+
+/// As [`rig`], with CAN FD frames and 29-bit identifiers on the second bus, whose drives reply by one identifier.
+fn flexible_rig() -> Rig {
+    let mut parameters = two_kinds();
+    for axis in &mut parameters.axes[3..] {
+        let node = axis.node;
+        axis.commands[0].pdo = flexible::command_pdo(&axis.commands[0].pdo, node);
+        axis.feedback[0] = flexible::reply_pdo(&axis.feedback[0], node);
+    }
+    let mut rig = Rig::of(parameters);
+    rig.buses[1].is_flexible = true;
+    prepared(rig).enable()
+}
+
+#[test]
+fn drives_with_one_reply_identifier_are_moved_by_flexible_data_rate_frames_with_29_bit_identifiers() {
+    let mut rig = flexible_rig();
+    rig.move_to(1.25);
+    rig.run_until(Phase::Holding, 5_000);
+    rig.run(4);
+    for axis in 0..6 {
+        assert_eq!(rig.drive(axis).position, scale().position_to_counts(1.25), "axis {axis}");
+    }
+    assert_eq!(rig.stops(), []);
+    // A classic frame with the identifier of the replies is none of them, and the reply of another drive concerns nobody.
+    let reply = Id::base(flexible::REPLY).unwrap();
+    rig.buses[1].inject(Frame::of(reply, [0x37, 0x02, 0, 0, 0, 0, 2, 0]));
+    rig.buses[1].inject(Frame::fd(reply, &[0x37, 0x02, 0, 0, 0, 0, 9, 0], false).unwrap());
+    rig.run(1);
+    assert_eq!((rig.host.received.len(), rig.stops()), (2, vec![]));
+    // Of those that share the identifier, the one that stops to reply is known.
+    rig.drive(4).is_silent = true;
+    rig.run(5);
+    assert_eq!((rig.stops()[0].rule(), rig.stops()[0].axis()), (Rule::MissedFeedback, Some(4)));
+}
+
+#[test]
+fn a_set_point_from_somebody_else_is_noticed_whatever_its_identifier_and_kind() {
+    let mut rig = flexible_rig();
+    let own = rig.buses[1].sent.last().unwrap().1;
+    assert!(own.id().is_extended() && own.is_fd());
+    rig.buses[1].inject(own);
+    rig.run(1);
+    assert_eq!(rig.stops()[0].cause, StopCause::Fault(Fault::ForeignMaster { id: own.id() }));
 }
 
 fn error_of(change: impl Fn(&mut EngineParameters)) -> Option<SetUpError> {

@@ -139,7 +139,7 @@ fn frames_that_do_not_fit_into_one_batch_are_refused_at_set_up() {
             axis.commands.clear();
             for function in [0x200, 0x300, 0x400, 0x500] {
                 let mapping = if function == 0x200 { first.pdo.mapping.clone() } else { dummy.clone() };
-                let pdo = Pdo { id: Id::canopen(function, node), mapping };
+                let pdo = Pdo::classic(Id::canopen(function, node), mapping);
                 axis.commands.push(takt_rt::CommandPdo::every_cycle(pdo));
             }
         }

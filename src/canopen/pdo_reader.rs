@@ -1,17 +1,15 @@
 //! Reads the PDO configuration of a device by SDO, so that process data is decoded as the device reports it.
 //!
 //! Sub-index 0 of each parameter is read first, because it says which sub-indices exist. A device that does not answer
-//! for missing objects then gets no such request. No input and output, as with
-//! [`sdo::SdoClient`](super::sdo::SdoClient).
+//! for missing objects then gets no such request. The caller makes the transfers: it uploads each
+//! [`PdoReader::question`], and gives the result to [`PdoReader::answer`].
 
 use std::collections::{BTreeMap, VecDeque};
-
-use takt_rt::{Frame, Nanoseconds};
 
 use super::object::ObjectAddress;
 use super::objects::{PdoDirection, PdoParameters};
 use super::pdo_configuration::PdoConfiguration;
-use super::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
+use super::sdo::{SdoError, Uploaded};
 
 /// The sub-indices of a communication parameter that are read; 4 is reserved.
 const COMMUNICATION: [u8; 4] = [1, 2, 3, 5];
@@ -31,7 +29,6 @@ pub struct PdoReadError {
 /// Reads the configuration of some PDOs of one device.
 #[derive(Debug)]
 pub struct PdoReader {
-    client: SdoClient,
     pdos: Vec<(PdoDirection, u16)>,
     /// The objects to read, the next one first.
     questions: VecDeque<ObjectAddress>,
@@ -40,8 +37,8 @@ pub struct PdoReader {
 }
 
 impl PdoReader {
-    /// Reads these PDOs (numbers counted from 1) of `node`. The outcome leaves out PDOs that the device does not have.
-    pub fn new(node: u8, timing: SdoTiming, pdos: impl IntoIterator<Item = (PdoDirection, u16)>) -> Self {
+    /// Reads these PDOs (numbers counted from 1). The outcome leaves out PDOs that the device does not have.
+    pub fn new(pdos: impl IntoIterator<Item = (PdoDirection, u16)>) -> Self {
         let pdos: Vec<(PdoDirection, u16)> = pdos.into_iter().collect();
         let parameters = pdos.iter().map(|(direction, number)| PdoParameters::at(*direction, *number));
         let questions = parameters.flat_map(|parameters| {
@@ -49,43 +46,36 @@ impl PdoReader {
             [ObjectAddress::new(communication, 0), parameters.mapped_count().address]
         });
         let questions = questions.collect();
-        Self {
-            client: SdoClient::new(node, timing),
-            pdos,
-            questions,
-            answers: BTreeMap::new(),
-            failure: None,
-        }
+        Self { pdos, questions, answers: BTreeMap::new(), failure: None }
     }
 
     /// Reads the first four PDOs of each direction.
-    pub fn of_first_four(node: u8, timing: SdoTiming) -> Self {
+    pub fn of_first_four() -> Self {
         let directions = [PdoDirection::Receive, PdoDirection::Transmit];
         let pdos =
             directions.into_iter().flat_map(|direction| (1..=4).map(move |number| (direction, number)));
-        Self::new(node, timing, pdos)
+        Self::new(pdos)
     }
 
-    /// The next frame to send, if one is due. Call it until it returns `None`.
-    pub fn poll(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
-        loop {
-            if let Some(frame) = self.client.poll(now_ns) {
-                return Some(frame);
+    /// The next object to upload; `None` at the end.
+    pub fn question(&self) -> Option<ObjectAddress> {
+        self.questions.front().copied().filter(|_| self.failure.is_none())
+    }
+
+    /// Takes the result of uploading the [`PdoReader::question`].
+    pub fn answer(&mut self, outcome: Result<Uploaded, SdoError>) {
+        let Some(object) = self.questions.pop_front() else { return };
+        match outcome {
+            Ok(uploaded) => {
+                let value = number(&uploaded);
+                self.answers.insert(object, value);
+                if object.subindex == 0 {
+                    self.ask_for_the_rest(object.index, value);
+                }
             }
-            if let Some(outcome) = self.client.take_outcome() {
-                self.answered(outcome);
-            }
-            if self.client.is_busy() || self.failure.is_some() {
-                return None;
-            }
-            let object = *self.questions.front()?;
-            self.client.start(Transfer::Upload { object }).ok()?;
+            Err(SdoError::Aborted(_)) => {}
+            Err(error) => self.failure = Some(PdoReadError { object, error }),
         }
-    }
-
-    /// Receives a frame; frames from other nodes are ignored.
-    pub fn receive(&mut self, frame: &Frame) {
-        self.client.receive(frame);
     }
 
     /// The PDOs of the device, or the object that could not be read; `None` while reading. An abort means that the
@@ -104,21 +94,6 @@ impl PdoReader {
             })
         };
         Some(Ok(self.pdos.iter().filter_map(read).collect()))
-    }
-
-    fn answered(&mut self, outcome: Result<Completed, SdoError>) {
-        let Some(object) = self.questions.pop_front() else { return };
-        match outcome {
-            Ok(Completed::Uploaded(uploaded)) => {
-                let value = number(&uploaded);
-                self.answers.insert(object, value);
-                if object.subindex == 0 {
-                    self.ask_for_the_rest(object.index, value);
-                }
-            }
-            Ok(Completed::Downloaded) | Err(SdoError::Aborted(_)) => {}
-            Err(error) => self.failure = Some(PdoReadError { object, error }),
-        }
     }
 
     fn ask_for_the_rest(&mut self, index: u16, count: u32) {

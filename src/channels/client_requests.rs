@@ -14,7 +14,7 @@
 
 use std::sync::Arc;
 
-use crossbeam::utils::CachePadded;
+use crossbeam_utils::CachePadded;
 use takt_rt::{MAX_GROUPS, Request, RequestEnvelope, RequestId, RequestTarget, StopCategory};
 
 use super::primitives::{AtomicCell, AtomicU64, Ordering};

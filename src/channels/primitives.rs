@@ -3,5 +3,5 @@
 
 pub use std::sync::atomic::{AtomicU64, Ordering, fence};
 
-pub use crossbeam::atomic::AtomicCell;
-pub use crossbeam::queue::ArrayQueue;
+pub use crossbeam_queue::ArrayQueue;
+pub use crossbeam_utils::atomic::AtomicCell;

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use crossbeam::utils::CachePadded;
+use crossbeam_utils::CachePadded;
 
 use super::primitives::{ArrayQueue, AtomicU64, Ordering};
 

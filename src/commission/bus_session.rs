@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
 
-use super::event::ProcedureEvent;
-use super::procedure::{Procedure, ProcedureError};
-use super::report::Report;
+use super::Report;
+use super::{Procedure, ProcedureError};
+use crate::procedure::ProcedureEvent;
 
 /// Interval between two polls of the bus.
 const POLL_NS: Nanoseconds = 500_000;

@@ -49,6 +49,8 @@ pub const SDO_WHILE_ENABLED: bool = false;
 
 /// `[[axis]] answers_sync`
 pub const ANSWERS_SYNC: bool = true;
+/// `[[axis]] counts_per_turn` of a drive that is configured in code, where its family does not know them.
+pub const COUNTS_PER_TURN: f64 = 65_536.0;
 /// `[[axis]] gear_ratio`
 pub const GEAR_RATIO: f64 = 1.0;
 /// `[[axis]] missed_feedback_cycles`
@@ -159,12 +161,12 @@ pub const fn mapping(drive: &DriveFacts) -> PdoMapping {
     if drive.has_fixed_process_data { PdoMapping::AsStored } else { PdoMapping::Written }
 }
 
-/// `[[axis]] feedback`. A drive whose PDOs are written reports its mode of operation (object 6061). Nothing else shows that another
-/// master has changed the mode.
-pub fn feedback(mapping: PdoMapping) -> Vec<Feedback> {
+/// `[[axis]] feedback`. A drive whose PDOs are written reports its mode of operation (object 6061), if it can. Nothing else shows
+/// that another master has changed the mode.
+pub fn feedback(drive: &DriveFacts, mapping: PdoMapping) -> Vec<Feedback> {
     match mapping {
-        PdoMapping::Written => vec![Feedback::OperationMode],
-        PdoMapping::AsStored => vec![],
+        PdoMapping::Written if drive.reports_mode => vec![Feedback::OperationMode],
+        _ => vec![],
     }
 }
 

@@ -42,8 +42,8 @@ pub struct DriveFacts {
     pub name: &'static str,
     /// What the drives say of themselves. `None` accepts anything.
     pub identity: Identity,
-    /// Counts of one turn of the position that the drives report.
-    pub counts_per_turn: f64,
+    /// Counts of one turn of the position that the drives report. `None`: a configuration must say it.
+    pub counts_per_turn: Option<f64>,
     /// The unit of velocities (objects 606C, 60FF, 6081).
     pub velocity_unit: VelocityUnit,
     /// The modes that the drives have.
@@ -60,6 +60,8 @@ pub struct DriveFacts {
     pub bit_rates: &'static [u32],
     /// Whether the controller can map their PDOs.
     pub has_fixed_process_data: bool,
+    /// Whether a PDO can carry the mode of operation that a drive shows (6061).
+    pub reports_mode: bool,
     /// Whether the drives can be told to answer set-points alone, and not SYNC (`answers_sync`).
     pub may_ignore_sync: bool,
     /// Whether the drives have emergency objects.
@@ -98,21 +100,18 @@ impl ModeSet {
 /// The unit of a drive's velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum VelocityUnit {
-    /// Counts of the reported position in a second.
-    CountsPerSecond,
-    /// r/min of the reported position.
-    RevolutionsPerMinute,
-    /// So many units are one turn of the reported position in a second.
-    PerTurn(f64),
+    /// So many counts of the reported position in a second.
+    Counts(f64),
+    /// So many r/min of the reported position.
+    RevolutionsPerMinute(f64),
 }
 
 impl VelocityUnit {
     /// What the drive calls a speed of one turn of its position in a second.
     pub const fn units_per_turn(self, counts_per_turn: f64) -> f64 {
         match self {
-            Self::CountsPerSecond => counts_per_turn,
-            Self::RevolutionsPerMinute => 60.0,
-            Self::PerTurn(units) => units,
+            Self::Counts(counts) => counts_per_turn / counts,
+            Self::RevolutionsPerMinute(rpm) => 60.0 / rpm,
         }
     }
 }
@@ -164,8 +163,8 @@ impl DriveFacts {
             word,
             name,
             identity: Identity { device_type: None, vendor: None, product: None, revision: None },
-            counts_per_turn: 65_536.0,
-            velocity_unit: VelocityUnit::CountsPerSecond,
+            counts_per_turn: None,
+            velocity_unit: VelocityUnit::Counts(1.0),
             modes: ModeSet::of(&OperationMode::ALL),
             usual_mode: Control::Position,
             mode_changes: ModeChangeRule::When(ModeCondition::Disabled),
@@ -173,6 +172,7 @@ impl DriveFacts {
             highest_speed_rpm: None,
             bit_rates: &[],
             has_fixed_process_data: false,
+            reports_mode: true,
             may_ignore_sync: false,
             sends_emergencies: true,
             may_power_up_operational: false,

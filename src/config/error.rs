@@ -3,14 +3,14 @@
 use std::fmt;
 use std::ops::Range;
 
-use miette::{Diagnostic, GraphicalReportHandler, GraphicalTheme, LabeledSpan, SourceCode};
 use thiserror::Error;
 
 use crate::canopen::dcf::DcfError;
+use crate::canopen::eds::Findings;
 
 use super::problem_kind::ProblemKind;
-use super::source_view::SourceView;
 use crate::printable::{letter_start, printable};
+use crate::source_text::{LineStarts, SourceText};
 
 /// The most problems that are shown of one configuration; the rest are counted. Whoever gets more of them has given another
 /// file, or will see the rest after the first are mended.
@@ -19,14 +19,14 @@ const SHOWN_AT_MOST: usize = 20;
 /// The most bytes of a file that are underlined.
 const LONGEST_SPAN: usize = 200;
 
-/// A configuration that cannot be used, with its first twenty problems in the order of the file. `miette` shows each of them
-/// with its line, and so does `Debug`, which is what `main` prints of an error that `?` hands it.
+/// A configuration that cannot be used, with its first twenty problems in the order of the file. `Debug` shows each of them at its
+/// line: that is what `main` prints of an error that `?` hands it. With the feature `miette` it is a diagnostic of that crate.
 pub struct ConfigError(Box<Inner>);
 
 struct Inner {
     name: String,
     /// The text of the file; `None` where the configuration was made in code or could not be read.
-    source: Option<SourceView>,
+    source: Option<SourceText>,
     lines: LineStarts,
     problems: Vec<Problem>,
     omitted: usize,
@@ -36,7 +36,7 @@ impl ConfigError {
     /// A file, or another text, that is wrong.
     pub(super) fn of_text(name: &str, text: &str, problems: Vec<Problem>) -> Self {
         let name = printable(name);
-        let source = Some(SourceView::new(&name, printable(text)));
+        let source = Some(SourceText::new(name.as_str(), printable(text)));
         let shorten = |problem: &mut Problem| {
             if let Location::Text { span, .. } = &mut problem.location {
                 let end = span.end.min(span.start.saturating_add(LONGEST_SPAN));
@@ -49,7 +49,7 @@ impl ConfigError {
     }
 
     /// A file that cannot be read.
-    pub(super) fn unreadable(name: &str, reason: String) -> Self {
+    pub(in crate::config) fn unreadable(name: &str, reason: String) -> Self {
         let kind = ProblemKind::Unreadable { reason };
         let problems = vec![Problem { kind, location: Location::Nowhere }];
         Self::new(printable(name), None, LineStarts::of(""), problems)
@@ -61,7 +61,7 @@ impl ConfigError {
         Self::new(name, None, LineStarts::of(""), problems)
     }
 
-    fn new(name: String, source: Option<SourceView>, lines: LineStarts, mut problems: Vec<Problem>) -> Self {
+    fn new(name: String, source: Option<SourceText>, lines: LineStarts, mut problems: Vec<Problem>) -> Self {
         problems.sort_by_key(|problem| problem.span().map(|span| (span.start, span.end)));
         // The defaults of axes are read once for each axis, with the same problems.
         let mut shown: Vec<Problem> = Vec::with_capacity(SHOWN_AT_MOST);
@@ -94,6 +94,12 @@ impl ConfigError {
         &self.0.problems
     }
 
+    /// The text of the file, if there is one.
+    #[cfg(feature = "miette")]
+    pub(super) fn source(&self) -> Option<&SourceText> {
+        self.0.source.as_ref()
+    }
+
     /// How many problems there are besides [`ConfigError::problems`].
     pub fn omitted(&self) -> usize {
         self.0.omitted
@@ -107,27 +113,6 @@ impl ConfigError {
     /// The line of a problem, counted from 1; `None` where the configuration is no text.
     pub fn line(&self, problem: &Problem) -> Option<usize> {
         Some(self.0.lines.line_of(problem.span()?.start))
-    }
-}
-
-/// Where each line of a text begins.
-#[derive(Clone, Debug)]
-pub(super) struct LineStarts(Vec<usize>);
-
-impl LineStarts {
-    pub fn of(text: &str) -> Self {
-        let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
-        Self(std::iter::once(0).chain(ends.map(|(at, _)| at + 1)).collect())
-    }
-
-    /// Where a line begins, counted from 0.
-    pub fn start_of(&self, line: usize) -> usize {
-        self.0.get(line).copied().unwrap_or(0)
-    }
-
-    /// The line in which a byte is, counted from 1.
-    pub fn line_of(&self, at: usize) -> usize {
-        self.0.partition_point(|start| *start <= at)
     }
 }
 
@@ -152,27 +137,26 @@ impl fmt::Display for ConfigError {
 impl fmt::Debug for ConfigError {
     /// The problems at their lines.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor()).render_report(f, self)
+        writeln!(f, "{self}")?;
+        for problem in self.problems() {
+            let help = problem.kind.help();
+            match (&self.0.source, problem.span()) {
+                (Some(source), Some(span)) => {
+                    source.write_problem(f, problem, Some((span, &problem.label())), &help)?;
+                }
+                // Problems of fields are part of the sentence.
+                (_, None) if matches!(problem.location, Location::Field { .. }) => continue,
+                _ => write!(f, "\n{problem}\n  help: {help}\n")?,
+            }
+            if let Some(findings) = problem.findings() {
+                findings.write_problems(f)?;
+            }
+        }
+        Ok(())
     }
 }
 
 impl std::error::Error for ConfigError {}
-
-impl Diagnostic for ConfigError {
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.0.source.as_ref().map(|source| {
-            let source: &dyn SourceCode = source;
-            source
-        })
-    }
-
-    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        fn diagnostic(problem: &Problem) -> &dyn Diagnostic {
-            problem
-        }
-        Some(Box::new(self.problems().iter().map(diagnostic)))
-    }
-}
 
 /// One problem.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -221,26 +205,22 @@ impl Problem {
             Location::Nowhere | Location::Field { .. } => None,
         }
     }
-}
 
-impl Diagnostic for Problem {
-    /// What is wrong with a file that the configuration names, at its lines.
-    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        let ProblemKind::Dcf { reason: DcfError::File(findings) } = &self.kind else { return None };
-        let findings: &dyn Diagnostic = findings;
-        Some(Box::new(std::iter::once(findings)))
+    /// What is wrong with a file that the configuration names.
+    pub(super) fn findings(&self) -> Option<&Findings> {
+        match &self.kind {
+            ProblemKind::Dcf { reason: DcfError::File(findings) } => Some(findings),
+            _ => None,
+        }
     }
 
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        Some(Box::new(self.kind.help()))
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let Location::Text { span, first_line } = &self.location else { return None };
-        let text = match first_line {
-            Some(line) => format!("{}; first in line {line}", self.kind.label()),
-            None => self.kind.label().to_owned(),
-        };
-        Some(Box::new(std::iter::once(LabeledSpan::at(span.clone(), text))))
+    /// What is written beside the place in the file.
+    pub(super) fn label(&self) -> String {
+        match &self.location {
+            Location::Text { first_line: Some(line), .. } => {
+                format!("{}; first in line {line}", self.kind.label())
+            }
+            _ => self.kind.label().to_owned(),
+        }
     }
 }

@@ -130,7 +130,8 @@ impl Axis {
     /// A rotary axis in the usual mode of its family: an index into the buses, a node ID from 1 to 127, and limits in rad.
     pub fn new(name: impl Into<String>, bus: usize, node: u8, drive: DriveFamily, limits: Limits) -> Self {
         let (travel, control, mapping) = (Travel::Rotary, drive.usual_mode, defaults::mapping(&drive));
-        let (counts_per_turn, identity) = (drive.counts_per_turn, drive.identity);
+        let counts_per_turn = drive.counts_per_turn.unwrap_or(defaults::COUNTS_PER_TURN);
+        let (identity, feedback) = (drive.identity, defaults::feedback(&drive, mapping));
         Self {
             name: name.into(),
             bus,
@@ -156,7 +157,7 @@ impl Axis {
             missed_feedback_cycles: defaults::MISSED_FEEDBACK_CYCLES,
             transmission_type: defaults::TRANSMISSION_TYPE,
             mapping,
-            feedback: defaults::feedback(mapping),
+            feedback,
             answers_sync: defaults::ANSWERS_SYNC,
             feedback_delay_ns: defaults::FEEDBACK_DELAY_NS,
             heartbeat_ns: None,

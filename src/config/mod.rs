@@ -6,6 +6,8 @@
 
 pub(crate) mod bounds;
 pub(crate) mod defaults;
+#[cfg(feature = "miette")]
+mod diagnostic;
 mod drive_family;
 mod error;
 mod in_code;
@@ -14,10 +16,11 @@ mod model;
 mod problem_kind;
 pub(crate) mod quantities;
 pub(crate) mod quantity;
+pub mod quirks;
 mod ranges;
 pub(crate) mod read;
 mod rules;
-mod source_view;
+mod scale;
 mod spelling;
 pub(crate) mod spot;
 

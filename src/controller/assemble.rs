@@ -6,13 +6,13 @@ use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
     FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
-    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters,
-    SetUpError, SlotPlan, TimingLadder, TorqueLimits,
+    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, ScaleError, SetUpError, SlotPlan,
+    TimingLadder, TorqueLimits,
 };
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
 use crate::config::{Axis, Compliance, Config, ConfigError, Interface};
-use crate::drive::{PdoPlan, ProcessData, Reply};
+use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
@@ -134,10 +134,10 @@ fn axis_parameters(
     let data = ProcessData::of(axis);
     let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
     let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
-        let pdo = Pdo { id: plan.id, mapping: Mapping::commands(&plan.objects)? };
+        let pdo = Pdo::classic(plan.id, Mapping::commands(&plan.objects)?);
         Ok(CommandPdo { pdo, transmission: plan.transmission })
     };
-    let feedback = |plan: &PdoPlan| Ok(Pdo { id: plan.id, mapping: Mapping::feedback(&plan.objects)? });
+    let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&plan.objects)?));
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,
@@ -156,7 +156,7 @@ fn axis_parameters(
             condition: axis.drive.mode_changes.condition().unwrap_or_default(),
             timeout_cycles: cycles(MODE_TIMEOUT_NS),
         },
-        scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
+        scale: axis.scale().map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
         torque_limits: torque_limits(axis),
         feed_forward: axis.feed_forward,
@@ -191,23 +191,6 @@ fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
     } else {
         FeedbackSince::CommandPhase
     }
-}
-
-/// The conversion of SI units to the drive units of an axis. The rated torque is the configured one until the drive has
-/// reported its own.
-///
-/// # Errors
-/// An impossible parameter.
-pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
-    Scale::new(ScaleParameters {
-        counts_per_turn: axis.counts_per_turn,
-        velocity_units_per_turn: axis.drive.velocity_units_per_turn(axis.counts_per_turn),
-        gear_ratio: axis.gear_ratio,
-        travel_per_turn: axis.travel.per_turn(),
-        reversed: axis.reversed,
-        zero_counts: axis.zero_counts.into(),
-        rated_torque: axis.rated_torque(),
-    })
 }
 
 /// The stream of each group of a configuration.

@@ -3,6 +3,8 @@
 use std::sync::mpsc;
 use std::thread::{Builder, JoinHandle};
 
+use nix::sched::{CpuSet, sched_getaffinity};
+use nix::unistd::Pid;
 use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, HostInterface, SlotPlan};
 
@@ -20,7 +22,10 @@ const LEAD_IN_NS: u64 = 2_000_000;
 /// The real-time set-up that a configuration asks for. Without a configured CPU, it is the last one that this process may
 /// use, since the first one serves most interrupts.
 pub fn thread_config(realtime: &Realtime) -> ThreadConfig {
-    let last = || core_affinity::get_core_ids().and_then(|cores| cores.last().map(|core| core.id));
+    let last = || {
+        let allowed = sched_getaffinity(Pid::from_raw(0)).ok()?;
+        (0..CpuSet::count()).rev().find(|cpu| allowed.is_set(*cpu) == Ok(true))
+    };
     ThreadConfig {
         priority: realtime.priority,
         // Without SCHED_FIFO, a pinned thread would have to share a busy CPU.

@@ -4,6 +4,8 @@
 //! its errors, and the drive that simulates it. Nothing outside its folder and `sim/` says its name. [`register`] adds a family
 //! of your own, so that configurations may name it.
 
+pub mod bring_up;
+pub mod commission;
 pub mod erob_canopen;
 mod error_words;
 mod registry;
@@ -22,10 +24,11 @@ pub use warning::{Warning, WarningKind, is_rounded};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
-use crate::commission::dictionary::ObjectEntry;
-use crate::commission::{Failure, Report, SdoQuirks, SdoSession, TargetDrive, Task};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily};
-use crate::drive::{BringUpTiming, ProcedureStep, ProcessData};
+use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
+use crate::family::commission::dictionary::ObjectEntry;
+use crate::family::commission::{Failure, Report, SdoSession, TargetDrive, Task};
+use crate::procedure::SdoQuirks;
 use crate::sim::Drive;
 
 /// ZeroErr eRob with CANopen firmware.
@@ -35,6 +38,9 @@ pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
 
 /// A task of commissioning that is under way.
 pub type CarryingOut<'a> = Pin<Box<dyn Future<Output = Result<Report, Failure>> + 'a>>;
+
+/// A part of bring-up or shutdown that is under way.
+pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + 'a>>;
 
 /// What takt needs to know of a family of drives, beside the facts that a configuration reads.
 pub trait Family: ConfiguredFamily {
@@ -53,13 +59,13 @@ pub trait Family: ConfiguredFamily {
     }
 
     /// From any state to NMT pre-operational, configured, without torque.
-    fn configure(&self, config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep>;
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
 
     /// From configured to operational.
-    fn start(&self, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep>;
+    fn start<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
 
     /// From operational to pre-operational, without torque, and without the watchdog on the controller's heartbeat.
-    fn shut_down(&self, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep>;
+    fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
 
     /// The protocol that a drive with this node ID may speak instead, if it can be probed for.
     fn other_protocol(&self, _node: u8) -> Option<OtherProtocol> {

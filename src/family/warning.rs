@@ -8,7 +8,7 @@ use crate::canopen::object::ObjectAddress;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Short;
 use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Travel};
-use crate::drive;
+use crate::family::bring_up;
 
 /// A rotary axis that goes round more often than this is unusual.
 const USUAL_TURNS: f64 = 2.0;
@@ -134,7 +134,7 @@ impl Config {
         for (index, axis) in self.axes.iter().enumerate() {
             let mut kinds = of_axis(axis);
             kinds.extend(self.rounded_velocities(index, axis));
-            let overwritten = drive::overwritten(self, axis);
+            let overwritten = bring_up::overwritten(self, axis);
             kinds.extend(overwritten.into_iter().map(|object| WarningKind::Overwritten { object }));
             warnings.extend(kinds.into_iter().map(|kind| Warning { axis: axis.name.clone(), kind }));
         }

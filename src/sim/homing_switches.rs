@@ -47,6 +47,29 @@ impl HomingSwitches {
     }
 }
 
+/// The switches and the index pulse that a drive's homing (object 6098) uses; one that is not wired stays low.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReferenceSwitches {
+    /// The switch at the lower end of the travel.
+    pub negative_limit: Option<Switch>,
+    /// The switch at the upper end of the travel.
+    pub positive_limit: Option<Switch>,
+    /// The home switch.
+    pub home: Option<Switch>,
+    /// The distance between two index pulses of the encoder: rad (m). One pulse is at 0.
+    pub index_distance: Option<f64>,
+}
+
+impl ReferenceSwitches {
+    /// The first index pulse on the way from one position to another.
+    pub fn index_between(&self, from: f64, to: f64) -> Option<f64> {
+        let distance = self.index_distance.filter(|distance| *distance > 0.0)?;
+        let pulse = if to > from { (from / distance).floor() + 1.0 } else { (from / distance).ceil() - 1.0 }
+            * distance;
+        (from.min(to)..=from.max(to)).contains(&pulse).then_some(pulse)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -61,5 +84,15 @@ mod tests {
         assert!(Switch::above(1.0).is_closed(7.0) && !Switch::above(1.0).is_closed(0.9));
         assert!(Switch::below(-1.0).is_closed(-7.0) && !Switch::below(-1.0).is_closed(-0.9));
         assert!(!HomingSwitches::default().dir(0.0));
+    }
+
+    #[test]
+    fn the_index_pulse_comes_once_a_distance_in_both_directions() {
+        let switches = ReferenceSwitches { index_distance: Some(0.5), ..ReferenceSwitches::default() };
+        assert_eq!(switches.index_between(0.4, 0.6), Some(0.5));
+        assert_eq!(switches.index_between(0.6, 0.4), Some(0.5));
+        assert_eq!(switches.index_between(0.1, 0.4), None);
+        assert_eq!(switches.index_between(-0.1, 0.1), Some(0.0));
+        assert_eq!(ReferenceSwitches::default().index_between(-9.0, 9.0), None);
     }
 }

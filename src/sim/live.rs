@@ -157,7 +157,7 @@ mod tests {
     use super::*;
     use crate::canopen::lss::{LssAddress, LssRequest, LssResponse};
     use crate::config::Config;
-    use crate::family::simulated_drives;
+    use crate::sim::erob::{ErobJoint, ErobParameters};
 
     /// The drives of the first bus of a configuration on one end of a socket pair, and the other end. Only the
     /// interface differs from a real one.
@@ -166,7 +166,11 @@ mod tests {
         config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 1_000_000);
         let (ours, theirs) = UnixDatagram::pair().unwrap();
         let port = |socket: &UnixDatagram| SocketCanPort::new(socket.as_raw_fd(), 1_000_000, None).unwrap();
-        (LiveDrives::new(simulated_drives(&config, 0), port(&ours)), port(&theirs))
+        let on_bus = config.axes.iter().filter(|axis| axis.bus == 0);
+        let drives = on_bus.map(|axis| -> Box<dyn Drive> {
+            Box::new(ErobJoint::new(ErobParameters::of(axis, &config.simulation)))
+        });
+        (LiveDrives::new(drives.collect(), port(&ours)), port(&theirs))
     }
 
     /// Runs until the master has received `count` frames.

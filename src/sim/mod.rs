@@ -7,8 +7,8 @@
 //!     medium               drive ── Drive: the interface between a simulated drive and its bus
 //!     arbitration           │
 //!     who sends, when       │
-//!     mailbox  wire        yz_aim ── the YZ-AIM servo: the same parts, own controlword, homing, alarms
-//!     mailbox  wire        yz_aim ── the YZ-AIM servo: the same, its own controlword, homing, alarms
+//!     mailbox  wire        cia402 ── any CiA 402 drive, made from its electronic data sheet
+//!                          erob, yz_aim ── drives of their own, by their manuals and field experience
 //!     frames   bits,        │
 //!     waiting  stuffing   servo ── position, velocity and torque loops
 //!                           │
@@ -45,6 +45,7 @@
 //! assert_eq!(batch[0].frame, Frame::of(Id::canopen(0x700, 5), [0])); // boot-up
 //! ```
 
+pub mod cia402;
 mod defect;
 mod drive;
 pub mod erob;
@@ -53,10 +54,13 @@ mod live;
 pub mod lss;
 mod mailbox;
 mod medium;
+mod object_dictionary;
+mod pdo_engine;
 pub mod plant;
 mod port;
 pub(crate) mod random;
 mod sdo_reply;
+mod sdo_server;
 mod servo;
 mod wire_length;
 pub mod yz_aim;

@@ -13,6 +13,11 @@ impl Random {
         random
     }
 
+    /// A sequence for something that draws no number from it.
+    pub const fn placeholder() -> Self {
+        Self(0)
+    }
+
     /// The next number.
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);

@@ -15,6 +15,12 @@ pub enum AbortCode {
     Toggle = 0x0503_0000,
     /// Command specifier not valid or unknown.
     Command = 0x0504_0001,
+    /// Block size not valid.
+    BlockSize = 0x0504_0002,
+    /// CRC error of a block transfer.
+    Checksum = 0x0504_0004,
+    /// Out of memory.
+    Memory = 0x0504_0005,
     /// Attempt to read a write-only object.
     WriteOnly = 0x0601_0001,
     /// Attempt to write a read-only object.
@@ -35,6 +41,10 @@ pub enum AbortCode {
     NoSubindex = 0x0609_0011,
     /// Invalid value for parameter.
     Value = 0x0609_0030,
+    /// Value range of parameter exceeded: too high.
+    ValueTooHigh = 0x0609_0031,
+    /// Value range of parameter exceeded: too low.
+    ValueTooLow = 0x0609_0032,
     /// Data cannot be transferred or stored to the application.
     CannotStore = 0x0800_0020,
     /// Data cannot be transferred or stored to the application because of the present device state.

@@ -9,9 +9,9 @@ mod world;
 use proptest::prelude::*;
 use scripted_drive::at;
 use takt::canopen::emcy::ErrorCode;
-use takt::canopen::nmt::NmtState;
+use takt::canopen::nmt::{ErrorControl, NmtState};
 use takt::config::{Config, Control};
-use takt::drive::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
+use takt::family::bring_up::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
 use takt_rt::{DriveState, Frame, Id};
 use world::{World, config};
 
@@ -257,6 +257,23 @@ fn a_drive_that_restarts_during_the_bring_up_is_configured_again() {
     let facts = world.run(&mut BringUp::new(&config)).unwrap();
     assert_eq!(facts[0].restarts, 2);
     assert_eq!(world.drive().number(0x1600, 2), 0x607A_0020, "the mapping was lost and set again");
+}
+
+#[test]
+fn a_restart_ends_the_request_under_way_without_a_repetition() {
+    let config = config(&[(0, 2)]);
+    let mut world = World::of(&config);
+    let mut bring_up = BringUp::new(&config);
+    for _ in 0..3 {
+        world.step(&mut bring_up);
+    }
+    // The next request is lost, and the drive boots before the reply timeout is noticed.
+    bring_up.poll(world.now_ns, &mut |_, _| ());
+    let boot_up = ErrorControl { node: 2, state: NmtState::BootUp }.frame();
+    bring_up.receive(0, &boot_up);
+    let mut requests = vec![];
+    bring_up.poll(world.now_ns + 600_000_000, &mut |_, frame| requests.push(frame));
+    assert_eq!(format!("{requests:?}"), "[602#4000100000000000]", "the identity is read again");
 }
 
 #[test]

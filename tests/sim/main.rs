@@ -1,6 +1,7 @@
 //! The simulated bus and the simulated drives from the point of view of a master.
 
 mod bench;
+mod cia402;
 mod device;
 mod lengths;
 mod motion;

@@ -159,9 +159,7 @@ impl Axis {
                     TransmissionType::OnControlword => self.controlwords.is_due(),
                 }
         };
-        self.parameters.commands.iter().filter(move |command| is_due(command)).map(|command| {
-            let mapping = &command.pdo.mapping;
-            Frame::packed(command.pdo.id, mapping.pack(&self.command), mapping.length())
-        })
+        let due = self.parameters.commands.iter().filter(move |command| is_due(command));
+        due.map(|command| command.pdo.frame(&self.command))
     }
 }

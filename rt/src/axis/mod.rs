@@ -65,7 +65,7 @@ use torque_loop::TorqueLoop;
 pub use feedback::Jump;
 pub use parameters::{
     AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, ModeChanges, ModeCondition,
-    Pdo, TorqueLimits,
+    Pdo, SenderByte, TorqueLimits,
 };
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.

@@ -5,19 +5,45 @@ use arrayvec::ArrayVec;
 use crate::cia402::OperationMode;
 use crate::cia402_codec::Cia402Codec;
 use crate::control::{ControlLaw, GainError};
-use crate::frame::Id;
+use crate::frame::{Frame, FrameFormat, Id};
 use crate::guard::{AxisLimits, LimitError};
-use crate::pdo::{MAX_PDOS, Mapping, TransmissionType};
+use crate::pdo::{MAX_PDOS, Mapping, ProcessImage, TransmissionType};
 use crate::source::Follow;
 use crate::units::Scale;
 
-/// A PDO: its identifier and its compiled mapping.
+/// A PDO: its frames and its compiled mapping.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pdo {
     /// The identifier.
     pub id: Id,
+    /// The kind of its frames. CAN FD frames are received with and without bit-rate switch, whichever of the two this says.
+    pub format: FrameFormat,
+    /// The byte by which its frames are known where several drives send by this identifier. Nothing in a PDO that is sent.
+    pub sender: Option<SenderByte>,
     /// What it carries.
     pub mapping: Mapping,
+}
+
+/// A byte of a frame that says which drive has sent it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SenderByte {
+    /// Its place in the payload, from 0.
+    pub at: u8,
+    /// Its value in the frames of this drive.
+    pub value: u8,
+}
+
+impl Pdo {
+    /// A PDO of classic frames whose identifier is its own.
+    pub const fn classic(id: Id, mapping: Mapping) -> Self {
+        Self { id, format: FrameFormat::Classic, sender: None, mapping }
+    }
+
+    /// The frame that carries these numbers.
+    #[inline]
+    pub(crate) fn frame(&self, image: &ProcessImage) -> Frame {
+        Frame::packed(self.id, self.format, self.mapping.pack(image), self.mapping.length())
+    }
 }
 
 /// A PDO that is sent to the drive.
@@ -286,9 +312,8 @@ pub(super) mod tests {
     use core::f64::consts::TAU;
 
     pub fn parameters() -> AxisParameters {
-        let pdo = |id, objects: &[MappedObject], compile: fn(&[MappedObject]) -> Result<Mapping, _>| Pdo {
-            id,
-            mapping: compile(objects).unwrap(),
+        let pdo = |id, objects: &[MappedObject], compile: fn(&[MappedObject]) -> Result<Mapping, _>| {
+            Pdo::classic(id, compile(objects).unwrap())
         };
         let command = pdo(Id::canopen(0x200, 5), &[MappedObject::new(0x6040, 0, 16)], Mapping::commands);
         let feedback = pdo(Id::canopen(0x180, 5), &[MappedObject::new(0x6041, 0, 16)], Mapping::feedback);

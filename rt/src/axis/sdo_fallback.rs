@@ -1,6 +1,6 @@
 //! The drive's controlword by SDO: what is left for a drive that takes no process data any more.
 
-use super::{Axis, CommandPdo, Pdo};
+use super::{Axis, CommandPdo};
 use crate::cia402::controlword;
 use crate::frame::{Frame, Id};
 use crate::pdo::CommandSlot;
@@ -137,8 +137,8 @@ impl Axis {
         let word = self.sdo_fallback.take_due_word(repeat_slots)?;
         self.command.set(CommandSlot::Controlword, word.into());
         let carries_it = |command: &&CommandPdo| command.pdo.mapping.sends(CommandSlot::Controlword);
-        let Pdo { id, mapping } = &self.parameters.commands.iter().find(carries_it)?.pdo;
-        Some(Frame::packed(*id, mapping.pack(&self.command), mapping.length()))
+        let command = self.parameters.commands.iter().find(carries_it)?;
+        Some(command.pdo.frame(&self.command))
     }
 
     /// Takes a frame that may confirm a controlword that was written by SDO.

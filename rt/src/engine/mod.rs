@@ -95,8 +95,8 @@ pub enum Deadline {
 
 /// The axes of a controller, in groups that each move together.
 ///
-/// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 5 kB for each axis, 4 kB for each
-/// bus, and 11 kB beside: 25 kB for two axes on one bus, 246 kB for 32 axes on 16 buses.
+/// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 6 kB for each axis, 5 kB for each
+/// bus, and 15 kB beside: 32 kB for two axes on one bus, 288 kB for 32 axes on 16 buses.
 ///
 /// # The order of calls
 /// In each slot, once each: [`Engine::sync`] for every bus, and its frame is sent; [`Engine::receive`] for every frame that has
@@ -123,7 +123,7 @@ pub enum Deadline {
 /// }
 ///
 /// let object = MappedObject::new;
-/// let pdo = |function, mapping| Pdo { id: Id::canopen(function, 1), mapping };
+/// let pdo = |function, mapping| Pdo::classic(Id::canopen(function, 1), mapping);
 /// let commands = Mapping::commands(&[object(0x6040, 0, 16), object(0x607A, 0, 32)]).unwrap();
 /// let feedback = Mapping::feedback(&[object(0x6041, 0, 16), object(0x6064, 0, 32)]).unwrap();
 /// let axis = AxisParameters {

@@ -6,7 +6,7 @@ use super::SEND_BATCH;
 use crate::axis::{Axis, AxisParameters, AxisParametersError, FeedbackSince};
 use crate::bit_set::BitSet;
 use crate::dispatch::{Dispatch, IdTaken};
-use crate::frame::Id;
+use crate::frame::{FrameFormat, Id};
 use crate::record::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::stop::StopCategories;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
@@ -413,10 +413,10 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
     }
     for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
         let Some(CanopenNetwork { sync_id }) = bus.canopen else { continue };
-        table.foreign(NMT);
-        table.foreign(sync_id);
+        table.foreign(NMT, FrameFormat::Classic);
+        table.foreign(sync_id, FrameFormat::Classic);
         if let Some(heartbeat) = parameters.heartbeat {
-            table.foreign(Id::canopen(0x700, heartbeat.node));
+            table.foreign(Id::canopen(0x700, heartbeat.node), FrameFormat::Classic);
         }
     }
     Ok(dispatch)
@@ -430,10 +430,10 @@ fn enter_services(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Resu
 
 fn enter_process_data(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
     for (number, pdo) in (0..).zip(&own.feedback) {
-        table.feedback(pdo.id, place, number)?;
+        table.feedback(pdo, place, number)?;
     }
     for command in &own.commands {
-        table.foreign(command.pdo.id);
+        table.foreign(command.pdo.id, command.pdo.format);
     }
     for id in &own.unused {
         table.unused(*id, place)?;

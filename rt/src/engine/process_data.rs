@@ -42,13 +42,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let (mut changed, entry) = (table.clone(), place as u8);
         changed.forget_process_data(entry);
         for (number, pdo) in (0..).zip(&feedback) {
-            changed.feedback(pdo.id, entry, number).map_err(taken)?;
+            changed.feedback(pdo, entry, number).map_err(taken)?;
         }
         for id in data.unused.iter().flatten() {
             changed.unused(*id, entry).map_err(taken)?;
         }
         for command in &commands {
-            changed.foreign(command.pdo.id);
+            changed.foreign(command.pdo.id, command.pdo.format);
         }
         *table = changed;
         axis.set_process_data(commands, feedback);
@@ -85,9 +85,9 @@ fn objects(pdo: &MappedPdo) -> ArrayVec<MappedObject, MAX_OBJECTS> {
 
 fn command(pdo: &MappedPdo) -> Result<CommandPdo, MappingError> {
     let mapping = Mapping::commands(&objects(pdo))?;
-    Ok(CommandPdo { pdo: Pdo { id: pdo.id, mapping }, transmission: pdo.transmission })
+    Ok(CommandPdo { pdo: Pdo::classic(pdo.id, mapping), transmission: pdo.transmission })
 }
 
 fn feedback(pdo: &MappedPdo) -> Result<Pdo, MappingError> {
-    Ok(Pdo { id: pdo.id, mapping: Mapping::feedback(&objects(pdo))? })
+    Ok(Pdo::classic(pdo.id, Mapping::feedback(&objects(pdo))?))
 }

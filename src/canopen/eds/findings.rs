@@ -4,20 +4,18 @@ use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 
-use miette::{Diagnostic, NamedSource, SourceCode};
-
 use super::problem::{EdsProblem, EdsProblemKind, Severity};
+use crate::source_text::{LineStarts, SourceText};
 
 /// The largest number of problems that are shown with their lines; [`Findings::problems`] has all.
 const MAX_SHOWN: usize = 100;
 
-/// The problems of a file, in its order. `miette` shows each problem with its line.
+/// The problems of a file, in its order. With the feature `miette` it is a diagnostic of that crate.
 #[derive(Clone)]
 pub struct Findings(Arc<Inner>);
 
 struct Inner {
-    source: NamedSource<String>,
-    line_starts: Vec<usize>,
+    source: SourceText,
     problems: Vec<EdsProblem>,
 }
 
@@ -33,8 +31,7 @@ pub struct SourcePosition {
 impl Findings {
     pub(super) fn new(source_name: &str, text: String, mut problems: Vec<EdsProblem>) -> Self {
         problems.sort_by_key(|problem| (problem.span.start, problem.span.end));
-        let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        Self(Arc::new(Inner { source: NamedSource::new(source_name, text), line_starts, problems }))
+        Self(Arc::new(Inner { source: SourceText::new(source_name, text), problems }))
     }
 
     pub(super) fn unreadable(source_name: &str, reason: String) -> Self {
@@ -64,17 +61,37 @@ impl Findings {
 
     /// The position of a problem.
     pub fn position(&self, problem: &EdsProblem) -> SourcePosition {
-        let text = self.0.source.inner();
-        let at = problem.span.start.min(text.len());
-        let line = self.0.line_starts.partition_point(|start| *start <= at);
-        let start = line.checked_sub(1).and_then(|line| self.0.line_starts.get(line)).copied().unwrap_or(0);
-        let column = text.get(start..at).map_or(0, |before| before.chars().count()) + 1;
+        let (line, column) = self.0.source.position(problem.span.start);
         SourcePosition { line, column }
+    }
+
+    /// The problems that are shown; if there are too many, errors come before warnings.
+    pub(super) fn shown(&self) -> impl Iterator<Item = &EdsProblem> {
+        let is_many = self.problems().len() > MAX_SHOWN;
+        let is_error = |problem: &&EdsProblem| problem.kind.severity() == Severity::Error;
+        let first = self.problems().iter().filter(move |problem| !is_many || is_error(problem));
+        let then = self.problems().iter().filter(move |problem| is_many && !is_error(problem));
+        first.chain(then).take(MAX_SHOWN)
+    }
+
+    /// Writes them for people, each with its line.
+    pub(crate) fn write_problems(&self, to: &mut impl fmt::Write) -> fmt::Result {
+        for problem in self.shown() {
+            let label = problem.label();
+            let place = label.as_deref().map(|label| (problem.span.clone(), label));
+            self.0.source.write_problem(to, problem, place, &problem.kind.help())?;
+        }
+        Ok(())
+    }
+
+    #[cfg(feature = "miette")]
+    pub(super) fn source(&self) -> &SourceText {
+        &self.0.source
     }
 
     /// The line of a problem, without blanks at its ends.
     pub fn source_line(&self, problem: &EdsProblem) -> &str {
-        let text = self.0.source.inner();
+        let text = self.0.source.text();
         let start = problem.span.start.min(text.len());
         let from = text.get(..start).and_then(|before| before.rfind('\n')).map_or(0, |at| at + 1);
         text.get(from..).and_then(|rest| rest.lines().next()).unwrap_or("").trim()
@@ -90,7 +107,7 @@ impl fmt::Debug for Findings {
 impl PartialEq for Findings {
     fn eq(&self, other: &Self) -> bool {
         self.source_name() == other.source_name()
-            && self.0.source.inner() == other.0.source.inner()
+            && self.0.source.text() == other.0.source.text()
             && self.problems() == other.problems()
     }
 }
@@ -125,39 +142,16 @@ impl fmt::Display for Findings {
 
 impl std::error::Error for Findings {}
 
-impl Diagnostic for Findings {
-    fn severity(&self) -> Option<miette::Severity> {
-        Some(if self.has_errors() { miette::Severity::Error } else { miette::Severity::Warning })
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        Some(&self.0.source)
-    }
-
-    /// The first problems; if there are too many to show, errors come before warnings.
-    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        fn diagnostic(problem: &EdsProblem) -> &dyn Diagnostic {
-            problem
-        }
-        let is_many = self.problems().len() > MAX_SHOWN;
-        let is_error = |problem: &&EdsProblem| problem.kind.severity() == Severity::Error;
-        let first = self.problems().iter().filter(move |problem| !is_many || is_error(problem));
-        let then = self.problems().iter().filter(move |problem| is_many && !is_error(problem));
-        Some(Box::new(first.chain(then).take(MAX_SHOWN).map(diagnostic)))
-    }
-}
-
 /// Collects problems while a file is read.
 #[derive(Debug)]
 pub(super) struct Reporter {
-    line_starts: Vec<usize>,
+    lines: LineStarts,
     problems: Vec<EdsProblem>,
 }
 
 impl Reporter {
     pub fn new(text: &str) -> Self {
-        let line_starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        Self { line_starts, problems: vec![] }
+        Self { lines: LineStarts::of(text), problems: vec![] }
     }
 
     pub fn report(&mut self, kind: EdsProblemKind, span: Range<usize>) {
@@ -172,7 +166,7 @@ impl Reporter {
 
     /// The line of a byte, counted from 1.
     pub fn line_of(&self, at: usize) -> usize {
-        self.line_starts.partition_point(|start| *start <= at)
+        self.lines.line_of(at)
     }
 
     pub fn into_problems(self) -> Vec<EdsProblem> {

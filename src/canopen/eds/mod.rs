@@ -22,6 +22,8 @@
 
 mod compact_pdo;
 mod data_type;
+#[cfg(feature = "miette")]
+mod diagnostic;
 mod dictionary;
 mod entry;
 mod findings;

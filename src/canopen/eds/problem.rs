@@ -1,9 +1,7 @@
 //! The kinds of problems in a file, and how each is repaired.
 
-use std::fmt;
 use std::ops::Range;
 
-use miette::{Diagnostic, LabeledSpan};
 use thiserror::Error;
 
 use super::data_type::DataTypeCode;
@@ -30,23 +28,15 @@ pub struct EdsProblem {
     pub first_line: Option<usize>,
 }
 
-impl Diagnostic for EdsProblem {
-    fn severity(&self) -> Option<miette::Severity> {
-        Some(match self.kind.severity() {
-            Severity::Error => miette::Severity::Error,
-            Severity::Warning => miette::Severity::Warning,
-        })
-    }
-
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        Some(Box::new(self.kind.help()))
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        let text = self.first_line.map_or("here".to_owned(), |line| format!("here; first in line {line}"));
-        let is_somewhere =
-            !matches!(self.kind, EdsProblemKind::Unreadable { .. } | EdsProblemKind::NoObjects);
-        Some(Box::new(is_somewhere.then(|| LabeledSpan::at(self.span.clone(), text)).into_iter()))
+impl EdsProblem {
+    /// What is written beside its place in the file; `None` where it has no place.
+    pub(super) fn label(&self) -> Option<String> {
+        match self.kind {
+            EdsProblemKind::Unreadable { .. } | EdsProblemKind::NoObjects => None,
+            _ => {
+                Some(self.first_line.map_or("here".to_owned(), |line| format!("here; first in line {line}")))
+            }
+        }
     }
 }
 

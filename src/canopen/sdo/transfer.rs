@@ -67,6 +67,11 @@ impl Uploaded {
         data_type.decode(self.bytes.get(..counted)?)
     }
 
+    /// As [`Uploaded::number`], where the device decides the length, and the type the sign.
+    pub fn number_of_any_length(&self, data_type: DataType) -> Option<i64> {
+        self.number(data_type).or_else(|| self.number(data_type.of_length(self.bytes.len())?))
+    }
+
     /// Decodes a text (VISIBLE_STRING), without trailing zeros and blanks.
     pub fn text(&self) -> String {
         printable(String::from_utf8_lossy(&self.bytes).trim_end_matches(['\0', ' ']))

@@ -310,7 +310,7 @@ fn mapping(section: &mut Section<'_>, drive: Option<&DriveFacts>) -> PdoMapping 
 fn feedback(section: &mut Section<'_>, drive: Option<&DriveFacts>, mapping: PdoMapping) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
     let Some(entry) = section.get("feedback") else {
-        return defaults::feedback(mapping);
+        return drive.map_or(vec![], |drive| defaults::feedback(drive, mapping));
     };
     let mut feedback = vec![];
     for entry in entry.list().into_iter().flatten() {

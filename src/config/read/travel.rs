@@ -33,13 +33,18 @@ pub fn counting(
     travel: Option<Travel>,
 ) -> Option<Counting> {
     let counts_per_turn = section.get("counts_per_turn").map(|entry| entry.number(ranges::COUNTS_PER_TURN));
+    if counts_per_turn.is_none() && drive.is_some_and(|drive| drive.counts_per_turn.is_none()) {
+        let says =
+            "counts of one turn of the position that the drive reports, which its data sheet does not say";
+        section.require("counts_per_turn", says);
+    }
     let gear_ratio = section.get("gear_ratio").map(|entry| entry.number(ranges::GEAR_RATIO));
     let zero =
         section.get("zero_counts").map(|entry| entry.integer(i32::MIN.into()..1 + i64::from(i32::MAX)));
     let reversed = boolean(section, "reversed", false);
     Some(Counting {
         travel: travel?,
-        counts_per_turn: counts_per_turn.unwrap_or_else(|| drive.map(|drive| drive.counts_per_turn))?,
+        counts_per_turn: counts_per_turn.unwrap_or_else(|| drive.and_then(|drive| drive.counts_per_turn))?,
         gear_ratio: gear_ratio.unwrap_or(Some(defaults::GEAR_RATIO))?,
         reversed,
         zero_counts: i32::try_from(zero.unwrap_or(Some(0))?).ok()?,

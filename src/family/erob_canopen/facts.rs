@@ -16,8 +16,8 @@ pub static FACTS: DriveFacts = DriveFacts {
         revision: None,
     },
     // 19 bits on the output side.
-    counts_per_turn: 524_288.0,
-    velocity_unit: VelocityUnit::CountsPerSecond,
+    counts_per_turn: Some(524_288.0),
+    velocity_unit: VelocityUnit::Counts(1.0),
     modes: ModeSet::of(&[
         OperationMode::CyclicSynchronousPosition,
         OperationMode::CyclicSynchronousVelocity,

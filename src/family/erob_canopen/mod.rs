@@ -1,5 +1,7 @@
 //! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and field experience).
 
+mod bring_up;
+mod commission;
 mod errors;
 mod facts;
 
@@ -8,13 +10,13 @@ pub use facts::FACTS;
 
 use takt_rt::{Frame, Id};
 
-use super::{CarryingOut, Family, OtherProtocol};
+use super::{CarryingOut, Family, OtherProtocol, SettingUp};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
-use crate::commission::dictionary::ObjectEntry;
-use crate::commission::{SdoSession, TargetDrive, Task, erob_canopen as commissioning};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys, PdoMapping};
-use crate::drive::{BringUpTiming, ProcedureStep, ProcessData, erob_canopen};
+use crate::family::bring_up::{AxisSession, ProcessData};
+use crate::family::commission::dictionary::ObjectEntry;
+use crate::family::commission::{SdoSession, TargetDrive, Task};
 use crate::sim::Drive;
 use crate::sim::erob::{ErobJoint, ErobParameters};
 
@@ -42,16 +44,16 @@ impl Family for ErobCanopen {
         if axis.mapping == PdoMapping::AsStored { written.padded() } else { written }
     }
 
-    fn configure(&self, config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-        erob_canopen::configure(config, axis, timing)
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::configure(c))
     }
 
-    fn start(&self, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-        erob_canopen::start(axis, timing)
+    fn start<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::start(c))
     }
 
-    fn shut_down(&self, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-        erob_canopen::shut_down(axis, timing)
+    fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::shut_down(c))
     }
 
     /// The vendor's own protocol of firmware without CANopen. The request 0x0002 reads the position and changes nothing.
@@ -76,15 +78,15 @@ impl Family for ErobCanopen {
     }
 
     fn objects(&self) -> &'static [ObjectEntry] {
-        commissioning::OBJECTS
+        commission::OBJECTS
     }
 
     fn meaning(&self, object: &Object, value: i64) -> Option<String> {
-        commissioning::meaning(object, value)
+        commission::meaning(object, value)
     }
 
     fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {
-        commissioning::process_data_words(target, frame)
+        commission::process_data_words(target, frame)
     }
 
     fn carry_out<'a>(
@@ -93,7 +95,7 @@ impl Family for ErobCanopen {
         target: &'a TargetDrive,
         task: Task,
     ) -> CarryingOut<'a> {
-        Box::pin(commissioning::carry_out(session, target, task))
+        Box::pin(commission::carry_out(session, target, task))
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

@@ -12,6 +12,10 @@ use crate::config::{Control, DriveFacts, Identity, ModeChangeRule, ModeSet, Plau
 pub const INTERPOLATION_PERIOD_NS: u64 = 2_000_000;
 /// The highest value of 6081 and 60FF, in r/min.
 pub const HIGHEST_SPEED_RPM: f64 = 3000.0;
+/// At this value of 6083 and above the drive uses no ramp (4.3).
+pub const NO_RAMP: i64 = 60_000;
+/// Below this speed the drive counts as standing: 1 r/min, in the 0.1 r/min of object 606C by SDO (A27).
+pub const STANDSTILL: i64 = 10;
 
 /// How it uses controlword and statusword (manual v1.62, 5.04): bits 6, 7, 9, 11, 14 and 15 of the statusword are absent, bits 0, 1,
 /// 2, 4 and 5 show that it is enabled, bit 3 alone is an alarm, and nothing shows the states before it is enabled. Set-points are
@@ -34,8 +38,8 @@ pub static FACTS: DriveFacts = DriveFacts {
         revision: None,
     },
     // 15 bits on the motor side.
-    counts_per_turn: 32_768.0,
-    velocity_unit: VelocityUnit::RevolutionsPerMinute,
+    counts_per_turn: Some(32_768.0),
+    velocity_unit: VelocityUnit::RevolutionsPerMinute(1.0),
     modes: ModeSet::of(&[
         OperationMode::InterpolatedPosition,
         OperationMode::ProfilePosition,
@@ -50,6 +54,7 @@ pub static FACTS: DriveFacts = DriveFacts {
     // Manual, 5.13.
     bit_rates: &[125_000, 250_000, 500_000, 1_000_000],
     has_fixed_process_data: true,
+    reports_mode: false,
     may_ignore_sync: true,
     sends_emergencies: false,
     // The manual does not say which NMT state real units have after power-up.

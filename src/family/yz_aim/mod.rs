@@ -4,21 +4,24 @@
 //! requests for unknown objects.
 
 mod alarm;
+mod bring_up;
+mod commission;
 mod facts;
 mod process_data;
 
 pub use alarm::{Alarm, Clearing};
-pub use facts::{CODEC, FACTS, HIGHEST_SPEED_RPM, INTERPOLATION_PERIOD_NS};
+pub use facts::{CODEC, FACTS, HIGHEST_SPEED_RPM, INTERPOLATION_PERIOD_NS, NO_RAMP, STANDSTILL};
 pub(crate) use process_data::answers_sync;
 
 use takt_rt::Frame;
 
-use super::{CarryingOut, Family, MappingMatch};
+use super::{CarryingOut, Family, MappingMatch, SettingUp};
 use crate::canopen::object::Object;
-use crate::commission::dictionary::ObjectEntry;
-use crate::commission::{SdoQuirks, SdoSession, TargetDrive, Task, yz_aim as commissioning};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
-use crate::drive::{BringUpTiming, ProcedureStep, ProcessData, yz_aim};
+use crate::family::bring_up::{AxisSession, ProcessData};
+use crate::family::commission::dictionary::ObjectEntry;
+use crate::family::commission::{SdoSession, TargetDrive, Task};
+use crate::procedure::SdoQuirks;
 use crate::sim::Drive;
 use crate::sim::yz_aim::{YzAimJoint, YzAimParameters};
 
@@ -49,16 +52,16 @@ impl Family for YzAim {
         MappingMatch::ByNumber
     }
 
-    fn configure(&self, config: &Config, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-        yz_aim::configure(config, axis, timing)
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::configure(c))
     }
 
-    fn start(&self, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-        yz_aim::start(axis, timing)
+    fn start<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::start(c))
     }
 
-    fn shut_down(&self, axis: &Axis, timing: &BringUpTiming) -> Vec<ProcedureStep> {
-        yz_aim::shut_down(axis, timing)
+    fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(bring_up::shut_down(c))
     }
 
     fn error_words(&self, code: u16) -> String {
@@ -69,21 +72,28 @@ impl Family for YzAim {
         Some(Alarm::of(code).advice().unwrap_or(super::error_words::UNKNOWN))
     }
 
-    /// A YZ-AIM drops requests that overlap or follow too soon, and shortens its replies.
+    /// A YZ-AIM drops requests that overlap or follow too soon, shortens its replies, and does not answer for objects that
+    /// it does not have. The manual gives 606C two lengths (A27), so the length of the reply counts.
     fn sdo_quirks(&self) -> SdoQuirks {
-        SdoQuirks { gap_ns: 2_000_000, has_short_replies: true, ..SdoQuirks::standard() }
+        SdoQuirks {
+            gap_ns: 2_000_000,
+            has_short_replies: true,
+            has_other_lengths: true,
+            is_silent_if_absent: true,
+            ..SdoQuirks::standard()
+        }
     }
 
     fn objects(&self) -> &'static [ObjectEntry] {
-        commissioning::OBJECTS
+        commission::OBJECTS
     }
 
     fn meaning(&self, object: &Object, value: i64) -> Option<String> {
-        commissioning::meaning(object, value)
+        commission::meaning(object, value)
     }
 
     fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {
-        commissioning::process_data_words(target, frame)
+        commission::process_data_words(target, frame)
     }
 
     fn carry_out<'a>(
@@ -92,7 +102,7 @@ impl Family for YzAim {
         target: &'a TargetDrive,
         task: Task,
     ) -> CarryingOut<'a> {
-        Box::pin(commissioning::carry_out(session, target, task))
+        Box::pin(commission::carry_out(session, target, task))
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

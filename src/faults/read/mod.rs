@@ -20,7 +20,8 @@ use crate::printable::printable_path;
 const FAULTS_AT_MOST: usize = 64;
 
 /// Why a scenario cannot be used.
-#[derive(thiserror::Error, miette::Diagnostic)]
+#[derive(thiserror::Error)]
+#[cfg_attr(feature = "miette", derive(miette::Diagnostic))]
 pub enum ScenarioError {
     /// The file cannot be read.
     #[error("the scenario {path} cannot be read: {reason}")]
@@ -30,9 +31,9 @@ pub enum ScenarioError {
         /// The operating system's reason.
         reason: String,
     },
-    /// The content is invalid or does not suit the configuration. `miette` shows each problem with its line.
+    /// The content is invalid or does not suit the configuration. `Debug` shows each problem at its line.
     #[error(transparent)]
-    #[diagnostic(transparent)]
+    #[cfg_attr(feature = "miette", diagnostic(transparent))]
     Wrong(#[from] ConfigError),
 }
 

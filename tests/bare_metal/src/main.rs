@@ -58,7 +58,7 @@ fn axis() -> Option<AxisParameters> {
         zero_counts: 0.0,
         rated_torque: 31.0,
     };
-    let pdo = |function, mapping| Pdo { id: Id::canopen(function, 1), mapping };
+    let pdo = |function, mapping| Pdo::classic(Id::canopen(function, 1), mapping);
     Some(AxisParameters {
         bus: 0,
         node: 1,

@@ -1,0 +1,149 @@
+//! Quirks of a drive: in what it deviates from its electronic data sheet and from CiA 402. They are data, in a small file
+//! beside the data sheet (`drives/*.toml`).
+
+mod read;
+
+use takt_rt::{Nanoseconds, OperationMode};
+
+use crate::canopen::object::ObjectAddress;
+
+pub use read::{load, parse};
+
+/// Whether anybody has tried what a quirk file says.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Confirmation {
+    /// It comes from documents alone.
+    #[default]
+    DataSheetOnly,
+    /// A real drive has shown it.
+    TriedOnHardware,
+}
+
+impl Confirmation {
+    /// For people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::DataSheetOnly => "from its data sheet, not tried on hardware",
+            Self::TriedOnHardware => "tried on hardware",
+        }
+    }
+}
+
+/// The drive that a quirk file is about.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct QuirkyDrive {
+    /// The vendor, for people.
+    pub vendor: String,
+    /// The product, for people.
+    pub product: String,
+    /// Object 1018:1, if known.
+    pub vendor_number: Option<u32>,
+    /// Object 1018:2 of the products that it is true for; empty when they are not known.
+    pub product_numbers: Vec<u32>,
+    /// Whether it was tried.
+    pub confirmation: Confirmation,
+    /// The documents that it was taken from.
+    pub sources: Vec<String>,
+}
+
+/// An object, or all sub-indices of an index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ObjectPattern {
+    /// Every sub-index of this index.
+    Index(u16),
+    /// One sub-index.
+    Address(ObjectAddress),
+}
+
+impl ObjectPattern {
+    /// Whether an object is meant.
+    pub fn matches(self, address: ObjectAddress) -> bool {
+        match self {
+            Self::Index(index) => address.index == index,
+            Self::Address(exact) => address == exact,
+        }
+    }
+}
+
+/// What one unit of a velocity or acceleration object is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MotionUnit {
+    /// Position units per second (per second²), times this factor.
+    PositionUnits(f64),
+    /// Revolutions of the motor per minute (per minute and second), times this factor.
+    RevolutionsPerMinute(f64),
+}
+
+/// How long the drive takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Delays {
+    /// From power-up or "reset node" to the boot-up message.
+    pub boot_up_ns: Option<Nanoseconds>,
+    /// From NMT start to the first PDO, sent or accepted.
+    pub first_pdo_ns: Option<Nanoseconds>,
+    /// From an SDO request to its reply, at most.
+    pub sdo_reply_ns: Option<Nanoseconds>,
+    /// From a new value of 6060 until 6061 shows it.
+    pub mode_change_ns: Option<Nanoseconds>,
+    /// From "save" in 1010 until it has taken effect.
+    pub save_ns: Option<Nanoseconds>,
+}
+
+/// The NMT state after the boot-up message.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PowerUpState {
+    /// As CiA 301 says, unless object 1F80 says otherwise.
+    #[default]
+    PreOperational,
+    /// The drive starts itself.
+    Operational,
+}
+
+/// In what a drive deviates from its data sheet and from CiA 402. The default deviates in nothing.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Quirks {
+    /// The drive; empty for one without a quirk file.
+    pub drive: QuirkyDrive,
+    /// The modes that it has, where object 6502 does not tell.
+    pub modes: Option<Vec<OperationMode>>,
+    /// Objects that it lacks although its data sheet lists them.
+    pub missing: Vec<ObjectPattern>,
+    /// Objects that it refuses to write although its data sheet says otherwise.
+    pub constant: Vec<ObjectPattern>,
+    /// Bits of the statusword (6041) that are always 1.
+    pub statusword_set: u16,
+    /// Bits of the statusword (6041) that are always 0.
+    pub statusword_clear: u16,
+    /// The unit of a velocity or acceleration object, where objects 60A9 and 6096 do not tell.
+    pub units: Vec<(u16, MotionUnit)>,
+    /// The NMT state after the boot-up message.
+    pub power_up: PowerUpState,
+    /// Whether it refuses SDO block transfers.
+    pub refuses_blocks: bool,
+    /// Its delays.
+    pub delays: Delays,
+    /// Its own error codes (603F, EMCY) in words.
+    pub errors: Vec<(u16, String)>,
+}
+
+impl Quirks {
+    /// Whether the drive lacks an object that its data sheet may list.
+    pub fn is_missing(&self, address: ObjectAddress) -> bool {
+        self.missing.iter().any(|pattern| pattern.matches(address))
+    }
+
+    /// Whether the drive refuses to write an object that its data sheet may call writable.
+    pub fn is_constant(&self, address: ObjectAddress) -> bool {
+        self.constant.iter().any(|pattern| pattern.matches(address))
+    }
+
+    /// The unit of a velocity or acceleration object of the first axis, if the file tells.
+    pub fn unit(&self, index: u16) -> Option<MotionUnit> {
+        self.units.iter().find(|(known, _)| *known == index).map(|(_, unit)| *unit)
+    }
+
+    /// An error code of the drive in words, if the file tells.
+    pub fn error_words(&self, code: u16) -> Option<&str> {
+        self.errors.iter().find(|(known, _)| *known == code).map(|(_, words)| words.as_str())
+    }
+}

@@ -1,0 +1,242 @@
+//! Reads a quirk file with the configuration's reader. Every problem of the file is reported with its line and a remedy.
+//! `drives/` has examples.
+
+use std::path::Path;
+
+use takt_rt::{Nanoseconds, OperationMode};
+use toml::de::DeTable;
+
+use super::{Confirmation, Delays, MotionUnit, ObjectPattern, PowerUpState, QuirkyDrive, Quirks};
+use crate::canopen::object::ObjectAddress;
+use crate::config::ConfigError;
+use crate::config::read::document;
+use crate::config::read::entry::Entry;
+use crate::config::read::section::Section;
+use crate::config::spot::Problems;
+use crate::printable::printable_path;
+
+/// The longest delay; a longer one is a mistake in the unit.
+const LONGEST_S: f64 = 600.0;
+
+const MODES: [(&str, OperationMode); 8] = [
+    ("pp", OperationMode::ProfilePosition),
+    ("pv", OperationMode::ProfileVelocity),
+    ("pt", OperationMode::ProfileTorque),
+    ("homing", OperationMode::Homing),
+    ("ip", OperationMode::InterpolatedPosition),
+    ("csp", OperationMode::CyclicSynchronousPosition),
+    ("csv", OperationMode::CyclicSynchronousVelocity),
+    ("cst", OperationMode::CyclicSynchronousTorque),
+];
+
+const CONFIRMATIONS: [(&str, Confirmation); 2] = [
+    (Confirmation::DataSheetOnly.name(), Confirmation::DataSheetOnly),
+    (Confirmation::TriedOnHardware.name(), Confirmation::TriedOnHardware),
+];
+
+/// The velocity and acceleration objects whose unit a file may give.
+const UNITS: [(&str, u16); 4] = [
+    ("velocity", 0x606C),
+    ("target_velocity", 0x60FF),
+    ("profile_velocity", 0x6081),
+    ("acceleration", 0x6083),
+];
+
+/// Reads a quirk file.
+///
+/// # Errors
+/// The file cannot be read, or every problem of its text.
+pub fn load(path: &Path) -> Result<Quirks, ConfigError> {
+    let name = printable_path(path);
+    match crate::text_file::read(path) {
+        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?),
+        Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
+    }
+}
+
+/// Reads the text of a quirk file. Messages call it `source_name`.
+///
+/// # Errors
+/// Every problem of the text.
+pub fn parse(source_name: &str, text: &str) -> Result<Quirks, ConfigError> {
+    document(source_name, text, read)
+}
+
+/// Reads every section, even after one has failed.
+fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
+    let mut root = Section::new("", 0..0, table, problems);
+    let drive = drive(root.section("drive"));
+    let modes = optional(root.get("modes"), |entry| {
+        each(&entry, |entry| entry.choice(&MODES)).filter(|modes| {
+            let has_modes = !modes.is_empty();
+            if !has_modes {
+                entry.report_range("an empty list".to_owned(), "at least one mode".to_owned());
+            }
+            has_modes
+        })
+    });
+    let objects = objects(root.section("objects"));
+    let statusword = statusword(root.section("statusword"));
+    let units = units(root.section("units"));
+    let power_ups =
+        [("pre-operational", PowerUpState::PreOperational), ("operational", PowerUpState::Operational)];
+    let power_up = optional(root.get("power_up"), |entry| entry.choice(&power_ups));
+    let sdo_blocks = optional(root.get("sdo_blocks"), |entry| entry.boolean());
+    let delays = delays(root.section("delays"));
+    let errors = errors(root.get("errors"), problems);
+    root.finish();
+    let (missing, constant) = objects?;
+    let (statusword_set, statusword_clear) = statusword?;
+    Some(Quirks {
+        drive: drive?,
+        modes: modes?,
+        missing,
+        constant,
+        statusword_set,
+        statusword_clear,
+        units: units?,
+        power_up: power_up?.unwrap_or_default(),
+        refuses_blocks: !sdo_blocks?.unwrap_or(true),
+        delays: delays?,
+        errors: errors?,
+    })
+}
+
+/// An entry that may be absent: `Some(None)` then, and `None` when it is wrong.
+fn optional<'a, T>(entry: Option<Entry<'a>>, read: impl FnOnce(Entry<'a>) -> Option<T>) -> Option<Option<T>> {
+    match entry {
+        None => Some(None),
+        Some(entry) => read(entry).map(Some),
+    }
+}
+
+/// Every element of a list, even after one was wrong.
+fn each<'a, T>(entry: &Entry<'a>, read: impl Fn(&Entry<'a>) -> Option<T>) -> Option<Vec<T>> {
+    let read: Vec<Option<T>> = entry.list()?.iter().map(read).collect();
+    read.into_iter().collect()
+}
+
+fn drive(mut section: Section<'_>) -> Option<QuirkyDrive> {
+    let text = |entry: Entry<'_>| entry.text().map(str::to_owned);
+    let vendor = section.require("vendor", "the vendor: vendor = \"Maxon\"").and_then(text);
+    let product = section.require("product", "the product: product = \"EPOS4\"").and_then(text);
+    let number = |entry: &Entry<'_>| u32::try_from(entry.integer(0..1 << 32)?).ok();
+    let vendor_number = optional(section.get("vendor_number"), |entry| number(&entry));
+    let product_numbers = optional(section.get("product_numbers"), |entry| each(&entry, number));
+    let says = "whether anybody has tried it: status = \"from its data sheet, not tried on hardware\"";
+    let confirmation = section.require("status", says).and_then(|entry| entry.choice(&CONFIRMATIONS));
+    let says = "the documents that it was taken from: sources = [\"…\"]";
+    let sources = section.require("sources", says);
+    let sources = sources.and_then(|entry| each(&entry, |entry| entry.text().map(str::to_owned)));
+    section.finish();
+    Some(QuirkyDrive {
+        vendor: vendor?,
+        product: product?,
+        vendor_number: vendor_number?,
+        product_numbers: product_numbers?.unwrap_or_default(),
+        confirmation: confirmation?,
+        sources: sources?,
+    })
+}
+
+fn objects(mut section: Section<'_>) -> Option<(Vec<ObjectPattern>, Vec<ObjectPattern>)> {
+    let missing = optional(section.get("missing"), |entry| each(&entry, pattern));
+    let constant = optional(section.get("constant"), |entry| each(&entry, pattern));
+    section.finish();
+    Some((missing?.unwrap_or_default(), constant?.unwrap_or_default()))
+}
+
+/// Reads `"1006"` or `"1029:1"`, in hexadecimal.
+fn pattern(entry: &Entry<'_>) -> Option<ObjectPattern> {
+    let text = entry.text()?;
+    let (index, subindex) = match text.split_once(':') {
+        Some((index, subindex)) => (index, Some(subindex)),
+        None => (text, None),
+    };
+    let index = (index.len() == 4).then(|| u16::from_str_radix(index, 16).ok()).flatten();
+    let subindex = subindex.map(|subindex| u8::from_str_radix(subindex, 16).ok());
+    match (index, subindex) {
+        (Some(index), None) => Some(ObjectPattern::Index(index)),
+        (Some(index), Some(Some(subindex))) => Some(ObjectPattern::Address(ObjectAddress::new(index, subindex))),
+        _ => {
+            let allowed = "an index of four hexadecimal digits, or index and sub-index: \"1006\", \"1029:1\"";
+            entry.report_range(format!("{text:?}"), allowed.to_owned());
+            None
+        }
+    }
+}
+
+fn statusword(mut section: Section<'_>) -> Option<(u16, u16)> {
+    let bits = |entry: Entry<'_>| u16::try_from(entry.integer(0..1 << 16)?).ok();
+    let set = optional(section.get("set"), bits);
+    let clear = optional(section.get("clear"), bits);
+    section.finish();
+    Some((set?.unwrap_or(0), clear?.unwrap_or(0)))
+}
+
+fn units(mut section: Section<'_>) -> Option<Vec<(u16, MotionUnit)>> {
+    let read = UNITS.map(|(key, index)| (index, optional(section.get(key), |entry| unit(&entry))));
+    section.finish();
+    let mut units = vec![];
+    for (index, unit) in read {
+        units.extend(unit?.map(|unit| (index, unit)));
+    }
+    Some(units)
+}
+
+/// Reads `"counts/s"`, `"0.1 r/min"` and the like: a factor and one of two units, of a velocity or an acceleration.
+fn unit(entry: &Entry<'_>) -> Option<MotionUnit> {
+    let text = entry.text()?;
+    let (factor, name) = match text.split_once(' ') {
+        Some((factor, name)) => (factor.parse().ok().filter(|factor| *factor > 0.0), name),
+        None => (Some(1.0), text),
+    };
+    match (factor, name) {
+        (Some(factor), "counts/s" | "counts/s²") => Some(MotionUnit::PositionUnits(factor)),
+        (Some(factor), "r/min" | "r/min/s") => Some(MotionUnit::RevolutionsPerMinute(factor)),
+        _ => {
+            let allowed = "\"counts/s\" or \"r/min\" of a velocity, \"counts/s²\" or \"r/min/s\" of an acceleration, \
+                with a factor if needed: \"0.1 r/min\"";
+            entry.report_range(format!("{text:?}"), allowed.to_owned());
+            None
+        }
+    }
+}
+
+fn delays(mut section: Section<'_>) -> Option<Delays> {
+    let delay = |entry: Entry<'_>| -> Option<Nanoseconds> { entry.nanoseconds(0.0..=LONGEST_S) };
+    let boot_up_ns = optional(section.get("boot_up"), delay);
+    let first_pdo_ns = optional(section.get("first_pdo"), delay);
+    let sdo_reply_ns = optional(section.get("sdo_reply"), delay);
+    let mode_change_ns = optional(section.get("mode_change"), delay);
+    let save_ns = optional(section.get("save"), delay);
+    section.finish();
+    Some(Delays {
+        boot_up_ns: boot_up_ns?,
+        first_pdo_ns: first_pdo_ns?,
+        sdo_reply_ns: sdo_reply_ns?,
+        mode_change_ns: mode_change_ns?,
+        save_ns: save_ns?,
+    })
+}
+
+/// Reads the error codes in words. Their keys are the codes, so this table has no fixed keys.
+fn errors(entry: Option<Entry<'_>>, problems: &Problems) -> Option<Vec<(u16, String)>> {
+    let Some(entry) = entry else { return Some(vec![]) };
+    let mut errors = vec![];
+    let mut are_right = true;
+    for (key, value) in entry.table()? {
+        let spot = Entry::new(format!("errors.{}", key.get_ref()), value, problems);
+        let code = (key.get_ref().len() == 4).then(|| u16::from_str_radix(key.get_ref(), 16).ok()).flatten();
+        if code.is_none() {
+            let allowed = "an error code (object 603F) of four hexadecimal digits: 8611 = \"following error\"";
+            spot.report_range(format!("the key {:?}", key.get_ref()), allowed.to_owned());
+        }
+        match (code, spot.text()) {
+            (Some(code), Some(words)) => errors.push((code, words.to_owned())),
+            _ => are_right = false,
+        }
+    }
+    errors.sort();
+    are_right.then_some(errors)
+}

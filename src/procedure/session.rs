@@ -1,0 +1,191 @@
+//! The session of a procedure: the interface through which its code waits, sends and reports.
+
+use std::cell::{Ref, RefCell, RefMut};
+use std::collections::VecDeque;
+use std::fmt;
+use std::future::poll_fn;
+use std::pin::pin;
+use std::rc::Rc;
+use std::task::Poll;
+
+use takt_rt::Nanoseconds;
+
+use super::event::{AxisReading, ProcedureEvent};
+
+/// A session with one drive. Clones share the same state.
+pub struct ProcedureSession<C>(Rc<RefCell<SessionState<C>>>);
+
+#[derive(Debug)]
+struct SessionState<C> {
+    client: C,
+    /// When the session was polled first: its clock begins there.
+    began_ns: Option<Nanoseconds>,
+    now_ns: Nanoseconds,
+    events: VecDeque<ProcedureEvent>,
+    step: &'static str,
+    /// The step that failed, when further steps follow it.
+    failing_step: Option<&'static str>,
+    /// The number of finished accesses, for the progress.
+    done: usize,
+    /// The number of interruptions so far.
+    interruptions: u8,
+    /// The number of interruptions that are ignored, because the axis is already being stopped.
+    ignored_interruptions: u8,
+}
+
+impl<C> Clone for ProcedureSession<C> {
+    fn clone(&self) -> Self {
+        Self(Rc::clone(&self.0))
+    }
+}
+
+impl<C: fmt::Debug> fmt::Debug for ProcedureSession<C> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl<C> ProcedureSession<C> {
+    /// A session that has not begun.
+    pub fn new(client: C) -> Self {
+        Self(Rc::new(RefCell::new(SessionState {
+            client,
+            began_ns: None,
+            now_ns: 0,
+            events: VecDeque::new(),
+            step: "begin",
+            failing_step: None,
+            done: 0,
+            interruptions: 0,
+            ignored_interruptions: 0,
+        })))
+    }
+
+    // No borrow outlives its statement and none is held across an await, so these cannot panic.
+    fn state(&self) -> Ref<'_, SessionState<C>> {
+        self.0.borrow()
+    }
+
+    fn state_mut(&self) -> RefMut<'_, SessionState<C>> {
+        self.0.borrow_mut()
+    }
+
+    /// The client. The borrow must end before anything is awaited.
+    pub(super) fn client(&self) -> Ref<'_, C> {
+        Ref::map(self.state(), |state| &state.client)
+    }
+
+    /// As [`ProcedureSession::client`], to change it.
+    pub(super) fn client_mut(&self) -> RefMut<'_, C> {
+        RefMut::map(self.state_mut(), |state| &mut state.client)
+    }
+
+    /// Sets the time. The session's clock begins at the first call.
+    pub(super) fn set_time(&self, now_ns: Nanoseconds) {
+        let mut state = self.state_mut();
+        let began_ns = *state.began_ns.get_or_insert(now_ns);
+        state.now_ns = now_ns.saturating_sub(began_ns);
+    }
+
+    pub(super) fn take_event(&self) -> Option<ProcedureEvent> {
+        self.state_mut().events.pop_front()
+    }
+
+    pub(super) fn interrupt(&self) {
+        let mut state = self.state_mut();
+        state.interruptions = state.interruptions.saturating_add(1);
+    }
+
+    /// The current time.
+    pub fn now_ns(&self) -> Nanoseconds {
+        self.state().now_ns
+    }
+
+    /// Begins a step and reports it.
+    pub fn step(&self, name: &'static str) {
+        let mut state = self.state_mut();
+        state.step = name;
+        state.events.push_back(ProcedureEvent::Step(name));
+    }
+
+    /// Continues an earlier step without reporting it again.
+    pub fn resume_step(&self, name: &'static str) {
+        self.state_mut().step = name;
+    }
+
+    /// The name of the current step.
+    pub fn step_name(&self) -> &'static str {
+        self.state().step
+    }
+
+    /// Keeps the current step as the failing one, although further steps follow.
+    pub fn keep_failing_step(&self) {
+        let mut state = self.state_mut();
+        state.failing_step = state.failing_step.or(Some(state.step));
+    }
+
+    /// The step in which a failure belongs that ends the procedure now.
+    pub(super) fn failing_step(&self) -> &'static str {
+        let state = self.state();
+        state.failing_step.unwrap_or(state.step)
+    }
+
+    /// Reports a note for the operator.
+    pub fn note(&self, text: impl Into<String>) {
+        self.state_mut().events.push_back(ProcedureEvent::Note(text.into()));
+    }
+
+    /// Reports a reading of the axis.
+    pub fn show(&self, reading: AxisReading) {
+        self.state_mut().events.push_back(ProcedureEvent::Reading(reading));
+    }
+
+    /// Counts a finished access, for the progress.
+    pub fn count_done(&self) {
+        self.state_mut().done += 1;
+    }
+
+    /// The number of finished accesses.
+    pub fn done(&self) -> usize {
+        self.state().done
+    }
+
+    /// Sets the progress back to the beginning.
+    pub fn begin_again(&self) {
+        self.state_mut().done = 0;
+    }
+
+    /// Whether an interruption has come that is not ignored.
+    pub fn is_interrupted(&self) -> bool {
+        let state = self.state();
+        state.interruptions > state.ignored_interruptions
+    }
+
+    /// Ignores the interruptions so far (at least one); only a further one counts.
+    pub fn ignore_interruptions(&self) {
+        let mut state = self.state_mut();
+        state.ignored_interruptions = state.interruptions.max(state.ignored_interruptions).max(1);
+    }
+
+    /// Waits until `check` gives a value. It is called at every poll.
+    pub async fn until<T>(&self, mut check: impl FnMut() -> Option<T>) -> T {
+        poll_fn(|_| check().map_or(Poll::Pending, Poll::Ready)).await
+    }
+
+    /// Waits for a time.
+    pub async fn sleep(&self, duration_ns: Nanoseconds) {
+        let end_ns = self.now_ns().saturating_add(duration_ns);
+        self.until(|| (self.now_ns() >= end_ns).then_some(())).await;
+    }
+
+    /// Runs `work` to its end, or until `is_over`: then `work` is dropped where it waits, and the result is `None`.
+    pub async fn give_up_when<T>(
+        &self,
+        is_over: impl Fn() -> bool,
+        work: impl Future<Output = T>,
+    ) -> Option<T> {
+        let mut work = pin!(work);
+        poll_fn(|context| if is_over() { Poll::Ready(None) } else { work.as_mut().poll(context).map(Some) })
+            .await
+    }
+}

@@ -1,0 +1,1 @@
+//! Motion that not every drive has: homing, halt, quick stop, units, several axes.

@@ -1,0 +1,1 @@
+//! Services: SDO transfers, PDO mapping, transmission types, NMT, guarding, quirks.
