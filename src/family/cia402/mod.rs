@@ -7,9 +7,11 @@ mod bring_up;
 mod device;
 mod remarks;
 mod simulated;
+mod starting;
 
 pub use device::Device;
 pub use remarks::remarks;
+pub use starting::starting_configuration;
 
 use std::path::PathBuf;
 
