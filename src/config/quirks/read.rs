@@ -6,7 +6,7 @@ use std::path::Path;
 use takt_rt::{Nanoseconds, OperationMode};
 use toml::de::DeTable;
 
-use super::{Confirmation, Delays, MotionUnit, ObjectPattern, PowerUpState, QuirkyDrive, Quirks};
+use super::{Confirmation, Delays, MotionUnit, ObjectPattern, PowerUpState, Quirks, QuirkyDrive};
 use crate::canopen::object::ObjectAddress;
 use crate::config::ConfigError;
 use crate::config::read::document;
@@ -157,7 +157,9 @@ fn pattern(entry: &Entry<'_>) -> Option<ObjectPattern> {
     let subindex = subindex.map(|subindex| u8::from_str_radix(subindex, 16).ok());
     match (index, subindex) {
         (Some(index), None) => Some(ObjectPattern::Index(index)),
-        (Some(index), Some(Some(subindex))) => Some(ObjectPattern::Address(ObjectAddress::new(index, subindex))),
+        (Some(index), Some(Some(subindex))) => {
+            Some(ObjectPattern::Address(ObjectAddress::new(index, subindex)))
+        }
         _ => {
             let allowed = "an index of four hexadecimal digits, or index and sub-index: \"1006\", \"1029:1\"";
             entry.report_range(format!("{text:?}"), allowed.to_owned());
@@ -229,7 +231,8 @@ fn errors(entry: Option<Entry<'_>>, problems: &Problems) -> Option<Vec<(u16, Str
         let spot = Entry::new(format!("errors.{}", key.get_ref()), value, problems);
         let code = (key.get_ref().len() == 4).then(|| u16::from_str_radix(key.get_ref(), 16).ok()).flatten();
         if code.is_none() {
-            let allowed = "an error code (object 603F) of four hexadecimal digits: 8611 = \"following error\"";
+            let allowed =
+                "an error code (object 603F) of four hexadecimal digits: 8611 = \"following error\"";
             spot.report_range(format!("the key {:?}", key.get_ref()), allowed.to_owned());
         }
         match (code, spot.text()) {
