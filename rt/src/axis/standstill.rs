@@ -21,6 +21,8 @@ pub(super) struct Standstill {
     place: Option<(f64, f64)>,
     /// Reports from there, after the first one.
     reports: u32,
+    /// Whether enough reports in a row came from one place, and none since then from elsewhere.
+    is_at_rest: bool,
 }
 
 impl Standstill {
@@ -32,17 +34,21 @@ impl Standstill {
         let (lowest, highest) = self.place.unwrap_or((position, position));
         let (lowest, highest) = (lowest.min(position), highest.max(position));
         if highest - lowest > farthest.max(1.5 * count) {
-            *self = Self { place: Some((position, position)), reports: 0 };
+            *self = Self { place: Some((position, position)), reports: 0, is_at_rest: false };
             return;
         }
         let has_counted = self.place.is_some() && span.is_known;
-        self.reports = self.reports.saturating_add(u32::from(has_counted));
+        self.reports += u32::from(has_counted);
         self.place = Some((lowest, highest));
+        if self.reports >= STANDING_REPORTS {
+            // From here on anew: a joint may creep out of a place in a long time.
+            *self = Self { place: Some((position, position)), reports: 0, is_at_rest: true };
+        }
     }
 
     /// Whether the joint has been in one place for as long as is needed.
     pub(super) const fn is_at_rest(&self) -> bool {
-        self.reports >= STANDING_REPORTS
+        self.is_at_rest
     }
 }
 
@@ -96,6 +102,19 @@ mod tests {
             assert_eq!(speed_at_rest(swinging), None, "{frequency_hz} Hz");
         }
         assert_eq!(speed_at_rest(|at_s| 0.01 * at_s), None);
+    }
+
+    #[test]
+    fn a_joint_that_settles_under_its_load_for_seconds_stays_at_rest_and_one_that_is_pushed_does_not() {
+        let mut standstill = Standstill::default();
+        for cycle in 0..10_000 {
+            note(&mut standstill, 1e-6 * f64::from(cycle), true);
+            assert!(cycle < 2 * STANDING_REPORTS || standstill.is_at_rest(), "{cycle}");
+        }
+        for cycle in 0..10 {
+            note(&mut standstill, 0.01 + 3e-5 * f64::from(cycle), true);
+        }
+        assert!(!standstill.is_at_rest());
     }
 
     #[test]
