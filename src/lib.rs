@@ -1,6 +1,26 @@
 //! takt: a hard-real-time joint-motion controller for CAN drives.
 //!
-//! This is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
+//! A configuration, here of one joint on a simulated bus:
+//!
+#![doc = concat!("```toml\n", include_str!("../configs/first.toml"), "```")]
+//!
+//! and a program that carries it out, here in virtual time, without hardware and without waiting:
+//!
+//! ```
+//! fn main() -> takt::Result {
+//!     let config = takt::Config::load("configs/first.toml".as_ref())?;
+//!     let (mut run, _log) = takt::VirtualRun::simulated(&config)?;
+//!     let outcome = run.run(100_000, |_run| {});
+//!     let joint = run.snapshot().axes[0];
+//!     println!("{outcome:?}: the joint is at {:.4} rad", joint.position);
+//!     assert!((joint.position - std::f64::consts::FRAC_PI_2).abs() < 0.01);
+//!     Ok(())
+//! }
+//! ```
+//!
+//! [`Controller`] does the same in real time, on the buses that the configuration names, and takes commands from any thread.
+//!
+//! This crate is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
 //! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
 //! bounded, lock-free channels ([`channels`]), and nothing else.
 //!
@@ -8,12 +28,11 @@
 //!
 //! ```text
 //! cli                                 the program `takt`
-//! doctor jitter play                  is the machine fit, and how evenly it paces the loop; motion from a file
+//! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
-//! commission drive                    commissioning; bring-up and shutdown, over the services of CiA 301, without I/O
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
@@ -27,7 +46,7 @@
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`link`]: what a bus is connected to, and who commands it.
 //! - [`schedule`]: whether everything fits on the buses in the worst case.
-//! - [`drive`] and [`canopen`]: bring-up of each family of drives over the services of CiA 301, without I/O.
+//! - [`family`], [`procedure`] and [`canopen`]: what takt knows of each family of drives, and how it sets one up, without I/O.
 //! - [`procedure`]: the engine of procedures on drives, for bring-up, shutdown and [`commission`]ing.
 //! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
 //!   life: bring-up, enable, program, stop, disable, leave.
@@ -49,19 +68,19 @@ pub mod commission;
 pub mod config;
 pub mod controller;
 pub mod doctor;
-pub mod drive;
 mod error;
 pub mod family;
 pub mod faults;
-pub mod frame_time;
+mod frame_time;
 pub mod jitter;
 pub mod link;
 pub mod play;
+#[doc(hidden)]
 pub mod printable;
 pub mod procedure;
 pub mod schedule;
 pub mod sim;
-pub mod sleep_alignment;
+mod sleep_alignment;
 mod source_text;
 pub mod telemetry;
 mod text_file;

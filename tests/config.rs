@@ -319,7 +319,7 @@ fn a_stream_may_not_be_allowed_to_make_a_loop_swing() {
 
 #[test]
 fn what_is_fed_forward_goes_into_the_process_data() {
-    use takt::drive::ProcessData;
+    use takt::family::bring_up::ProcessData;
     let lengths = |mode: &str, feed_forward: &str| -> Vec<usize> {
         let keys = format!("mode = {mode:?}\nfeed_forward = {feed_forward:?}");
         let config = with(&keys);

@@ -7,7 +7,7 @@ use takt::canopen::lss::{
 };
 use takt::canopen::sdo;
 use takt::config::Config;
-use takt::drive::{BringUp, BringUpTiming, Shutdown};
+use takt::family::bring_up::{BringUp, BringUpTiming, Shutdown};
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 

@@ -173,7 +173,6 @@ impl Dispatch {
         self.shared.try_push(new).map_err(|_| taken)
     }
 
-    #[inline]
     fn entry(&self, id: Id) -> u16 {
         let found = if id.is_extended() {
             let place = self.extended.binary_search_by_key(&id.value(), |(id, _)| *id);
@@ -188,6 +187,20 @@ impl Dispatch {
     /// identifier of a CANopen PDO (CiA 301, 7.3.3), is none of these.
     #[inline]
     pub fn destination(&self, frame: &Frame) -> Destination {
+        let id = frame.id();
+        if id.is_extended() || frame.kind() != FrameKind::Data {
+            return self.rare_destination(frame);
+        }
+        // Process data in classic frames with a short identifier of their own are found at once.
+        match self.base.get(id.value() as usize) {
+            None | Some(&NOBODY) => Destination::Service,
+            Some(&entry) if entry < SHARED => destination_of(entry),
+            Some(_) => self.rare_destination(frame),
+        }
+    }
+
+    #[cold]
+    fn rare_destination(&self, frame: &Frame) -> Destination {
         let format = match frame.kind() {
             FrameKind::Data => 0,
             FrameKind::Fd | FrameKind::FdBitRateSwitch => FD,
@@ -205,7 +218,6 @@ impl Dispatch {
     }
 
     /// Where a frame goes whose identifier several drives share.
-    #[cold]
     fn shared_destination(&self, frame: &Frame) -> Destination {
         let is_sender = |shared: &&SharedId| {
             let SenderByte { at, value } = shared.sender;
@@ -232,7 +244,8 @@ const fn format_bit(format: FrameFormat) -> u16 {
 }
 
 const fn destination_of(entry: u16) -> Destination {
-    let (axis, pdo) = ((entry.saturating_sub(1) / 8) as u8, (entry.saturating_sub(1) % 8) as u8);
+    let place = entry.wrapping_sub(1);
+    let (axis, pdo) = ((place / 8) as u8, (place % 8) as u8);
     match pdo {
         EMERGENCY => Destination::Emergency { axis },
         ERROR_CONTROL => Destination::ErrorControl { axis },

@@ -101,27 +101,29 @@ impl core::error::Error for FrameError {}
 
 /// The four kinds of frame on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum FrameKind {
     /// A classic data frame, 0 to 8 bytes.
-    Data,
+    Data = 0,
     /// A classic remote frame (RTR): a length, no data.
-    Remote,
+    Remote = 1,
     /// A CAN FD frame at one bit rate.
-    Fd,
+    Fd = 2,
     /// A CAN FD frame with bit-rate switching (BRS): its data phase has the second, faster bit rate.
-    FdBitRateSwitch,
+    FdBitRateSwitch = 3,
 }
 
-/// The three kinds of frame that carry data.
+/// The three kinds of frame that carry data, with the numbers of [`FrameKind`]: then one becomes the other without an instruction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
 pub enum FrameFormat {
     /// A classic data frame, 0 to 8 bytes.
     #[default]
-    Classic,
+    Classic = 0,
     /// A CAN FD frame at one bit rate.
-    Fd,
+    Fd = 2,
     /// A CAN FD frame with bit-rate switching (BRS).
-    FdBitRateSwitch,
+    FdBitRateSwitch = 3,
 }
 
 impl FrameFormat {
@@ -204,7 +206,7 @@ impl Frame {
     }
 
     #[inline]
-    fn filled(id: Id, kind: FrameKind, bytes: &[u8]) -> Self {
+    pub(crate) fn filled(id: Id, kind: FrameKind, bytes: &[u8]) -> Self {
         let mut data = [0; Self::MAX_BYTES];
         for (to, from) in data.iter_mut().zip(bytes) {
             *to = *from;

@@ -7,6 +7,9 @@ use arrayvec::ArrayVec;
 use crate::guard::AxisLimits;
 use crate::plan::{self, Limits, PlanError, PlanOptions, Problem, Profile, Return, State, Synchronisation};
 
+/// A joint that must not turn round keeps this share of its velocity, so that no rounding turns it.
+const KEPT_VELOCITY: f64 = 1e-3;
+
 /// The planned motions of the axes of every group.
 ///
 /// There is room for two of each axis: the next one is planned beside the present one and takes its place only when that of
@@ -178,13 +181,17 @@ fn move_limits(leg: &Leg<'_>, velocity_scale: f64, acceleration_scale: f64) -> L
         .with_position(lowest, highest)
 }
 
-/// A fraction of the jerk limit, or more where the present acceleration would lead beyond the velocity limit before so
-/// little had taken it back.
+/// A fraction of the jerk limit, or more where the present acceleration would lead too far before so little had taken it back:
+/// beyond the velocity limit, or out again where the joint comes back from beyond a position limit.
 fn move_jerk(leg: &Leg<'_>, acceleration_scale: f64) -> f64 {
-    let (axis, State { velocity, acceleration, .. }) = (leg.limits, leg.start);
+    let (axis, State { position, velocity, acceleration }) = (leg.limits, leg.start);
     let wanted = axis.jerk * acceleration_scale;
     // In the direction of the acceleration, whether the joint moves there already or is about to turn round.
-    let room = (axis.velocity - velocity * acceleration.signum()).max(0.0);
+    let along = velocity * acceleration.signum();
+    let is_leading_out = position < axis.position_min && acceleration < 0.0
+        || position > axis.position_max && acceleration > 0.0;
+    let highest = if is_leading_out { -KEPT_VELOCITY * velocity.abs() } else { axis.velocity };
+    let room = (highest - along).max(0.0);
     let gain = acceleration * acceleration / 2.0;
     if gain > room * wanted { axis.jerk.min(gain / room) } else { wanted }
 }
@@ -209,6 +216,28 @@ mod tests {
         jerk: 100.0,
         torque: 50.0,
     };
+
+    #[test]
+    fn a_move_that_is_to_be_gentle_leads_back_from_beyond_a_position_limit_without_turning_round() {
+        // It slows down there already, so that it would turn round before so little jerk had taken the deceleration back.
+        for (side, acceleration_scale) in [(-1.0, 0.1), (1.0, 0.1), (-1.0, 0.8), (1.0, 0.8)] {
+            let start = State { position: side * 3.01, velocity: -0.1 * side, acceleration: 4.2 * side };
+            let leg = Leg { start, target: State::rest(2.9 * side), limits: &LIMITS };
+            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
+            motion.move_to(&mut profiles, [leg].into_iter(), 1.0, acceleration_scale, 0.0).unwrap();
+            let mut last = start.position;
+            while !motion.is_finished() {
+                motion.advance(0.001);
+                let position = motion.states(&profiles).next().unwrap().position;
+                assert!(
+                    position.abs() <= 3.0 || (last - position) * side >= 0.0,
+                    "from {last} to {position}"
+                );
+                last = position;
+            }
+            assert!((last - 2.9 * side).abs() < 1e-9);
+        }
+    }
 
     #[test]
     fn a_move_that_is_to_be_gentle_takes_a_high_acceleration_back_before_the_velocity_limit() {

@@ -18,6 +18,8 @@
 //! 7. `cia402`, `cia402_codec`, `profile`, `control`, `units`, `pdo`: how a drive is spoken to: its state machine ([`DriveState`]),
 //!    deviations of a drive ([`Cia402Codec`]), the handshake of profile position, the loops closed here ([`ControlLaw`]), SI to
 //!    drive units ([`Scale`]), and PDO mappings compiled to shifts and masks ([`Mapping`]).
+//! 8. `bit_fields`: the same for drives without an object dictionary, which are spoken to by frames of fixed bit fields
+//!    ([`FieldDrive`], [`FrameLayout`]). The engine does not use it yet.
 //!
 //! What crosses the border of the real-time thread:
 //!
@@ -30,6 +32,7 @@
 
 mod answers;
 mod axis;
+mod bit_fields;
 mod bit_set;
 mod cia402;
 mod cia402_codec;
@@ -67,6 +70,12 @@ pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
     ModeCondition, Pdo, SenderByte, TorqueLimits,
+};
+pub use bit_fields::{
+    BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits, FieldDrive,
+    FieldDriveParameters, FieldFrame, FieldMode, FieldTargets, FieldValue, FrameLayout, LayoutError, Life,
+    LifeCycle, LifeState, LifeStep, LifeWish, LinearScale, MAX_FIELD_BYTES, MAX_FIELDS, ModeCodes, Number,
+    OwnFrame, OwnFrames, PositionReference, ReplyError, ReplyValue, ReplyValues, Setting,
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};

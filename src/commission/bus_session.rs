@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
 
-use super::report::Report;
+use super::Report;
 use super::{Procedure, ProcedureError};
 use crate::procedure::ProcedureEvent;
 

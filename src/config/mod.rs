@@ -20,6 +20,7 @@ pub mod quirks;
 mod ranges;
 pub(crate) mod read;
 mod rules;
+mod scale;
 mod spelling;
 pub(crate) mod spot;
 
@@ -73,6 +74,7 @@ impl Config {
 
 /// Why a bus cannot be connected to another interface.
 #[derive(Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum OverrideError {
     /// There is no such bus.
     #[error("there is no bus called {name:?}; the buses are: {known}")]

@@ -6,13 +6,13 @@ use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
     FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
-    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Scale, ScaleError, ScaleParameters,
-    SetUpError, SlotPlan, TimingLadder, TorqueLimits,
+    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, ScaleError, SetUpError, SlotPlan,
+    TimingLadder, TorqueLimits,
 };
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
 use crate::config::{Axis, Compliance, Config, ConfigError, Interface};
-use crate::drive::{PdoPlan, ProcessData, Reply};
+use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
@@ -27,6 +27,7 @@ const SERVICE_FRAMES_PASSIVE: usize = 6;
 
 /// Why the real-time thread cannot execute a configuration.
 #[derive(thiserror::Error)]
+#[non_exhaustive]
 pub enum AssembleError {
     /// A value that cannot be: see [`Config::validate`].
     #[error(transparent)]
@@ -156,7 +157,7 @@ fn axis_parameters(
             condition: axis.drive.mode_changes.condition().unwrap_or_default(),
             timeout_cycles: cycles(MODE_TIMEOUT_NS),
         },
-        scale: scale(axis).map_err(|error| AssembleError::Scale { axis: index, error })?,
+        scale: axis.scale().map_err(|error| AssembleError::Scale { axis: index, error })?,
         limits: axis.limits,
         torque_limits: torque_limits(axis),
         feed_forward: axis.feed_forward,
@@ -191,23 +192,6 @@ fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
     } else {
         FeedbackSince::CommandPhase
     }
-}
-
-/// The conversion of SI units to the drive units of an axis. The rated torque is the configured one until the drive has
-/// reported its own.
-///
-/// # Errors
-/// An impossible parameter.
-pub fn scale(axis: &Axis) -> Result<Scale, ScaleError> {
-    Scale::new(ScaleParameters {
-        counts_per_turn: axis.counts_per_turn,
-        velocity_units_per_turn: axis.drive.velocity_units_per_turn(axis.counts_per_turn),
-        gear_ratio: axis.gear_ratio,
-        travel_per_turn: axis.travel.per_turn(),
-        reversed: axis.reversed,
-        zero_counts: axis.zero_counts.into(),
-        rated_torque: axis.rated_torque(),
-    })
 }
 
 /// The stream of each group of a configuration.

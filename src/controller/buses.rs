@@ -5,7 +5,7 @@ use takt_rt::Id;
 
 use crate::canopen::function_code;
 use crate::config::{Config, Interface};
-use crate::drive::ProcessData;
+use crate::family::bring_up::ProcessData;
 use crate::family::identifiers;
 use crate::link::ownership::{BusClaim, ClaimError, CommandedDrive, IfOwned, MasterTraffic, Ownership};
 use crate::link::{InterfaceSettings, SocketCanOptions};

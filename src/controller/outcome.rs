@@ -2,7 +2,7 @@
 
 use takt_rt::{Phase, RequestError, StopReason};
 
-use crate::drive::BringUpError;
+use crate::family::bring_up::BringUpError;
 use crate::link::ownership::Process;
 use crate::telemetry::{Machine, words};
 

@@ -20,7 +20,7 @@ use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramRunner, ProgramStep};
 use crate::channels::{HostSide, RequestNumbers};
 use crate::config::Config;
-use crate::drive::{AxisFacts, BringUp, Shutdown};
+use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 
 /// A stage must be completed within this time. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;

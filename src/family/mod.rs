@@ -4,6 +4,9 @@
 //! its errors, and the drive that simulates it. Nothing outside its folder and `sim/` says its name. [`register`] adds a family
 //! of your own, so that configurations may name it.
 
+pub mod bring_up;
+pub mod cia402;
+pub mod commission;
 pub mod erob_canopen;
 mod error_words;
 mod registry;
@@ -22,10 +25,11 @@ pub use warning::{Warning, WarningKind, is_rounded};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
-use crate::commission::dictionary::ObjectEntry;
-use crate::commission::{Failure, Report, SdoQuirks, SdoSession, TargetDrive, Task};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily};
-use crate::drive::{AxisSession, ProcessData, StepResult};
+use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
+use crate::family::commission::dictionary::ObjectEntry;
+use crate::family::commission::{Failure, Report, SdoSession, TargetDrive, Task};
+use crate::procedure::SdoQuirks;
 use crate::sim::Drive;
 
 /// ZeroErr eRob with CANopen firmware.
@@ -63,6 +67,11 @@ pub trait Family: ConfiguredFamily {
 
     /// From operational to pre-operational, without torque, and without the watchdog on the controller's heartbeat.
     fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
+
+    /// What an axis has to do without, because its drive lacks something: sentences for people.
+    fn remarks(&self, _axis: &Axis) -> Vec<&'static str> {
+        vec![]
+    }
 
     /// The protocol that a drive with this node ID may speak instead, if it can be probed for.
     fn other_protocol(&self, _node: u8) -> Option<OtherProtocol> {

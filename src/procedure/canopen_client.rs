@@ -30,6 +30,8 @@ pub struct CanopenClient {
     pub(super) reported_states: Vec<NmtState>,
     /// The number of boot-up messages of the node.
     pub(super) boot_ups: u32,
+    /// How many of them do not count as a restart; `None` before the node has obeyed its master.
+    pub(super) expected_boot_ups: Option<u32>,
     /// The last emergency message, unless an "error reset" message (code 00xx) followed.
     pub(super) emergency: Option<Emergency>,
     pub(super) heartbeat: Option<OwnHeartbeat>,
@@ -57,6 +59,7 @@ impl CanopenClient {
             nmt_state: None,
             reported_states: vec![],
             boot_ups: 0,
+            expected_boot_ups: None,
             emergency: None,
             heartbeat: None,
         }

@@ -44,6 +44,28 @@ impl CanopenSession {
         self.client().boot_ups
     }
 
+    /// Whether restarts of the node are watched for.
+    pub fn watches_restarts(&self) -> bool {
+        self.client().expected_boot_ups.is_some()
+    }
+
+    /// From now on, a boot-up beyond the first `expected` is a restart, unless they are watched for already.
+    pub fn watch_restarts(&self, expected: u32) {
+        self.client_mut().expected_boot_ups.get_or_insert(expected);
+    }
+
+    /// Whether the node has restarted, and so has lost its configuration.
+    pub fn has_restarted(&self) -> bool {
+        let client = self.client();
+        client.expected_boot_ups.is_some_and(|expected| client.boot_ups > expected)
+    }
+
+    /// Takes note of one restart.
+    pub fn accept_restart(&self) {
+        let mut client = self.client_mut();
+        client.expected_boot_ups = client.expected_boot_ups.map(|expected| expected.saturating_add(1));
+    }
+
     /// The drive's last emergency message, unless an "error reset" message (code 00xx) followed.
     pub fn emergency(&self) -> Option<Emergency> {
         self.client().emergency

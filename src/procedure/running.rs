@@ -70,9 +70,10 @@ impl<C: Client, T, E> Procedure<C, T, E> {
         }
     }
 
-    /// Passes a received message. It is ignored when the procedure has ended.
+    /// Passes a received message. It is ignored after a failure; after a success, another procedure may follow in the same
+    /// session, and must know of it.
     pub fn receive(&mut self, message: &C::Message) {
-        if self.outcome.is_none() {
+        if !matches!(self.outcome, Some(Err(_))) {
             self.session.client_mut().receive(message);
         }
     }
@@ -91,9 +92,90 @@ impl<C: Client, T, E> Procedure<C, T, E> {
     pub fn outcome(&self) -> Option<&Result<T, ProcedureError<E>>> {
         self.outcome.as_ref()
     }
+}
 
-    /// Its session.
-    pub fn session(&self) -> &ProcedureSession<C> {
-        &self.session
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+
+    /// The master's side of a serial line: one byte asks, and the answer is two bytes.
+    #[derive(Default)]
+    struct Line {
+        outgoing: VecDeque<Vec<u8>>,
+        answer: Option<Vec<u8>>,
+    }
+
+    impl Client for Line {
+        type Message = Vec<u8>;
+
+        fn poll(&mut self, _: Nanoseconds) -> Option<Vec<u8>> {
+            self.outgoing.pop_front()
+        }
+
+        fn receive(&mut self, bytes: &Vec<u8>) {
+            self.answer = Some(bytes.clone());
+        }
+    }
+
+    type LineSession = ProcedureSession<Line>;
+
+    /// Asks until an answer comes, three times at most, 10 ns apart.
+    async fn ask(session: LineSession, question: u8) -> Result<Vec<u8>, &'static str> {
+        session.step("question");
+        for _ in 0..3 {
+            session.client_mut().outgoing.push_back(vec![question]);
+            let answer = session.until(|| session.client_mut().answer.take());
+            let end_ns = session.now_ns() + 10;
+            if let Some(answer) = session.give_up_when(|| session.now_ns() >= end_ns, answer).await {
+                return Ok(answer);
+            }
+        }
+        Err("silence")
+    }
+
+    fn asking(question: u8) -> Procedure<Line, Vec<u8>, &'static str> {
+        let session = LineSession::new(Line::default());
+        Procedure::new(session.clone(), ask(session, question))
+    }
+
+    fn sent(procedure: &mut Procedure<Line, Vec<u8>, &'static str>, now_ns: Nanoseconds) -> Vec<Vec<u8>> {
+        let mut sent = vec![];
+        procedure.poll(now_ns, &mut |bytes| sent.push(bytes));
+        sent
+    }
+
+    #[test]
+    fn a_procedure_exchanges_bytes_as_well_as_frames() {
+        let mut procedure = asking(7);
+        assert_eq!(sent(&mut procedure, 1_000), [vec![7]]);
+        procedure.receive(&vec![1, 2]);
+        assert!(sent(&mut procedure, 1_005).is_empty());
+        assert_eq!(procedure.outcome(), Some(&Ok(vec![1, 2])));
+        assert_eq!(procedure.take_event(), Some(ProcedureEvent::Step("question")));
+    }
+
+    #[test]
+    fn a_wait_is_given_up_at_its_end_and_the_failure_names_its_step() {
+        let mut procedure = asking(7);
+        assert_eq!(
+            [0, 5, 10, 19, 20, 30].map(|now_ns| sent(&mut procedure, now_ns).len()),
+            [1, 0, 1, 0, 1, 0]
+        );
+        let error = procedure.outcome().unwrap().as_ref().unwrap_err();
+        assert_eq!(error.to_string(), "question: silence");
+    }
+
+    #[test]
+    fn procedures_run_side_by_side_each_on_its_own_bus() {
+        let mut parallel = crate::procedure::Parallel::new([(0, asking(7)), (1, asking(8))]);
+        let mut sent = vec![];
+        parallel.poll(0, &mut |bus, bytes| sent.push((bus, bytes)));
+        assert_eq!(sent, [(0, vec![7]), (1, vec![8])]);
+        parallel.receive(1, &vec![9]);
+        parallel.poll(1, &mut |_, _| ());
+        let are_over: Vec<bool> = parallel.procedures().map(|one| one.outcome().is_some()).collect();
+        assert_eq!(are_over, [false, true]);
     }
 }

@@ -5,7 +5,7 @@ use takt_rt::{Id, TIME_ID, TransmissionType};
 
 use crate::canopen::function_code;
 use crate::config::{Axis, Config, Master};
-use crate::drive::{PdoPlan, ProcessData, Reply};
+use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 use crate::frame_time::FrameShape;
 
 /// What a message is.

@@ -6,7 +6,7 @@ use takt::canopen::dcf::{self, DeviceConfiguration, Download};
 use takt::canopen::eds;
 use takt::canopen::sdo::AbortCode;
 use takt::config::Config;
-use takt::drive::{BringUp, BringUpError};
+use takt::family::bring_up::{BringUp, BringUpError};
 
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, ReceiveBatch};

@@ -3,7 +3,7 @@
 use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
-use takt::drive::{BringUp, FailureCause, ProbeResult, Shutdown};
+use takt::family::bring_up::{BringUp, FailureCause, ProbeResult, Shutdown};
 use takt_rt::DriveState;
 
 use super::scripted_drive::{ScriptedDrive, at};
@@ -225,6 +225,21 @@ fn the_drive_restarts_while_it_is_started() {
     world.drive().power_up_at(now_ns);
     let failure = world.run(&mut bring_up).unwrap_err().failures.remove(0);
     assert_eq!(failure.cause, FailureCause::Restarted { times: 1 });
+}
+
+#[test]
+fn the_drive_restarts_between_its_configuration_and_its_start() {
+    let config = config(&[(0, 1), (0, 2)]);
+    let mut world = World::of(&config);
+    let mut bring_up = BringUp::new(&config);
+    world.run(&mut bring_up).unwrap();
+    let now_ns = world.now_ns;
+    world.drive().power_up_at(now_ns);
+    world.step(&mut bring_up);
+    bring_up.start().unwrap();
+    let failures = world.run(&mut bring_up).unwrap_err().failures;
+    assert_eq!((failures.len(), failures[0].axis), (1, 0), "it has lost its mapping");
+    assert_eq!(failures[0].cause, FailureCause::Restarted { times: 1 });
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use takt::config::*;
-use takt::drive::{AxisFacts, BringUp, BringUpError, Shutdown};
+use takt::family::bring_up::{AxisFacts, BringUp, BringUpError, Shutdown};
 use takt_rt::Frame;
 
 use super::scripted_drive::ScriptedDrive;

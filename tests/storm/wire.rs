@@ -1,7 +1,7 @@
 //! What the controller has sent to each drive in a cycle, read from its PDOs.
 
 use takt::config::Config;
-use takt::drive::ProcessData;
+use takt::family::bring_up::ProcessData;
 use takt_rt::{Frame, MappedObject};
 
 const CONTROLWORD: u16 = 0x6040;

@@ -1,7 +1,7 @@
 //! Requests and streams from the bytes that a fuzzer makes.
 
 use takt::config::Config;
-use takt::drive::ProcessData;
+use takt::family::bring_up::ProcessData;
 use takt_rt::plan;
 use takt_rt::{
     AxisPoint, AxisTarget, Engine, Id, MAX_AXES, MappedObject, Move, PointRole, ProfileMove, ProfileTarget,

@@ -1,8 +1,7 @@
 //! A drive of the simplest kind: it obeys what it is commanded, in any mode of either family.
 
 use takt::config::{Axis, Config, Control};
-use takt::controller::assemble;
-use takt::drive::{PdoPlan, ProcessData};
+use takt::family::bring_up::{PdoPlan, ProcessData};
 use takt_rt::{Command, DriveState, Frame, Id, MappedObject, Scale, ShownStates, controlword, statusword};
 
 /// Below this speed friction fades out, so that a joint at rest stays there: rad/s (m/s).
@@ -40,7 +39,7 @@ impl ObedientDrive {
     pub fn new(axis: &'static Axis) -> Self {
         Self {
             axis,
-            scale: assemble::scale(axis).expect("the example is sound"),
+            scale: axis.scale().expect("the example is sound"),
             data: ProcessData::of(axis),
             state: DriveState::SwitchOnDisabled,
             is_silent: false,

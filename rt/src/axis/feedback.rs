@@ -73,7 +73,8 @@ impl Axis {
             return Ok(());
         }
         let Some(parameters) = self.parameters.feedback.get(pdo) else { return Ok(()) };
-        parameters.mapping.unpack(frame.first_word(), frame.payload().len(), &mut self.feedback)?;
+        // No remote frame is feedback: what has a length has as many bytes.
+        parameters.mapping.unpack(frame.first_word(), frame.length(), &mut self.feedback)?;
         if self.reception.note_arrival(pdo) {
             self.duplicate_node.note_repetition();
         }

@@ -95,8 +95,8 @@ pub enum Deadline {
 
 /// The axes of a controller, in groups that each move together.
 ///
-/// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 5 kB for each axis, 4 kB for each
-/// bus, and 11 kB beside: 25 kB for two axes on one bus, 246 kB for 32 axes on 16 buses.
+/// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 6 kB for each axis, 5 kB for each
+/// bus, and 15 kB beside: 32 kB for two axes on one bus, 288 kB for 32 axes on 16 buses.
 ///
 /// # The order of calls
 /// In each slot, once each: [`Engine::sync`] for every bus, and its frame is sent; [`Engine::receive`] for every frame that has

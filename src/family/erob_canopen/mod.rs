@@ -1,6 +1,7 @@
 //! ZeroErr eRob with CANopen firmware (eRunner manual 1.7, chapter 5, and field experience).
 
 mod bring_up;
+mod commission;
 mod errors;
 mod facts;
 
@@ -12,10 +13,10 @@ use takt_rt::{Frame, Id};
 use super::{CarryingOut, Family, OtherProtocol, SettingUp};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
-use crate::commission::dictionary::ObjectEntry;
-use crate::commission::{SdoSession, TargetDrive, Task, erob_canopen as commissioning};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys, PdoMapping};
-use crate::drive::{AxisSession, ProcessData};
+use crate::family::bring_up::{AxisSession, ProcessData};
+use crate::family::commission::dictionary::ObjectEntry;
+use crate::family::commission::{SdoSession, TargetDrive, Task};
 use crate::sim::Drive;
 use crate::sim::erob::{ErobJoint, ErobParameters};
 
@@ -77,15 +78,15 @@ impl Family for ErobCanopen {
     }
 
     fn objects(&self) -> &'static [ObjectEntry] {
-        commissioning::OBJECTS
+        commission::OBJECTS
     }
 
     fn meaning(&self, object: &Object, value: i64) -> Option<String> {
-        commissioning::meaning(object, value)
+        commission::meaning(object, value)
     }
 
     fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {
-        commissioning::process_data_words(target, frame)
+        commission::process_data_words(target, frame)
     }
 
     fn carry_out<'a>(
@@ -94,7 +95,7 @@ impl Family for ErobCanopen {
         target: &'a TargetDrive,
         task: Task,
     ) -> CarryingOut<'a> {
-        Box::pin(commissioning::carry_out(session, target, task))
+        Box::pin(commission::carry_out(session, target, task))
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

@@ -8,9 +8,9 @@ use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::config::Axis;
-use crate::drive::axis_units::turns;
-use crate::drive::{AxisSession, Check, RESTART_STEP, StepResult};
-use crate::drive::{actual_position, configuration_file, heartbeat, identity, pdo_mapping};
+use crate::family::bring_up::axis_units::turns;
+use crate::family::bring_up::{AxisSession, Check, RESTART_STEP, StepResult};
+use crate::family::bring_up::{actual_position, configuration_file, heartbeat, identity, pdo_mapping};
 
 /// Special function 2619: interpolation over CANopen.
 const INTERPOLATION: i64 = 7;
@@ -28,7 +28,7 @@ pub(super) async fn configure(c: &AxisSession<'_>) -> StepResult {
         "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID",
     );
     c.restart_communication().await?;
-    identity::compare(c).await?;
+    identity::compare(c, identity::PROFILE_CIA402).await?;
     come_to_rest(c).await?;
     configuration_file::write(c).await?;
     process_data(c).await?;

@@ -5,6 +5,7 @@
 
 mod alarm;
 mod bring_up;
+mod commission;
 mod facts;
 mod process_data;
 
@@ -16,10 +17,11 @@ use takt_rt::Frame;
 
 use super::{CarryingOut, Family, MappingMatch, SettingUp};
 use crate::canopen::object::Object;
-use crate::commission::dictionary::ObjectEntry;
-use crate::commission::{SdoQuirks, SdoSession, TargetDrive, Task, yz_aim as commissioning};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
-use crate::drive::{AxisSession, ProcessData};
+use crate::family::bring_up::{AxisSession, ProcessData};
+use crate::family::commission::dictionary::ObjectEntry;
+use crate::family::commission::{SdoSession, TargetDrive, Task};
+use crate::procedure::SdoQuirks;
 use crate::sim::Drive;
 use crate::sim::yz_aim::{YzAimJoint, YzAimParameters};
 
@@ -83,15 +85,15 @@ impl Family for YzAim {
     }
 
     fn objects(&self) -> &'static [ObjectEntry] {
-        commissioning::OBJECTS
+        commission::OBJECTS
     }
 
     fn meaning(&self, object: &Object, value: i64) -> Option<String> {
-        commissioning::meaning(object, value)
+        commission::meaning(object, value)
     }
 
     fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {
-        commissioning::process_data_words(target, frame)
+        commission::process_data_words(target, frame)
     }
 
     fn carry_out<'a>(
@@ -100,7 +102,7 @@ impl Family for YzAim {
         target: &'a TargetDrive,
         task: Task,
     ) -> CarryingOut<'a> {
-        Box::pin(commissioning::carry_out(session, target, task))
+        Box::pin(commission::carry_out(session, target, task))
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

@@ -4,10 +4,10 @@ use takt_rt::TransmissionType;
 
 use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Control};
-use crate::drive::mapped_objects::{
+use crate::family::bring_up::mapped_objects::{
     CONTROLWORD, OPERATION_MODE, POSITION, STATUSWORD, TARGET_POSITION, TARGET_VELOCITY, VELOCITY,
 };
-use crate::drive::{PdoPlan, ProcessData, Reply};
+use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 
 /// The process data of an axis.
 pub fn fixed(axis: &Axis) -> ProcessData {

@@ -3,7 +3,6 @@
 use std::collections::VecDeque;
 
 use takt::config::{Axis, Config, Control};
-use takt::controller::assemble;
 use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Scale};
 
 use super::Seen;
@@ -65,7 +64,7 @@ impl SetPoints {
         let follow = own.filter(|axis| !axis.control.is_profile());
         let slowest = follow.map(divider).max().unwrap_or(1).max(divider(axis));
         Self {
-            scale: assemble::scale(axis).unwrap(),
+            scale: axis.scale().unwrap(),
             period_s: config.cycle.period_ns as f64 * 1e-9,
             points: [None; 3],
             planned: VecDeque::new(),

@@ -1,0 +1,428 @@
+//! The life of a drive that is spoken to by bit fields: how it is started without a jump, changed, and stopped.
+//!
+//! Such a drive has no state machine that it would show: at most whether it has torque. So each step is taken when the drive has replied
+//! to the one before.
+//!
+//! | state | what is sent | next state, by a reply |
+//! | --- | --- | --- |
+//! | Stopping | stop | Stopped, unless the drive shows torque |
+//! | Stopped | a command without torque, at the actual position | |
+//! | Choosing | the mode: in a command as in Stopped, or in a frame of its own | Aligning, with or without a reply |
+//! | Aligning | a command without torque, at the actual position | Starting |
+//! | Starting | start, at the actual position | Running, unless the drive shows no torque |
+//! | Running | the set-points | Stopping, if the drive shows no torque |
+//! | Telling | zero, or clear | Told |
+//! | Told | as in Stopped, until something else is wanted | |
+//!
+//! A reply may be late, and answer the frame before. A drive that shows whether it has torque has stopped when it shows none; any other
+//! one when it has replied twice while it was told to stop.
+//!
+//! Where anything but running is wanted, a drive is stopped first. In every cycle exactly one frame is sent.
+
+use crate::frame::{Frame, Id};
+
+/// How a drive is told to start, to stop, and so on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LifeCycle {
+    /// By the fields `Run`, `Mode` and `Zero` of its command.
+    ByFields {
+        /// The codes of the modes.
+        modes: ModeCodes,
+    },
+    /// By frames of their own, each in the place of a cycle's command.
+    ByFrames(OwnFrames),
+}
+
+/// The codes of the modes in the field `Mode` of a command.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ModeCodes {
+    /// Torque.
+    pub torque: u8,
+    /// Velocity.
+    pub velocity: u8,
+    /// Position.
+    pub position: u8,
+}
+
+/// A frame that is always the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OwnFrame {
+    /// The identifier.
+    pub id: Id,
+    /// The payload: eight bytes of a classic frame.
+    pub payload: [u8; 8],
+}
+
+/// The frames of [`LifeCycle::ByFrames`]. A drive without one of the optional ones has no such function, or needs no frame for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OwnFrames {
+    /// The drive gets torque, and follows the last command.
+    pub start: OwnFrame,
+    /// The drive has no torque.
+    pub stop: OwnFrame,
+    /// The present position becomes zero.
+    pub zero: Option<OwnFrame>,
+    /// Faults are cleared.
+    pub clear: Option<OwnFrame>,
+    /// Torque mode.
+    pub torque: Option<OwnFrame>,
+    /// Velocity mode.
+    pub velocity: Option<OwnFrame>,
+    /// Position mode.
+    pub position: Option<OwnFrame>,
+}
+
+/// What a running drive follows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FieldMode {
+    /// The torque.
+    Torque,
+    /// The velocity.
+    Velocity,
+    /// The position.
+    Position,
+}
+
+/// Where a drive is to be led.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LifeWish {
+    /// It has no torque.
+    Stop,
+    /// It follows set-points in this mode. A running drive takes another mode at once: the caller sees to it that the joint stands.
+    Run(FieldMode),
+    /// The present position becomes zero, once; without torque.
+    Zero,
+    /// Faults are cleared, once; without torque.
+    Clear,
+}
+
+/// What is told to a drive once, without torque.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// The present position becomes zero.
+    Zero,
+    /// Faults are cleared.
+    Clear,
+}
+
+/// How far a drive is. The module documentation has the table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LifeState {
+    /// It is told to stop: whether it has torque is not known.
+    #[default]
+    Stopping,
+    /// It has no torque.
+    Stopped,
+    /// It is told this mode.
+    Choosing(FieldMode),
+    /// Its target is brought to the actual position, in this mode.
+    Aligning(FieldMode),
+    /// It is told to start in this mode.
+    Starting(FieldMode),
+    /// It follows set-points in this mode.
+    Running(FieldMode),
+    /// It is told this.
+    Telling(Setting),
+    /// It has been told this.
+    Told(Setting),
+}
+
+/// The one frame that a drive is sent in a cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LifeStep {
+    /// The command with these fields.
+    Command {
+        /// The field `Run`.
+        run: bool,
+        /// The field `Zero`.
+        zero: bool,
+        /// The field `Mode`.
+        mode: u8,
+        /// Whether the targets are those of rest at the actual position, and not the set-points.
+        is_at_rest: bool,
+    },
+    /// A frame of its own.
+    Own(Frame),
+}
+
+/// The life of one drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Life {
+    state: LifeState,
+    /// Cycles since the last reply.
+    unanswered_cycles: u32,
+    /// Replies without a state of the drive, while it is told to stop.
+    stop_replies: u8,
+}
+
+/// Replies to a stop of which the last cannot be that to a frame before it.
+const STOP_REPLIES: u8 = 2;
+
+impl Life {
+    /// How far the drive is.
+    pub const fn state(&self) -> LifeState {
+        self.state
+    }
+
+    /// Cycles in a row in which a frame was sent and none had come back.
+    pub const fn unanswered_cycles(&self) -> u32 {
+        self.unanswered_cycles
+    }
+
+    /// Takes a reply to the frame of the last cycle. `has_torque` where the drive shows it.
+    pub fn receive(&mut self, has_torque: Option<bool>) {
+        self.unanswered_cycles = 0;
+        self.state = match (self.state, has_torque) {
+            (LifeState::Stopping, Some(false)) => LifeState::Stopped,
+            (LifeState::Stopping, None) => {
+                self.stop_replies = self.stop_replies.saturating_add(1);
+                if self.stop_replies < STOP_REPLIES { LifeState::Stopping } else { LifeState::Stopped }
+            }
+            (LifeState::Aligning(mode), Some(false) | None) => LifeState::Starting(mode),
+            (LifeState::Starting(mode), Some(true) | None) => LifeState::Running(mode),
+            // It has taken its torque away by itself.
+            (LifeState::Running(_), Some(false)) => LifeState::Stopping,
+            (state @ (LifeState::Stopping | LifeState::Starting(_) | LifeState::Running(_)), _) => state,
+            // It has torque though it is to have none.
+            (_, Some(true)) => LifeState::Stopping,
+            (LifeState::Telling(setting), _) => LifeState::Told(setting),
+            (state, _) => state,
+        };
+    }
+
+    /// What the drive is sent in this cycle.
+    pub fn step(&mut self, wish: LifeWish, by: &LifeCycle) -> LifeStep {
+        self.unanswered_cycles = self.unanswered_cycles.saturating_add(1);
+        let before = self.state;
+        self.state = next(before, wish);
+        if before != LifeState::Stopping {
+            self.stop_replies = 0;
+        }
+        match by {
+            LifeCycle::ByFields { modes } => step_by_fields(self.state, modes),
+            LifeCycle::ByFrames(frames) => step_by_frames(before, self.state, frames),
+        }
+    }
+}
+
+/// What a wish makes of a state.
+fn next(state: LifeState, wish: LifeWish) -> LifeState {
+    match (state, wish) {
+        (LifeState::Stopping, _) => state,
+        (LifeState::Choosing(mode), LifeWish::Run(wanted)) if mode == wanted => LifeState::Aligning(mode),
+        (LifeState::Aligning(mode), LifeWish::Run(wanted)) if mode == wanted => state,
+        (LifeState::Starting(_), LifeWish::Run(_)) => state,
+        (LifeState::Running(_), LifeWish::Run(mode)) => LifeState::Running(mode),
+        (LifeState::Starting(_) | LifeState::Running(_), _) => LifeState::Stopping,
+        (LifeState::Telling(Setting::Zero), LifeWish::Zero) => state,
+        (LifeState::Telling(Setting::Clear), LifeWish::Clear) => state,
+        (LifeState::Told(Setting::Zero), LifeWish::Zero) => state,
+        (LifeState::Told(Setting::Clear), LifeWish::Clear) => state,
+        (_, LifeWish::Stop) => LifeState::Stopped,
+        (_, LifeWish::Run(mode)) => LifeState::Choosing(mode),
+        (_, LifeWish::Zero) => LifeState::Telling(Setting::Zero),
+        (_, LifeWish::Clear) => LifeState::Telling(Setting::Clear),
+    }
+}
+
+const fn step_by_fields(state: LifeState, modes: &ModeCodes) -> LifeStep {
+    let (mode, run) = match state {
+        LifeState::Choosing(mode) | LifeState::Aligning(mode) => (mode, false),
+        LifeState::Starting(mode) | LifeState::Running(mode) => (mode, true),
+        _ => (FieldMode::Position, false),
+    };
+    let code = match mode {
+        FieldMode::Torque => modes.torque,
+        FieldMode::Velocity => modes.velocity,
+        FieldMode::Position => modes.position,
+    };
+    LifeStep::Command {
+        run,
+        zero: matches!(state, LifeState::Telling(Setting::Zero)),
+        mode: code,
+        is_at_rest: !matches!(state, LifeState::Running(_)),
+    }
+}
+
+fn step_by_frames(before: LifeState, state: LifeState, frames: &OwnFrames) -> LifeStep {
+    let new_mode = match (before, state) {
+        (_, LifeState::Choosing(mode)) => Some(mode),
+        (LifeState::Running(old), LifeState::Running(mode)) if old != mode => Some(mode),
+        _ => None,
+    };
+    let own = match (state, new_mode) {
+        (LifeState::Stopping, _) => Some(frames.stop),
+        (LifeState::Starting(_), _) => Some(frames.start),
+        (LifeState::Telling(Setting::Zero), _) => frames.zero,
+        (LifeState::Telling(Setting::Clear), _) => frames.clear,
+        (_, Some(FieldMode::Torque)) => frames.torque,
+        (_, Some(FieldMode::Velocity)) => frames.velocity,
+        (_, Some(FieldMode::Position)) => frames.position,
+        _ => None,
+    };
+    let is_at_rest = !matches!(state, LifeState::Running(_));
+    let command = LifeStep::Command { run: !is_at_rest, zero: false, mode: 0, is_at_rest };
+    own.map_or(command, |own| LifeStep::Own(Frame::of(own.id, own.payload)))
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const BY_FIELDS: LifeCycle =
+        LifeCycle::ByFields { modes: ModeCodes { torque: 0, velocity: 1, position: 2 } };
+    const RUN: LifeWish = LifeWish::Run(FieldMode::Position);
+
+    fn own(last: u8) -> OwnFrame {
+        OwnFrame { id: Id::canopen(0, 1), payload: [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last] }
+    }
+
+    fn by_frames() -> LifeCycle {
+        LifeCycle::ByFrames(OwnFrames {
+            start: own(0xFC),
+            stop: own(0xFD),
+            zero: Some(own(0xFE)),
+            clear: None,
+            torque: Some(own(0xF9)),
+            velocity: Some(own(0xFA)),
+            position: Some(own(0xFB)),
+        })
+    }
+
+    /// Each step in a few letters: the last byte of a frame of its own, or the fields of a command.
+    fn letters(step: LifeStep) -> std::string::String {
+        match step {
+            LifeStep::Own(frame) => std::format!("{:02X}", frame.payload()[7]),
+            LifeStep::Command { run, zero, mode, is_at_rest } => {
+                let (run, zero) = (u8::from(run), u8::from(zero));
+                std::format!("run={run} zero={zero} mode={mode} {}", if is_at_rest { "rest" } else { "set" })
+            }
+        }
+    }
+
+    /// The steps of a life in which each is answered at once, by a drive that shows its state or does not.
+    fn answered(
+        life: &mut Life,
+        by: &LifeCycle,
+        shows: bool,
+        wishes: &[LifeWish],
+    ) -> Vec<std::string::String> {
+        let steps = wishes.iter().map(|wish| {
+            let step = life.step(*wish, by);
+            let has_torque = matches!(step, LifeStep::Command { run: true, .. });
+            life.receive(shows.then_some(has_torque));
+            letters(step)
+        });
+        steps.collect()
+    }
+
+    #[test]
+    fn a_drive_is_started_by_its_fields_only_with_its_target_at_its_position() {
+        let mut life = Life::default();
+        let steps = answered(&mut life, &BY_FIELDS, true, &[RUN; 6]);
+        let rest = "run=0 zero=0 mode=2 rest";
+        assert_eq!(
+            steps,
+            [
+                rest,
+                rest,
+                rest,
+                "run=1 zero=0 mode=2 rest",
+                "run=1 zero=0 mode=2 set",
+                "run=1 zero=0 mode=2 set"
+            ]
+        );
+        let stopped = answered(&mut life, &BY_FIELDS, true, &[LifeWish::Stop; 2]);
+        assert_eq!((stopped, life.state()), ([rest; 2].map(Into::into).to_vec(), LifeState::Stopped));
+    }
+
+    #[test]
+    fn a_drive_is_started_by_frames_of_its_own_after_a_command_at_its_position() {
+        let mut life = Life::default();
+        let steps = answered(&mut life, &by_frames(), false, &[RUN; 7]);
+        let (rest, set) = ("run=0 zero=0 mode=0 rest", "run=1 zero=0 mode=0 set");
+        assert_eq!(steps, ["FD", "FD", "FB", rest, "FC", set, set]);
+        let velocity = LifeWish::Run(FieldMode::Velocity);
+        assert_eq!(answered(&mut life, &by_frames(), false, &[velocity; 2]), ["FA", set]);
+        assert_eq!(answered(&mut life, &by_frames(), false, &[LifeWish::Stop; 4]), ["FD", "FD", rest, rest]);
+    }
+
+    #[test]
+    fn a_drive_that_does_not_reply_is_told_to_stop_for_ever_and_its_silence_is_counted() {
+        for by in [BY_FIELDS, by_frames()] {
+            let mut life = Life::default();
+            for cycle in 1..100 {
+                assert!(!matches!(life.step(RUN, &by), LifeStep::Command { run: true, .. }));
+                assert_eq!((life.state(), life.unanswered_cycles()), (LifeState::Stopping, cycle));
+            }
+            life.receive(None);
+            assert_eq!(life.unanswered_cycles(), 0);
+        }
+    }
+
+    #[test]
+    fn a_drive_that_takes_its_torque_away_by_itself_gets_no_further_set_point() {
+        let mut life = Life::default();
+        answered(&mut life, &BY_FIELDS, true, &[RUN; 6]);
+        assert_eq!(life.state(), LifeState::Running(FieldMode::Position));
+        life.step(RUN, &BY_FIELDS);
+        life.receive(Some(false));
+        assert_eq!(letters(life.step(RUN, &BY_FIELDS)), "run=0 zero=0 mode=2 rest");
+    }
+
+    #[test]
+    fn zero_is_told_once_and_taken_back_and_only_to_a_drive_that_has_stopped() {
+        let mut life = Life::default();
+        answered(&mut life, &BY_FIELDS, true, &[RUN; 6]);
+        let steps = answered(&mut life, &BY_FIELDS, true, &[LifeWish::Zero; 4]);
+        let rest = "run=0 zero=0 mode=2 rest";
+        assert_eq!(steps, [rest, "run=0 zero=1 mode=2 rest", rest, rest]);
+        // It is told again where the first time is not answered.
+        let mut life = Life::default();
+        answered(&mut life, &by_frames(), false, &[LifeWish::Stop; 3]);
+        let told = [0; 3].map(|_| letters(life.step(LifeWish::Zero, &by_frames())));
+        assert_eq!(told, ["FE"; 3]);
+    }
+
+    proptest! {
+        #[test]
+        fn whatever_is_wanted_and_replied_torque_follows_a_command_at_rest_and_set_points_follow_torque(
+            cycles in prop::collection::vec((0..6u8, prop::option::of(prop::option::of(any::<bool>()))), 1..200),
+            has_own_frames in any::<bool>(),
+        ) {
+            let by = if has_own_frames { by_frames() } else { BY_FIELDS };
+            let (mut life, mut is_aligned, mut may_have_torque) = (Life::default(), false, false);
+            for (wish, reply) in cycles {
+                let wish = match wish {
+                    0 => LifeWish::Stop,
+                    1 => LifeWish::Zero,
+                    2 => LifeWish::Clear,
+                    3 => LifeWish::Run(FieldMode::Torque),
+                    _ => RUN,
+                };
+                let step = letters(life.step(wish, &by));
+                let starts = step == "FC" || step.starts_with("run=1") && step.ends_with("rest");
+                if starts {
+                    prop_assert!(is_aligned && matches!(wish, LifeWish::Run(_)), "{}", step);
+                    may_have_torque = true;
+                }
+                if step.ends_with("set") {
+                    prop_assert!(may_have_torque && matches!(wish, LifeWish::Run(_)), "{}", step);
+                }
+                if step == "FE" || step.contains("zero=1") {
+                    prop_assert!(!may_have_torque && wish == LifeWish::Zero);
+                }
+                // By fields, a command without run takes the torque away.
+                let is_stopped = if has_own_frames { step == "FD" } else { step.starts_with("run=0") };
+                may_have_torque &= !is_stopped;
+                is_aligned = starts || step.starts_with("run=0") && step.ends_with("rest");
+                if let Some(has_torque) = reply {
+                    life.receive(has_torque);
+                }
+            }
+        }
+    }
+}

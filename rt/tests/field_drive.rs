@@ -1,0 +1,308 @@
+//! Drives that are spoken to by bit fields, led through their lives: hollow-shaft motors over CAN FD, and over CAN in both of its modes.
+
+use std::f64::consts::TAU;
+
+use takt_rt::{
+    BitField, BitRange, ByteOrder, CommandValue, FieldBits, FieldDrive, FieldDriveParameters, FieldFrame,
+    FieldMode, FieldTargets, Frame, FrameFormat, Id, LifeCycle, LifeState, LifeWish, LinearScale, ModeCodes,
+    Number, OwnFrame, OwnFrames, PositionReference, ReplyValue, Setting,
+};
+
+const MOTOR: Id = Id::canopen(0, 1);
+const MASTER: Id = Id::canopen(0, 0x64);
+const COUNTS_PER_TURN: f64 = 1_048_576.0;
+const COUNT: f64 = TAU / COUNTS_PER_TURN;
+const RUN: LifeWish = LifeWish::Run(FieldMode::Position);
+/// A limit of velocity for a motor that follows positions.
+const VELOCITY: f64 = 10.0;
+
+fn field<V>(value: V, bits: FieldBits, number: Number, scale: LinearScale) -> BitField<V> {
+    BitField { value, bits, number, scale, codes: None }
+}
+
+fn plain<V>(value: V, at: u16) -> BitField<V> {
+    field(value, FieldBits::of(at, 8), Number::Unsigned, LinearScale::ONE)
+}
+
+fn counts<V>(value: V, bits: FieldBits) -> BitField<V> {
+    let scale = LinearScale { codes_per_unit: 1.0 / COUNT, zero_code: 0.0 };
+    field(value, bits, Number::Signed, scale)
+}
+
+fn flexible() -> FieldDriveParameters {
+    let speed = LinearScale { codes_per_unit: 1_000.0, zero_code: 0.0 };
+    let command = [
+        counts(CommandValue::Position, FieldBits::of(0, 40)),
+        field(CommandValue::Velocity, FieldBits::of(40, 32), Number::Signed, speed),
+        plain(CommandValue::Mode, 88),
+        plain(CommandValue::Run, 96),
+        plain(CommandValue::Zero, 120),
+    ];
+    let reply = [
+        counts(ReplyValue::Position, FieldBits::of(0, 40)),
+        plain(ReplyValue::Mode, 88),
+        plain(ReplyValue::Run, 96),
+        field(ReplyValue::Temperature, FieldBits::of(112, 8), Number::Signed, LinearScale::ONE),
+        plain(ReplyValue::Sender, 120),
+    ];
+    let (format, order) = (FrameFormat::FdBitRateSwitch, ByteOrder::BigEndian);
+    FieldDriveParameters {
+        command: FieldFrame::compile(MOTOR, format, 16, order, &command).unwrap(),
+        reply: FieldFrame::compile(MASTER, format, 16, order, &reply).unwrap(),
+        life_cycle: LifeCycle::ByFields { modes: ModeCodes { torque: 0, velocity: 1, position: 2 } },
+        position_reference: PositionReference::Zero,
+        position_span: None,
+        missed_reply_cycles: 3,
+    }
+}
+
+fn own(last: u8) -> OwnFrame {
+    OwnFrame { id: MOTOR, payload: [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last] }
+}
+
+/// The packed frames of CAN; in extended mode with a position of 32 bits in the reply, and with increments in the command.
+fn packed(is_extended: bool) -> FieldDriveParameters {
+    let (turn, velocity) = (LinearScale::centred(16, TAU), LinearScale::centred(12, 20.0));
+    let command = [
+        field(CommandValue::Position, FieldBits::of(0, 16), Number::Unsigned, turn),
+        field(CommandValue::Velocity, FieldBits::of(16, 12), Number::Unsigned, velocity),
+    ];
+    let (bytes, position) = if is_extended {
+        let halves = FieldBits::split(BitRange { at: 48, width: 16 }, BitRange { at: 8, width: 16 });
+        (8, counts(ReplyValue::Position, halves))
+    } else {
+        (6, field(ReplyValue::Position, FieldBits::of(8, 16), Number::Unsigned, turn))
+    };
+    let reply = [plain(ReplyValue::Sender, 0), position];
+    let (format, order) = (FrameFormat::Classic, ByteOrder::BigEndian);
+    FieldDriveParameters {
+        command: FieldFrame::compile(MOTOR, format, 8, order, &command).unwrap(),
+        reply: FieldFrame::compile(MASTER, format, bytes, order, &reply).unwrap(),
+        life_cycle: LifeCycle::ByFrames(OwnFrames {
+            start: own(0xFC),
+            stop: own(0xFD),
+            zero: Some(own(0xFE)),
+            clear: None,
+            torque: Some(own(0xF9)),
+            velocity: Some(own(0xFA)),
+            position: Some(own(0xFB)),
+        }),
+        position_reference: if is_extended { PositionReference::Present } else { PositionReference::Zero },
+        position_span: is_extended.then_some(4096.0 * TAU),
+        missed_reply_cycles: 3,
+    }
+}
+
+/// How a motor is spoken to.
+#[derive(Clone, Copy, PartialEq)]
+enum Protocol {
+    Flexible,
+    Normal,
+    Extended,
+}
+
+/// A motor that goes where it is told at once, and that must never be started anywhere else than where it stands.
+struct Motor {
+    protocol: Protocol,
+    /// Counts since it was switched on.
+    position: i64,
+    zero: i64,
+    runs: bool,
+    /// The last command, as a position in counts or as an increment.
+    told: Option<i64>,
+    velocity_limit: i64,
+    zeroed: u32,
+}
+
+impl Motor {
+    fn new(protocol: Protocol, position: i64) -> Self {
+        Self { protocol, position, zero: 0, runs: false, told: None, velocity_limit: 0, zeroed: 0 }
+    }
+
+    fn drive(&self) -> FieldDrive {
+        FieldDrive::new(match self.protocol {
+            Protocol::Flexible => flexible(),
+            Protocol::Normal => packed(false),
+            Protocol::Extended => packed(true),
+        })
+    }
+
+    /// The way that it has still to go.
+    fn way(&self) -> i64 {
+        let told = self.told.expect("it is started with a command");
+        if self.protocol == Protocol::Extended { told } else { told - (self.position - self.zero) }
+    }
+
+    fn start(&mut self) {
+        // A quantum of the 16-bit position is 32 counts.
+        assert!(self.runs || self.way().abs() <= 32, "it would jump by {} counts", self.way());
+        self.runs = true;
+    }
+
+    fn clear_count(&mut self) {
+        assert!(!self.runs, "only while it is stopped");
+        self.zero = self.position;
+        self.zeroed += 1;
+    }
+
+    fn hear(&mut self, frame: &Frame) -> Frame {
+        let payload = frame.payload();
+        if self.protocol == Protocol::Flexible {
+            let high = i64::from_be_bytes(payload[..8].try_into().unwrap());
+            self.told = Some(high >> 24);
+            self.velocity_limit = i32::from_be_bytes(payload[5..9].try_into().unwrap()).into();
+            match payload[12] {
+                0 => self.runs = false,
+                _ => self.start(),
+            }
+            if payload[15] == 1 {
+                self.clear_count();
+            }
+        } else {
+            match payload {
+                [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, last] => match last {
+                    0xFC => self.start(),
+                    0xFD => self.runs = false,
+                    0xFE => self.clear_count(),
+                    0xF9..=0xFB => {}
+                    other => panic!("{other:X}"),
+                },
+                _ => {
+                    let code = i64::from(u16::from_be_bytes([payload[0], payload[1]]));
+                    self.told = Some((code - 0x8000) * 32);
+                    self.velocity_limit =
+                        i64::from(u16::from_be_bytes([payload[2], payload[3]]) >> 4) - 0x800;
+                }
+            }
+        }
+        let is_own = payload.starts_with(&[0xFF; 7]);
+        if self.runs && !is_own && self.velocity_limit > 0 {
+            self.position += self.way();
+        }
+        self.reply()
+    }
+
+    fn reply(&self) -> Frame {
+        let position = self.position - self.zero;
+        match self.protocol {
+            Protocol::Flexible => {
+                let mut payload = [0; 16];
+                payload[..5].copy_from_slice(&position.to_be_bytes()[3..]);
+                (payload[11], payload[12], payload[14], payload[15]) = (2, self.runs.into(), 0xE7, 1);
+                Frame::fd(MASTER, &payload, false).unwrap()
+            }
+            Protocol::Normal => {
+                let [high, low] = ((position / 32 + 0x8000).clamp(0, 0xFFFF) as u16).to_be_bytes();
+                Frame::of(MASTER, [1, high, low, 0x80, 0x08, 0x00])
+            }
+            Protocol::Extended => {
+                let [a, b, c, d] = (position as i32).to_be_bytes();
+                Frame::of(MASTER, [1, c, d, 0x80, 0x08, 0x00, a, b])
+            }
+        }
+    }
+}
+
+fn to(position: f64) -> FieldTargets {
+    FieldTargets { position, velocity: VELOCITY, ..FieldTargets::default() }
+}
+
+/// Cycles in which the motor hears everything and is heard.
+fn run(drive: &mut FieldDrive, motor: &mut Motor, wish: LifeWish, position: f64, cycles: usize) {
+    for _ in 0..cycles {
+        let reply = motor.hear(&drive.step(wish, &to(position)));
+        drive.receive(&reply).unwrap();
+    }
+}
+
+const PROTOCOLS: [Protocol; 3] = [Protocol::Flexible, Protocol::Normal, Protocol::Extended];
+
+#[test]
+fn a_motor_is_started_where_it_stands_follows_its_set_points_and_is_stopped() {
+    for protocol in PROTOCOLS {
+        let mut motor = Motor::new(protocol, 320_000);
+        let mut drive = motor.drive();
+        assert!(drive.is_stale() && drive.position().is_none());
+        // It stands until it runs, whatever the set-points are.
+        while !matches!(drive.state(), LifeState::Running(_)) {
+            run(&mut drive, &mut motor, RUN, -3.0, 1);
+            assert_eq!(motor.position, 320_000);
+        }
+        for target in [1.9, 2.0, 0.5, -1.25] {
+            run(&mut drive, &mut motor, RUN, target, 2);
+            assert!((drive.position().unwrap() - target).abs() <= 32.0 * COUNT, "{target}");
+            assert!((motor.position as f64 * COUNT - target).abs() <= 32.0 * COUNT, "{target}");
+        }
+        run(&mut drive, &mut motor, LifeWish::Stop, 2.0, 4);
+        assert_eq!((drive.state(), motor.runs), (LifeState::Stopped, false));
+        // Somebody turns it by hand: it is started again where it is then.
+        motor.position = -100_000;
+        run(&mut drive, &mut motor, RUN, 2.0, 12);
+        assert!((motor.position as f64 * COUNT - 2.0).abs() <= 32.0 * COUNT);
+    }
+}
+
+#[test]
+fn the_position_goes_on_where_the_report_of_32_bits_wraps_around() {
+    let edge = i64::from(i32::MAX);
+    let mut motor = Motor::new(Protocol::Extended, edge - 1_000);
+    let mut drive = motor.drive();
+    run(&mut drive, &mut motor, RUN, (edge - 1_000) as f64 * COUNT, 10);
+    for _ in 0..3 {
+        for step in [100_000, 300_000, 200_000, -50_000, -400_000] {
+            let target = (edge + step) as f64 * COUNT;
+            run(&mut drive, &mut motor, RUN, target, 2);
+            assert!((drive.position().unwrap() - target).abs() < 33.0 * COUNT, "{step}");
+            assert!((motor.position - edge - step).abs() < 33, "{step}");
+        }
+    }
+}
+
+#[test]
+fn zero_is_set_only_while_the_motor_is_stopped_and_the_count_begins_anew() {
+    for protocol in PROTOCOLS {
+        let mut motor = Motor::new(protocol, 200_000);
+        let mut drive = motor.drive();
+        run(&mut drive, &mut motor, RUN, 1.0, 10);
+        run(&mut drive, &mut motor, LifeWish::Zero, 1.0, 10);
+        assert_eq!((motor.zeroed, drive.state()), (1, LifeState::Told(Setting::Zero)));
+        assert!(drive.position().unwrap().abs() < 1e-9);
+        run(&mut drive, &mut motor, RUN, 0.25, 10);
+        assert!((drive.position().unwrap() - 0.25).abs() <= 32.0 * COUNT);
+    }
+}
+
+#[test]
+fn a_motor_that_is_not_heard_for_longer_than_is_bridged_is_stale_until_it_is_heard_again() {
+    let mut motor = Motor::new(Protocol::Normal, 0);
+    let mut drive = motor.drive();
+    run(&mut drive, &mut motor, RUN, 0.0, 10);
+    for missed in 1..=6 {
+        drive.step(RUN, &to(0.0));
+        assert_eq!(drive.is_stale(), missed > 3, "{missed} missed");
+    }
+    // A frame of another length, as in the other mode, is no reply.
+    let other = Motor::new(Protocol::Extended, 77_777).reply();
+    assert!(drive.receive(&other).is_err());
+    assert!(drive.is_stale() && drive.position().unwrap().abs() < 1e-9);
+    drive.receive(&motor.reply()).unwrap();
+    assert!(!drive.is_stale());
+}
+
+#[test]
+fn a_motor_shows_what_its_replies_carry_and_nothing_else() {
+    let mut motor = Motor::new(Protocol::Flexible, 0);
+    let mut drive = motor.drive();
+    assert_eq!(drive.reported(ReplyValue::Temperature), None);
+    run(&mut drive, &mut motor, LifeWish::Stop, 0.0, 1);
+    let shown =
+        [ReplyValue::Temperature, ReplyValue::Sender, ReplyValue::Torque].map(|value| drive.reported(value));
+    assert_eq!(shown, [Some(-25.0), Some(1.0), None]);
+    // It takes its torque away by itself: it gets no further set-point.
+    run(&mut drive, &mut motor, RUN, 1.0, 10);
+    motor.runs = false;
+    drive.receive(&motor.reply()).unwrap();
+    assert_eq!(drive.state(), LifeState::Stopping);
+    let frame = drive.step(LifeWish::Stop, &to(2.0));
+    assert_eq!(frame.payload()[12], 0);
+}

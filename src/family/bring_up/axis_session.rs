@@ -1,0 +1,343 @@
+//! The session of a bring-up or shutdown with the drive of one axis: reads, compares, writes, and keeps facts.
+//!
+//! Each access has a name in the failure that it may cause: what was expected, and what was received. An access to an
+//! object that a drive may lack is an optional one: it returns `false` then, and notes the object in
+//! [`AxisFacts::absent`].
+//!
+//! In a rehearsal there is no drive: each read gives what is expected, and each write is accepted and listed.
+
+use std::cell::{Cell, Ref, RefCell};
+
+use takt_rt::Nanoseconds;
+
+use super::check::Check;
+use super::facts::AxisFacts;
+use super::failure::{Content, FailureCause};
+use super::stages::BringUpTiming;
+use crate::canopen::dcf::Download;
+use crate::canopen::object::{Object, ObjectAddress};
+use crate::canopen::sdo::{AbortCode, SdoError, Transfer};
+use crate::config::{Axis, Config};
+use crate::procedure::{Access, CanopenSession, POLL_NS};
+
+/// The result of a step of bring-up or shutdown.
+pub type StepResult<T = ()> = Result<T, FailureCause>;
+
+/// What happens when an access fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OnFailure {
+    /// The procedure ends.
+    End,
+    /// The procedure goes on, unless the drive no longer answers. The first failure is reported at the end.
+    GoOn,
+}
+
+/// A failure with the remedy of its step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StepFailure {
+    pub cause: FailureCause,
+    pub advice: &'static str,
+}
+
+/// A session with the drive of one axis.
+pub struct AxisSession<'a> {
+    /// The whole configuration.
+    pub config: &'a Config,
+    /// The axis.
+    pub axis: &'a Axis,
+    /// The timeouts.
+    pub timing: BringUpTiming,
+    pub(super) bus: CanopenSession,
+    on_failure: OnFailure,
+    facts: RefCell<AxisFacts>,
+    /// The remedy of the current step.
+    advice: Cell<&'static str>,
+    first_failure: Cell<Option<StepFailure>>,
+    /// In a rehearsal: every number that was written, in order.
+    rehearsed: Option<RefCell<Vec<(ObjectAddress, i64)>>>,
+}
+
+impl<'a> AxisSession<'a> {
+    /// A session with the drive that `bus` leads to. `facts` is what is known of it.
+    pub(super) fn new(
+        bus: CanopenSession,
+        config: &'a Config,
+        axis: &'a Axis,
+        timing: BringUpTiming,
+        on_failure: OnFailure,
+        facts: AxisFacts,
+    ) -> Self {
+        Self {
+            config,
+            axis,
+            timing,
+            bus,
+            on_failure,
+            facts: RefCell::new(facts),
+            advice: Cell::new(""),
+            first_failure: Cell::new(None),
+            rehearsed: None,
+        }
+    }
+
+    /// The same procedure without a drive.
+    pub(super) fn rehearsal(self) -> Self {
+        Self { rehearsed: Some(RefCell::default()), ..self }
+    }
+
+    pub(super) fn is_rehearsal(&self) -> bool {
+        self.rehearsed.is_some()
+    }
+
+    /// Every number that was written in a rehearsal, in order.
+    pub(super) fn rehearsed(self) -> Vec<(ObjectAddress, i64)> {
+        self.rehearsed.map(RefCell::into_inner).unwrap_or_default()
+    }
+
+    /// The facts, or the first failure.
+    pub(super) fn end(self, result: StepResult) -> Result<AxisFacts, StepFailure> {
+        let failure = result.err().map(|cause| StepFailure { cause, advice: self.advice.get() });
+        match self.first_failure.get().or(failure) {
+            Some(failure) => Err(failure),
+            None => Ok(AxisFacts { emergency: self.bus.emergency(), ..self.facts.into_inner() }),
+        }
+    }
+
+    /// Begins a step: its name and its remedy, for progress and failures.
+    pub fn step(&self, name: &'static str, advice: &'static str) {
+        self.bus.step(name);
+        self.advice.set(advice);
+    }
+
+    /// What the drive has reported so far.
+    pub fn facts(&self) -> Ref<'_, AxisFacts> {
+        self.facts.borrow()
+    }
+
+    /// Keeps a fact.
+    pub fn keep(&self, keep: impl FnOnce(&mut AxisFacts)) {
+        keep(&mut self.facts.borrow_mut());
+    }
+
+    /// Reads a number, keeps it as a fact, and compares it.
+    pub async fn read(
+        &self,
+        object: Object,
+        expected: Check,
+        keep: impl FnOnce(&mut AxisFacts, i64),
+    ) -> StepResult {
+        let compared = self.number(object, Access::Read, expected).await.and_then(|received| {
+            self.keep(|facts| keep(facts, received));
+            compared(object, Access::Read, expected, received)
+        });
+        self.settled(compared)
+    }
+
+    /// Reads a number from an object that the drive may lack or refuse.
+    pub async fn read_optional(
+        &self,
+        object: Object,
+        keep: impl FnOnce(&mut AxisFacts, i64),
+    ) -> StepResult<bool> {
+        let read = match self.number(object, Access::Read, Check::Any).await {
+            Ok(received) => {
+                self.keep(|facts| keep(facts, received));
+                Ok(true)
+            }
+            Err(FailureCause::Transfer { error, .. }) if self.may_refuse(error) => {
+                self.note_absent(object.address);
+                Ok(false)
+            }
+            Err(cause) => Err(cause),
+        };
+        self.settled(read)
+    }
+
+    /// Reads a text from an object that the drive may lack or refuse.
+    pub async fn read_text(
+        &self,
+        object: ObjectAddress,
+        keep: impl FnOnce(&mut AxisFacts, String),
+    ) -> StepResult<bool> {
+        if self.is_rehearsal() {
+            return self.settled(Ok(false));
+        }
+        let read = match self.bus.read_bytes(object).await {
+            Ok(uploaded) => {
+                self.keep(|facts| keep(facts, uploaded.text()));
+                Ok(true)
+            }
+            Err(SdoError::Aborted(_)) => {
+                self.note_absent(object);
+                Ok(false)
+            }
+            Err(error) => Err(FailureCause::TextTransfer { object, error }),
+        };
+        self.settled(read)
+    }
+
+    /// Reads a number again and again until it is as expected. Each is kept as a fact.
+    pub async fn wait_for(
+        &self,
+        object: Object,
+        expected: Check,
+        within_ns: Nanoseconds,
+        mut keep: impl FnMut(&mut AxisFacts, i64),
+    ) -> StepResult {
+        let began_ns = self.bus.now_ns();
+        let awaited = loop {
+            let received = match self.number(object, Access::Read, expected).await {
+                Ok(received) => received,
+                Err(cause) => break Err(cause),
+            };
+            self.keep(|facts| keep(facts, received));
+            let waited_ns = self.bus.now_ns().saturating_sub(began_ns);
+            if expected.passes(received) {
+                break Ok(());
+            } else if waited_ns >= within_ns {
+                let access = Access::Read;
+                break Err(FailureCause::Value { object, access, expected, received, waited_ns });
+            }
+            self.bus.sleep(POLL_NS).await;
+        };
+        self.settled(awaited)
+    }
+
+    /// Waits for a time; not in a rehearsal.
+    pub async fn pause(&self, duration_ns: Nanoseconds) {
+        if !self.is_rehearsal() {
+            self.bus.sleep(duration_ns).await;
+        }
+    }
+
+    /// Writes a number.
+    pub async fn write(&self, object: Object, value: i64) -> StepResult {
+        let written = self.written(object, value).await;
+        self.settled(written)
+    }
+
+    /// Writes a number to an object that the drive may lack.
+    pub async fn write_optional(&self, object: Object, value: i64) -> StepResult<bool> {
+        let written = match self.written(object, value).await {
+            Ok(()) => Ok(true),
+            Err(FailureCause::Transfer { error, .. }) if self.bus.quirks().means_absent(error) => {
+                self.note_absent(object.address);
+                Ok(false)
+            }
+            Err(cause) => Err(cause),
+        };
+        self.settled(written)
+    }
+
+    /// Writes a number and reads it back.
+    pub async fn write_and_read_back(&self, object: Object, value: i64) -> StepResult {
+        self.write_and_compare(object, value, Check::Equals(value)).await
+    }
+
+    /// Writes a number, reads it back, and compares it.
+    pub async fn write_and_compare(&self, object: Object, value: i64, expected: Check) -> StepResult {
+        let written = async {
+            self.written(object, value).await?;
+            let access = Access::ReadBack(value);
+            let received = self.number(object, access, expected).await?;
+            compared(object, access, expected, received)
+        };
+        let written = written.await;
+        self.settled(written)
+    }
+
+    /// Writes a value of a configuration file, and reads it back unless the object is write-only.
+    pub async fn write_download(&self, download: &Download) -> StepResult {
+        let written = self.written_download(download).await;
+        self.settled(written)
+    }
+
+    async fn written_download(&self, download: &Download) -> StepResult {
+        if self.is_rehearsal() {
+            return Ok(());
+        }
+        let Download { object, data } = download;
+        let (object, written) = (*object, Content::of(data));
+        let failed = |is_reading_back| {
+            move |error| FailureCause::ConfigurationTransfer {
+                object,
+                written,
+                is_reading_back,
+                error,
+                means_absent: self.bus.quirks().means_absent(error),
+            }
+        };
+        let transfer = Transfer::Download { object, data: data.clone() };
+        self.bus.exchange(transfer).await.map_err(failed(false))?;
+        match self.bus.read_bytes(object).await {
+            Err(SdoError::Aborted(AbortCode::WriteOnly)) => Ok(()),
+            Err(error) => Err(failed(true)(error)),
+            Ok(received) if download.is_held_by(&received) => Ok(()),
+            Ok(received) => {
+                let received = Content::of(&received.bytes);
+                Err(FailureCause::ConfigurationDiffers { object, written, received })
+            }
+        }
+    }
+
+    async fn written(&self, object: Object, value: i64) -> StepResult {
+        let data = object.data_type.encode(value).ok_or(FailureCause::DoesNotFit { object, value })?;
+        if let Some(rehearsed) = &self.rehearsed {
+            rehearsed.borrow_mut().push((object.address, value));
+            return Ok(());
+        }
+        let failed = |error| FailureCause::Transfer { object, access: Access::Write(value), error };
+        let transfer = Transfer::Download { object: object.address, data };
+        self.bus.exchange(transfer).await.map(|_| ()).map_err(failed)
+    }
+
+    async fn number(&self, object: Object, access: Access, expected: Check) -> StepResult<i64> {
+        if self.is_rehearsal() {
+            return Ok(expected.example());
+        }
+        let failed = |error| FailureCause::Transfer { object, access, error };
+        let uploaded = self.bus.read_bytes(object.address).await.map_err(failed)?;
+        let number = if self.bus.quirks().has_other_lengths {
+            uploaded.number_of_any_length(object.data_type)
+        } else {
+            uploaded.number(object.data_type)
+        };
+        number.ok_or(FailureCause::Length { object, received: uploaded.bytes.len() })
+    }
+
+    /// Whether an object that may be absent is so by this error. Some drives abort with a code that has another meaning.
+    fn may_refuse(&self, error: SdoError) -> bool {
+        matches!(error, SdoError::Aborted(_)) || self.bus.quirks().means_absent(error)
+    }
+
+    /// Notes that the drive does not have the object.
+    pub fn note_absent(&self, object: ObjectAddress) {
+        self.keep(|facts| facts.absent.push(object));
+    }
+
+    /// Ends an access: counts it, and decides whether the procedure goes on after its failure.
+    pub(super) fn settled<T: Default>(&self, result: StepResult<T>) -> StepResult<T> {
+        match result {
+            Err(cause) if self.on_failure == OnFailure::GoOn && !cause.is_silence() => {
+                if self.first_failure.get().is_none() {
+                    self.bus.keep_failing_step();
+                    self.first_failure.set(Some(StepFailure { cause, advice: self.advice.get() }));
+                }
+                self.bus.count_done();
+                Ok(T::default())
+            }
+            Err(cause) => Err(cause),
+            Ok(value) => {
+                self.bus.count_done();
+                Ok(value)
+            }
+        }
+    }
+}
+
+fn compared(object: Object, access: Access, expected: Check, received: i64) -> StepResult {
+    if expected.passes(received) {
+        return Ok(());
+    }
+    Err(FailureCause::Value { object, access, expected, received, waited_ns: 0 })
+}

@@ -1,0 +1,35 @@
+//! What differs between drive families: process data, bring-up, parameters.
+//!
+//! Bring-up and shutdown of a [family](crate::family) are plain async functions over an [`AxisSession`], which read like the
+//! manual's own list. What CiA 402 drives have in common is in functions that any family may call: [`identity`],
+//! [`configuration_file`], [`pdo_mapping`], [`heartbeat`], [`actual_position`]. [`BringUp`] and [`Shutdown`] run them for all
+//! axes in parallel, with the engine of [`procedure`](crate::procedure).
+//!
+//! [`AxisFacts`] has what the drive has reported, [`BringUpError`] what failed. [`ProcessData`] says which objects each PDO
+//! carries: as written to the drive, or as the drive reports it (`reported_mapping`).
+
+pub mod actual_position;
+mod axis_session;
+pub mod axis_units;
+mod check;
+pub mod configuration_file;
+mod facts;
+mod failure;
+pub mod heartbeat;
+pub mod identity;
+pub(crate) mod mapped_objects;
+mod network_state;
+pub mod pdo_mapping;
+mod process_data;
+mod reported_mapping;
+mod stages;
+
+pub use crate::procedure::Access;
+pub use axis_session::{AxisSession, StepResult};
+pub use check::Check;
+pub use facts::{AxisFacts, DeviceIdentity, DeviceTexts};
+pub use failure::{AxisFailure, BringUpError, Content, FailureCause, ProbeResult};
+pub use network_state::RESTART_STEP;
+pub use process_data::{PdoPlan, ProcessData, Reply};
+pub use reported_mapping::MappingProblem;
+pub use stages::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage, overwritten};

@@ -1,0 +1,372 @@
+//! Brings drives up and shuts them down, all axes of all buses in parallel.
+//!
+//! [`BringUp`] has two stages. [`Stage::Configure`] leaves every drive in NMT pre-operational, without torque, with its
+//! PDO mapping and mode set, and its target at the actual position. Then [`BringUp::start`] begins [`Stage::Start`],
+//! which makes the nodes operational; after that SYNC may begin. [`Shutdown`] follows the last motion.
+//!
+//! There is no input and output here: [`BringUp::poll`] returns frames, [`BringUp::receive`] takes them. Both may be
+//! called at any rate. Each drive has at most one SDO transfer under way.
+//!
+//! If the configuration gives the master a heartbeat, the drives monitor it from the end of [`Stage::Configure`] on.
+//! The caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
+
+use std::rc::Rc;
+use std::task::{Context, Waker};
+
+use takt_rt::{Frame, Nanoseconds};
+
+use super::axis_session::{AxisSession, OnFailure, StepFailure, StepResult};
+use super::facts::AxisFacts;
+use super::failure::{AxisFailure, BringUpError, FailureCause};
+use super::network_state::RESTART_STEP;
+use crate::canopen::object::ObjectAddress;
+use crate::canopen::sdo;
+use crate::config::{Axis, Config};
+use crate::family::{self, SettingUp};
+use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, SdoQuirks};
+
+/// Number of restarts of a drive after which its configuration gives up.
+const MAX_RESTARTS: u8 = 3;
+
+/// The timeouts of bring-up and shutdown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BringUpTiming {
+    /// Timeout of a node's boot-up after a reset. It includes the boot time after power-up (eRob: 8 s).
+    pub boot_up_timeout_ns: Nanoseconds,
+    /// Interval between two resets of a node that does not boot.
+    pub reset_repeat_ns: Nanoseconds,
+    /// Timeout of a mode change, a state change or standstill.
+    pub confirm_timeout_ns: Nanoseconds,
+    /// SDO reply timeout and retries.
+    pub sdo: sdo::SdoTiming,
+}
+
+impl Default for BringUpTiming {
+    fn default() -> Self {
+        Self {
+            boot_up_timeout_ns: 12_000_000_000,
+            // Not a divisor of 8 s: a drive with that boot time would be reset again just after it has booted.
+            reset_repeat_ns: 700_000_000,
+            confirm_timeout_ns: 2_000_000_000,
+            sdo: sdo::SdoTiming::default(),
+        }
+    }
+}
+
+/// The stage of a [`BringUp`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// From any state to pre-operational, configured, without torque.
+    Configure,
+    /// From there to operational.
+    Start,
+}
+
+/// The progress of a bring-up or shutdown, for a progress bar.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BringUpProgress {
+    /// 0 to 1.
+    pub fraction: f64,
+    /// The step of the slowest axis; empty when all axes are done.
+    pub step: &'static str,
+    /// The slowest axis, an index into the configuration.
+    pub axis: usize,
+}
+
+/// Brings up every axis of a configuration.
+#[derive(Debug)]
+pub struct BringUp {
+    config: Rc<Config>,
+    timing: BringUpTiming,
+    group: Group,
+    stage: Stage,
+}
+
+/// [`BringUp::start`] was called before [`Stage::Configure`] had succeeded, or a second time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the drives are not configured yet, or have already been started")]
+pub struct NotConfigured;
+
+/// The objects to which bring-up writes another value than the configuration file of an axis (`dcf`) has for them.
+pub fn overwritten(config: &Config, axis: &Axis) -> Vec<ObjectAddress> {
+    let Some(file) = &axis.dcf else { return vec![] };
+    // The last write of each object counts: a PDO is made invalid before it is made valid.
+    let mut last: Vec<(ObjectAddress, i64)> = vec![];
+    for (object, value) in rehearse(Part::Configure, config, axis).writes {
+        last.retain(|(address, _)| *address != object);
+        last.push((object, value));
+    }
+    let is_other = |(address, value): &(ObjectAddress, i64)| {
+        let in_file = file.downloads.iter().rev().find(|download| download.object == *address);
+        in_file.is_some_and(|download| !value.to_le_bytes().starts_with(&download.data))
+    };
+    last.into_iter().filter(is_other).map(|(address, _)| address).collect()
+}
+
+impl BringUp {
+    /// Begins with [`Stage::Configure`] for every axis. Nothing is sent before [`BringUp::poll`].
+    pub fn new(config: &Config) -> Self {
+        Self::with_timing(config, BringUpTiming::default())
+    }
+
+    /// As [`BringUp::new`], with other timeouts.
+    pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
+        let config = Rc::new(config.clone());
+        let mut group = Group::new(&config, timing);
+        group.begin(Part::Configure, &config, timing, &[]);
+        Self { config, timing, group, stage: Stage::Configure }
+    }
+
+    /// Begins [`Stage::Start`]. The outcome is `None` again until this stage is done. Operational nodes wait for SYNC.
+    pub fn start(&mut self) -> Result<(), NotConfigured> {
+        match (self.stage, self.outcome()) {
+            (Stage::Configure, Some(Ok(facts))) => {
+                self.stage = Stage::Start;
+                self.group.begin(Part::Start, &self.config, self.timing, &facts);
+                Ok(())
+            }
+            _ => Err(NotConfigured),
+        }
+    }
+
+    /// The current or last stage.
+    pub const fn stage(&self) -> Stage {
+        self.stage
+    }
+
+    /// Advances to `now_ns`, and sends each frame that is due with the index of its bus.
+    pub fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(usize, Frame)) {
+        self.group.poll(now_ns, send);
+    }
+
+    /// Takes a frame received on the bus with this index. Frames of other nodes are ignored.
+    pub fn receive(&mut self, bus: usize, frame: &Frame) {
+        self.group.receive(bus, frame);
+    }
+
+    /// The progress of the current stage.
+    pub fn progress(&self) -> BringUpProgress {
+        self.group.progress()
+    }
+
+    /// The facts of all drives in the order of the configuration, or all failures; `None` while the current stage runs.
+    /// A drive fault does not fail the bring-up: see [`AxisFacts::fault`].
+    pub fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
+        self.group.outcome()
+    }
+}
+
+/// Shuts every axis of a configuration down: NMT pre-operational, without torque, heartbeat watchdog off. The cycle
+/// should have disabled the axes before; an axis that still has torque is stopped and disabled.
+///
+/// The master's heartbeat must continue until this is done.
+#[derive(Debug)]
+pub struct Shutdown {
+    group: Group,
+}
+
+impl Shutdown {
+    /// Prepares the shutdown of every axis. Nothing is sent before [`Shutdown::poll`].
+    pub fn new(config: &Config) -> Self {
+        Self::with_timing(config, BringUpTiming::default())
+    }
+
+    /// As [`Shutdown::new`], with other timeouts.
+    pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
+        let mut group = Group::new(config, timing);
+        group.begin(Part::ShutDown, &Rc::new(config.clone()), timing, &[]);
+        Self { group }
+    }
+
+    /// Advances to `now_ns`, and sends each frame that is due with the index of its bus.
+    pub fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(usize, Frame)) {
+        self.group.poll(now_ns, send);
+    }
+
+    /// Takes a frame received on the bus with this index. Frames of other nodes are ignored.
+    pub fn receive(&mut self, bus: usize, frame: &Frame) {
+        self.group.receive(bus, frame);
+    }
+
+    /// The progress.
+    pub fn progress(&self) -> BringUpProgress {
+        self.group.progress()
+    }
+
+    /// The facts of all drives in the order of the configuration, or all failures; `None` while it runs.
+    pub fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
+        self.group.outcome()
+    }
+}
+
+/// The axes of a configuration, and their running procedures.
+#[derive(Debug)]
+struct Group {
+    members: Vec<Member>,
+    procedures: Parallel<CanopenClient, AxisFacts, StepFailure>,
+}
+
+#[derive(Debug)]
+struct Member {
+    name: String,
+    bus: usize,
+    bus_name: String,
+    node: u8,
+    session: CanopenSession,
+    /// The number of accesses without restarts and repetitions, for the progress.
+    accesses: usize,
+}
+
+impl Group {
+    fn new(config: &Config, timing: BringUpTiming) -> Self {
+        let members = config.axes.iter().map(|axis| Member {
+            name: axis.name.clone(),
+            bus: axis.bus,
+            bus_name: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
+            node: axis.node,
+            session: session(axis, timing),
+            accesses: 0,
+        });
+        Self { members: members.collect(), procedures: Parallel::new([]) }
+    }
+
+    /// Begins a part of every axis. `facts` is what is known of each drive; without it, nothing is known.
+    fn begin(&mut self, part: Part, config: &Rc<Config>, timing: BringUpTiming, facts: &[AxisFacts]) {
+        let mut facts = facts.iter().cloned();
+        let begun = self.members.iter_mut().zip(&config.axes).map(|(member, axis)| {
+            let unknown = || AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
+            let facts = facts.next().unwrap_or_else(unknown);
+            member.accesses = rehearse(part, config, axis).accesses;
+            member.session.begin_again();
+            // The progress shows it before the first poll.
+            member.session.resume_step(RESTART_STEP);
+            let (session, config, axis) = (member.session.clone(), Rc::clone(config), axis.clone());
+            let work = async move {
+                let c = AxisSession::new(session, &config, &axis, timing, part.on_failure(), facts);
+                let result = carry_out(part, &c).await;
+                c.end(result)
+            };
+            (member.bus, Procedure::new(member.session.clone(), work))
+        });
+        self.procedures = Parallel::new(begun);
+    }
+
+    fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(usize, Frame)) {
+        self.procedures.poll(now_ns, send);
+    }
+
+    fn receive(&mut self, bus: usize, frame: &Frame) {
+        self.procedures.receive(bus, frame);
+    }
+
+    fn progress(&self) -> BringUpProgress {
+        let of_axes = self.members.iter().zip(self.procedures.procedures()).enumerate();
+        let open = of_axes.filter(|(_, (_, procedure))| procedure.outcome().is_none());
+        let slowest = open.min_by_key(|(_, (member, _))| member.session.done());
+        let sum: f64 = self.members.iter().map(Member::fraction).sum();
+        BringUpProgress {
+            fraction: if slowest.is_none() { 1.0 } else { sum / self.members.len() as f64 },
+            step: slowest.map_or("", |(_, (member, _))| member.session.step_name()),
+            axis: slowest.map_or(0, |(index, _)| index),
+        }
+    }
+
+    fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
+        let (mut facts, mut failures) = (vec![], vec![]);
+        for (axis, (member, procedure)) in self.members.iter().zip(self.procedures.procedures()).enumerate() {
+            match procedure.outcome()? {
+                Ok(of_axis) => facts.push(of_axis.clone()),
+                Err(error) => failures.push(member.failure(axis, error.step, error.failure)),
+            }
+        }
+        Some(if failures.is_empty() { Ok(facts) } else { Err(BringUpError { failures }) })
+    }
+}
+
+impl Member {
+    /// The finished part, 0 to 1.
+    fn fraction(&self) -> f64 {
+        if self.accesses == 0 { 1.0 } else { (self.session.done() as f64 / self.accesses as f64).min(1.0) }
+    }
+
+    fn failure(&self, axis: usize, step: &'static str, failure: StepFailure) -> AxisFailure {
+        AxisFailure {
+            axis,
+            name: self.name.clone(),
+            bus: self.bus_name.clone(),
+            node: self.node,
+            step,
+            cause: failure.cause,
+            emergency: self.session.emergency(),
+            step_advice: failure.advice,
+        }
+    }
+}
+
+/// A part of a drive's life that has a procedure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Configure,
+    Start,
+    ShutDown,
+}
+
+impl Part {
+    /// The procedure of the drive's family.
+    fn of_family<'a>(self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        let family = family::of(&c.axis.drive);
+        match self {
+            Self::Configure => family.configure(c),
+            Self::Start => family.start(c),
+            Self::ShutDown => family.shut_down(c),
+        }
+    }
+
+    const fn on_failure(self) -> OnFailure {
+        match self {
+            Self::Configure | Self::Start => OnFailure::End,
+            Self::ShutDown => OnFailure::GoOn,
+        }
+    }
+}
+
+fn session(axis: &Axis, timing: BringUpTiming) -> CanopenSession {
+    let quirks = SdoQuirks { timing: timing.sdo, ..family::of(&axis.drive).sdo_quirks() };
+    CanopenSession::new(CanopenClient::new(axis.node, quirks))
+}
+
+/// Carries out a part, and watches for restarts of the drive: its configuration is then done again, and another part
+/// fails.
+async fn carry_out<'a>(part: Part, c: &'a AxisSession<'a>) -> StepResult {
+    loop {
+        let work = part.of_family(c);
+        if let Some(result) = c.bus.give_up_when(|| c.bus.has_restarted(), work).await {
+            return result;
+        }
+        c.bus.accept_restart();
+        c.keep(|facts| facts.restarts = facts.restarts.saturating_add(1));
+        let times = c.facts().restarts;
+        if part != Part::Configure || times > MAX_RESTARTS {
+            return Err(FailureCause::Restarted { times });
+        }
+        c.bus.reset_transfer();
+        c.bus.begin_again();
+    }
+}
+
+/// What a part does when the drive answers as expected.
+struct Rehearsal {
+    accesses: usize,
+    /// Every number that it writes, in order. Values of a configuration file are not listed.
+    writes: Vec<(ObjectAddress, i64)>,
+}
+
+fn rehearse(part: Part, config: &Config, axis: &Axis) -> Rehearsal {
+    let timing = BringUpTiming::default();
+    let session = session(axis, timing);
+    let facts = AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
+    let c = AxisSession::new(session.clone(), config, axis, timing, part.on_failure(), facts).rehearsal();
+    // Nothing is waited for without a drive, so one poll is enough.
+    let _ = part.of_family(&c).as_mut().poll(&mut Context::from_waker(Waker::noop()));
+    Rehearsal { accesses: session.done(), writes: c.rehearsed() }
+}
