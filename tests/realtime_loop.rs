@@ -106,7 +106,7 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         Watched(port)
     });
     let work = LoopParts {
-        engine: Box::new(assemble::engine(&config).unwrap()),
+        engine: assemble::engine(&config).unwrap(),
         plan: assemble::slot_plan(&config),
         ports: ports.collect(),
         host: rt,

@@ -57,7 +57,7 @@ fn run<P: BusPort + Send + 'static>(
         })
         .unzip();
     let work = LoopParts {
-        engine: Box::new(assemble::engine(config).unwrap()),
+        engine: assemble::engine(config).unwrap(),
         plan: assemble::slot_plan(config),
         ports,
         host: rt,

@@ -68,11 +68,11 @@ pub fn slot_plan(config: &Config) -> SlotPlan {
     SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns)
 }
 
-/// The engine of a configuration.
+/// The engine of a configuration. It is a few hundred kilobytes, so it is on the heap, and not on the stack of each caller.
 ///
 /// # Errors
 /// See [`AssembleError`]. A configuration that has passed its checks gives no error.
-pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
+pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
     config.validate()?;
     let period_ns = config.cycle.period_ns;
     let cycles = |ns: u64| u32::try_from(ns.div_ceil(period_ns.max(1))).unwrap_or(u32::MAX);
@@ -95,7 +95,7 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         cycles: cycles(ns).max(1),
         timeout_cycles: cycles(config.master.heartbeat_timeout_ns),
     });
-    Engine::new(EngineParameters {
+    let engine = Engine::new(EngineParameters {
         period_ns,
         axes,
         groups: groups(config),
@@ -113,7 +113,8 @@ pub fn engine(config: &Config) -> Result<Engine, AssembleError> {
         },
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
-    .map_err(AssembleError::Engine)
+    .map_err(AssembleError::Engine)?;
+    Ok(Box::new(engine))
 }
 
 /// The groups with their numbers in place of the names. A checked configuration has no number that does not fit.

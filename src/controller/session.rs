@@ -180,7 +180,7 @@ fn lead_as_owner(
     mut ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
-    let engine = Box::new(assemble::engine(config)?);
+    let engine = assemble::engine(config)?;
     let (ports, traces) = open_ports(config, options.fault_injector.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = match remote {

@@ -155,7 +155,7 @@ impl<P: BusPort> VirtualRun<P> {
         config: &Config,
         ports: Vec<P>,
     ) -> Result<(Self, LogSide), AssembleError> {
-        let engine = Box::new(assemble::engine(config)?);
+        let engine = assemble::engine(config)?;
         let (mut rt, host, log) = channels(&ChannelSizes::of(config));
         rt.measure_callbacks_by(CallbackClock::Virtual(0));
         let period_ns = config.cycle.period_ns.max(1);

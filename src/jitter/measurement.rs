@@ -139,7 +139,7 @@ pub fn measure(
     let has_bus = !ports.is_empty();
     let (rt, mut host, mut log) = channels(&ChannelSizes::of(&config));
     let work = LoopParts {
-        engine: Box::new(assemble::engine(&config)?),
+        engine: assemble::engine(&config)?,
         plan: SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns),
         ports,
         host: rt,

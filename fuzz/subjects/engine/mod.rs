@@ -184,7 +184,7 @@ impl HostInterface for Hall {
 
 struct Machine {
     config: &'static Config,
-    engine: Engine,
+    engine: Box<Engine>,
     hall: Hall,
     drives: Vec<ObedientDrive>,
     watch: Watch,
