@@ -25,6 +25,7 @@ pub type Result<T = (), E = Error> = std::result::Result<T, E>;
 /// }
 /// ```
 #[derive(thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// A configuration cannot be used.
     #[error(transparent)]

@@ -71,15 +71,16 @@ pub mod doctor;
 mod error;
 pub mod family;
 pub mod faults;
-pub mod frame_time;
+mod frame_time;
 pub mod jitter;
 pub mod link;
 pub mod play;
+#[doc(hidden)]
 pub mod printable;
 pub mod procedure;
 pub mod schedule;
 pub mod sim;
-pub mod sleep_alignment;
+mod sleep_alignment;
 mod source_text;
 pub mod telemetry;
 mod text_file;

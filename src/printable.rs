@@ -20,7 +20,7 @@ pub fn printable_path(path: &Path) -> String {
 }
 
 /// The beginning of a text that may be of any length, for a message.
-pub fn excerpt(text: &str) -> String {
+pub(crate) fn excerpt(text: &str) -> String {
     const LETTERS: usize = 80;
     let mut shown = printable(text.get(..letter_start(text, 4 * LETTERS)).unwrap_or_default());
     if let Some((end, _)) = shown.char_indices().nth(LETTERS) {
@@ -31,7 +31,7 @@ pub fn excerpt(text: &str) -> String {
 }
 
 /// The last beginning of a letter at or before a byte; the end of a text that is shorter.
-pub fn letter_start(text: &str, at: usize) -> usize {
+pub(crate) fn letter_start(text: &str, at: usize) -> usize {
     let is_start = |at: &usize| text.is_char_boundary(*at);
     (0..=at.min(text.len())).rev().find(is_start).unwrap_or(0)
 }

@@ -108,7 +108,8 @@ impl CommandSlot {
         match (object.index, object.subindex) {
             (0x6040, 0) => Self::Controlword,
             (0x6060, 0) => Self::OperationMode,
-            (0x607A, 0) => Self::TargetPosition,
+            // 60C1:1, the target of interpolated position, is a position as well.
+            (0x607A, 0) | (0x60C1, 1) => Self::TargetPosition,
             (0x60FF, 0) => Self::TargetVelocity,
             (0x6071, 0) => Self::TargetTorque,
             (0x60B1, 0) => Self::VelocityOffset,

@@ -81,6 +81,7 @@ pub struct ChannelSizes {
 
 /// Why a request or frame was not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ChannelError {
     /// The channel is full: the real-time thread does not run, or gets too much.
     #[error("the channel to the real-time thread is full")]

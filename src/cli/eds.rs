@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use takt::canopen::eds::{self, Findings, Severity};
+use takt::family::cia402;
 
 use super::exit::Exit;
 use super::print;
@@ -22,6 +23,12 @@ pub struct Arguments {
     /// The node ID that replaces $NODEID; a DCF has its own
     #[arg(long, value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
+    /// Print a configuration to start with, for a drive that this file describes
+    #[arg(long, conflicts_with = "json")]
+    config: bool,
+    /// The quirks of the drive, for --config
+    #[arg(long, value_name = "FILE", requires = "config")]
+    quirks: Option<PathBuf>,
     /// Print one JSON object instead of tables
     #[arg(long)]
     json: bool,
@@ -29,6 +36,9 @@ pub struct Arguments {
 
 /// Reads the file and prints it. The exit code is 0 when it is usable, else 2.
 pub fn run(arguments: &Arguments) -> Exit {
+    if arguments.config {
+        return starting_configuration(arguments);
+    }
     let loaded = match eds::load(&arguments.file) {
         Ok(loaded) => loaded,
         Err(findings) => {
@@ -51,6 +61,20 @@ pub fn run(arguments: &Arguments) -> Exit {
         show(loaded.warnings);
     }
     exit
+}
+
+/// Prints a configuration with one axis.
+fn starting_configuration(arguments: &Arguments) -> Exit {
+    match cia402::Device::load(&arguments.file, arguments.quirks.as_deref()) {
+        Ok(device) => {
+            let node = arguments.node.or(device.dictionary.commissioned_node()).unwrap_or(1);
+            print::text(&cia402::starting_configuration(&device, &arguments.file, node), Exit::Done)
+        }
+        Err(reason) => {
+            say!("takt: {reason}");
+            Exit::Usage
+        }
+    }
 }
 
 /// A file that cannot be used, as an object.

@@ -1,4 +1,6 @@
-//! `takt sim`: the configured drives, simulated on real interfaces.
+//! `takt sim`: the configured drives, or one made from its data sheet, simulated on real interfaces.
+
+mod data_sheet;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -20,12 +22,14 @@ use super::exit::Exit;
 use super::interruption;
 use super::lss::SimulatedDevice;
 use super::usage_error::UsageError;
+use data_sheet::DataSheetArguments;
 
 /// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// The configuration (TOML)
-    config: PathBuf,
+    #[arg(required_unless_present = "sheet")]
+    config: Option<PathBuf>,
     /// Connect a bus to another interface than the configuration says: can0, vcan0 …
     #[arg(long = "bus", value_name = "NAME=INTERFACE")]
     buses: Vec<BusOverride>,
@@ -34,6 +38,8 @@ pub struct Arguments {
     /// Without BUS it is on the first bus that has a real interface.
     #[arg(long = "lss", value_name = "[BUS=]DEVICE")]
     lss_devices: Vec<LssOnBus>,
+    #[command(flatten)]
+    data_sheet: DataSheetArguments,
 }
 
 /// A device with LSS, and the name of its bus.
@@ -57,7 +63,15 @@ impl FromStr for LssOnBus {
 
 /// Runs until Ctrl-C or SIGTERM.
 pub fn run(arguments: &Arguments) -> Exit {
-    let config = match configuration::load(&arguments.config, &arguments.buses) {
+    match data_sheet::open(&arguments.data_sheet) {
+        Err(error) => return error.print(false),
+        Ok(Some((drives, _lock))) => return host(vec![("can".to_owned(), drives)]),
+        Ok(None) => {}
+    }
+    let Some(path) = &arguments.config else {
+        return UsageError::from("name a configuration, or a data sheet with --eds".to_owned()).print(false);
+    };
+    let config = match configuration::load(path, &arguments.buses) {
         Ok(config) => config,
         Err(error) => return error.print(false),
     };
@@ -88,6 +102,13 @@ pub fn run(arguments: &Arguments) -> Exit {
         say!("takt: no bus has a real interface; name one, for example: --bus {}=vcan0", first_bus(&config));
         return Exit::Usage;
     }
+    let exit = host(drives);
+    drop(locked);
+    exit
+}
+
+/// Runs the drives of every bus until the program is asked to stop.
+fn host(drives: Vec<(String, LiveDrives)>) -> Exit {
     let is_stopped = match interruption::watch() {
         Ok(is_stopped) => is_stopped,
         Err(error) => {
@@ -112,7 +133,6 @@ pub fn run(arguments: &Arguments) -> Exit {
             }
         }
     });
-    drop(locked);
     if has_panicked.into_inner() { Exit::Stopped } else { Exit::Done }
 }
 

@@ -44,6 +44,7 @@ impl fmt::Display for Interface {
 
 /// What is wrong with the name of an interface.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum InterfaceError {
     /// A serial-line adapter, which takt does not open itself.
     #[error("takt does not open the serial adapter {device:?} itself")]

@@ -74,6 +74,7 @@ impl Config {
 
 /// Why a bus cannot be connected to another interface.
 #[derive(Clone, PartialEq, Eq, Error)]
+#[non_exhaustive]
 pub enum OverrideError {
     /// There is no such bus.
     #[error("there is no bus called {name:?}; the buses are: {known}")]

@@ -9,6 +9,7 @@ use super::quantity::{self, Quantity};
 
 /// The kinds of problems. `key` is the whole path of a key, as in `axis.limits.velocity`.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ProblemKind {
     /// The file cannot be read.
     #[error("the file cannot be read: {reason}")]

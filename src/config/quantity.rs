@@ -166,6 +166,7 @@ const UNITS: &[Unit] = &[
 
 /// Why a text is not the quantity that was asked for.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum QuantityError {
     /// It does not begin with a number.
     NoNumber,

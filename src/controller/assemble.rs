@@ -27,6 +27,7 @@ const SERVICE_FRAMES_PASSIVE: usize = 6;
 
 /// Why the real-time thread cannot execute a configuration.
 #[derive(thiserror::Error)]
+#[non_exhaustive]
 pub enum AssembleError {
     /// A value that cannot be: see [`Config::validate`].
     #[error(transparent)]

@@ -6,6 +6,7 @@ use crate::config::{Axis, Control};
 
 /// Why an axis does not take a point. rad and N·m, or m and N.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PointRefusal {
     /// A number is infinite or none.
     #[error("a number is not finite: {value:?}")]

@@ -76,6 +76,7 @@ pub struct Running {
 
 /// Why the thread could not be started.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StartError {
     /// The operating system gives no thread.
     #[error("the real-time thread could not be started: {0}")]

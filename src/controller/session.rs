@@ -75,6 +75,7 @@ pub struct Session {
 
 /// Why a run did not begin.
 #[derive(thiserror::Error)]
+#[non_exhaustive]
 pub enum SessionError {
     /// The configuration cannot be executed.
     #[error(transparent)]

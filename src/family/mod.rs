@@ -5,6 +5,7 @@
 //! of your own, so that configurations may name it.
 
 pub mod bring_up;
+pub mod cia402;
 pub mod commission;
 pub mod erob_canopen;
 mod error_words;
@@ -66,6 +67,11 @@ pub trait Family: ConfiguredFamily {
 
     /// From operational to pre-operational, without torque, and without the watchdog on the controller's heartbeat.
     fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
+
+    /// What an axis has to do without, because its drive lacks something: sentences for people.
+    fn remarks(&self, _axis: &Axis) -> Vec<&'static str> {
+        vec![]
+    }
 
     /// The protocol that a drive with this node ID may speak instead, if it can be probed for.
     fn other_protocol(&self, _node: u8) -> Option<OtherProtocol> {

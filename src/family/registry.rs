@@ -2,11 +2,11 @@
 
 use std::sync::{PoisonError, RwLock};
 
-use super::{Family, erob_canopen, yz_aim};
+use super::{Family, cia402, erob_canopen, yz_aim};
 use crate::config::DriveFamily;
 
 /// The families that come with takt.
-static SHIPPED: [&dyn Family; 2] = [&erob_canopen::ErobCanopen, &yz_aim::YzAim];
+static SHIPPED: [&dyn Family; 3] = [&erob_canopen::ErobCanopen, &yz_aim::YzAim, &cia402::Cia402];
 /// Those of the program that embeds takt.
 static REGISTERED: RwLock<Vec<&dyn Family>> = RwLock::new(vec![]);
 
@@ -43,9 +43,10 @@ pub fn named(word: &str) -> Option<&'static dyn Family> {
     all().into_iter().find(|family| family.word() == word)
 }
 
-/// What takt knows of a family. One that nobody has registered is treated as the first: [`Config::validate`] refuses it.
+/// What takt knows of a family.
 ///
-/// [`Config::validate`]: crate::config::Config::validate
+/// # Panics
+/// Nobody has registered a family of this name: a program has made a [`DriveFamily`] for which there is no [`Family`].
 pub fn of(drive: &DriveFamily) -> &'static dyn Family {
-    named(drive.word).unwrap_or(SHIPPED[0])
+    named(drive.word).expect("the family of a drive is registered")
 }

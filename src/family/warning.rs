@@ -8,7 +8,7 @@ use crate::canopen::object::ObjectAddress;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Short;
 use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Travel};
-use crate::family::bring_up;
+use crate::family::{bring_up, registry};
 
 /// A rotary axis that goes round more often than this is unusual.
 const USUAL_TURNS: f64 = 2.0;
@@ -26,6 +26,7 @@ pub struct Warning {
 
 /// What is implausible.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum WarningKind {
     /// At its velocity limit the drive turns faster than drives of its family do.
     DriveSpeed {
@@ -60,6 +61,8 @@ pub enum WarningKind {
         /// The object.
         object: ObjectAddress,
     },
+    /// The drive lacks something; the text says what is lost by that.
+    Lacks(&'static str),
     /// A velocity of a program that the drive cannot have exactly.
     RoundedVelocity {
         /// What is commanded, with its unit.
@@ -119,6 +122,7 @@ impl fmt::Display for WarningKind {
                 f,
                 "bring-up overwrites the value that `dcf` has for {object}, because the controller needs another one"
             ),
+            Self::Lacks(loss) => f.write_str(loss),
             Self::RoundedVelocity { commanded, rounded } => write!(
                 f,
                 "its drive takes whole numbers of r/min only: the program's velocity of {commanded} becomes {rounded}"
@@ -136,6 +140,7 @@ impl Config {
             kinds.extend(self.rounded_velocities(index, axis));
             let overwritten = bring_up::overwritten(self, axis);
             kinds.extend(overwritten.into_iter().map(|object| WarningKind::Overwritten { object }));
+            kinds.extend(registry::of(&axis.drive).remarks(axis).into_iter().map(WarningKind::Lacks));
             warnings.extend(kinds.into_iter().map(|kind| Warning { axis: axis.name.clone(), kind }));
         }
         warnings

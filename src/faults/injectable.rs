@@ -33,6 +33,7 @@ impl DriveEffect {
 
 /// Why a fault could not be injected.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InjectError {
     /// The port has no simulated drives.
     #[error("faults can only be injected into simulated drives")]

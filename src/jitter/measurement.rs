@@ -98,6 +98,7 @@ pub struct Measurement {
 
 /// Why there is no measurement.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum JitterError {
     /// The period is outside the range of a cycle.
     #[error("{0}")]

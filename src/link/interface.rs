@@ -68,6 +68,7 @@ pub struct ControllerTiming {
 
 /// Why an interface cannot be used. The message ends with the command that repairs it.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum InterfaceError {
     /// No interface has this name.
     #[error(

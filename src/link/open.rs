@@ -7,6 +7,7 @@ use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
 
 /// A bus that cannot be opened.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OpenError {
     /// The interface is missing, down or set up differently.
     #[error("bus `{bus}`: {error}")]

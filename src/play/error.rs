@@ -15,6 +15,7 @@ pub struct PlayFileError {
 
 /// What is wrong with a file of points.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum FileProblem {
     /// There is nothing in it.
     Empty,

@@ -92,11 +92,6 @@ impl<C: Client, T, E> Procedure<C, T, E> {
     pub fn outcome(&self) -> Option<&Result<T, ProcedureError<E>>> {
         self.outcome.as_ref()
     }
-
-    /// Its session.
-    pub fn session(&self) -> &ProcedureSession<C> {
-        &self.session
-    }
 }
 
 #[cfg(test)]

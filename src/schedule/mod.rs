@@ -28,10 +28,10 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::config::{Config, Cycle};
-use crate::frame_time::{BitRates, worst_case_bits};
 use bound::Traffic;
 use messages::BusMessage;
 
+pub use crate::frame_time::{BitCount, BitRates, FrameShape, worst_case_bits};
 pub use command_phase::{NoCommandPhase, automatic_command_phase};
 pub use messages::MessageKind;
 pub use remedy::Remedy;
@@ -146,6 +146,7 @@ pub struct MessageSchedule {
 /// Something that does not fit. Times are in ns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "what")]
+#[non_exhaustive]
 pub enum Shortfall {
     /// Feedback can arrive after the command phase has begun.
     FeedbackLate {

@@ -13,6 +13,7 @@ use crate::config::{Axis, Config, Feedback};
 /// One change that makes a bus fit without any other.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "change")]
+#[non_exhaustive]
 pub enum Remedy {
     /// Another command phase, within this range.
     CommandPhase {

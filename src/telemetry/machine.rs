@@ -119,17 +119,17 @@ impl Machine {
     }
 
     /// The name of a bus; its number if it is unknown.
-    pub fn bus_name(&self, bus: u8) -> String {
+    pub(crate) fn bus_name(&self, bus: u8) -> String {
         self.buses.get(usize::from(bus)).map_or_else(|| format!("bus {bus}"), |bus| bus.name.clone())
     }
 
     /// The name of a group; its number if it is unknown.
-    pub fn group_name(&self, group: u8) -> String {
+    pub(crate) fn group_name(&self, group: u8) -> String {
         self.groups.get(usize::from(group)).map_or_else(|| format!("group {group}"), Clone::clone)
     }
 
     /// The number of the group of each axis.
-    pub fn groups_of_axes(&self) -> Vec<usize> {
+    pub(crate) fn groups_of_axes(&self) -> Vec<usize> {
         self.axes.iter().map(|axis| axis.group).collect()
     }
 
@@ -153,7 +153,7 @@ impl Machine {
     }
 
     /// The unit of an axis.
-    pub fn axis_unit(&self, axis: u8) -> Unit {
+    pub(crate) fn axis_unit(&self, axis: u8) -> Unit {
         self.axes.get(usize::from(axis)).map_or(Unit::Radian, |axis| axis.unit)
     }
 }

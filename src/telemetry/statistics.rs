@@ -192,7 +192,7 @@ impl Statistics {
     }
 
     /// How long the calls of the callbacks of a group took; `None` if none was called.
-    pub fn callback_of(&self, group: usize) -> Option<&Latency> {
+    pub(crate) fn callback_of(&self, group: usize) -> Option<&Latency> {
         self.callbacks.get(group).and_then(Option::as_ref)
     }
 

@@ -31,13 +31,13 @@ impl WallClock {
     }
 
     /// An instant of the monotonic clock as `20250131T235959Z`, for file names.
-    pub fn file_stamp(self, at_ns: Nanoseconds) -> String {
+    pub(crate) fn file_stamp(self, at_ns: Nanoseconds) -> String {
         let ([year, month, day], [hour, minute, second]) = self.date_and_time(at_ns);
         format!("{year:04}{month:02}{day:02}T{hour:02}{minute:02}{second:02}Z")
     }
 
     /// An instant of the monotonic clock as `2025-01-31 23:59:59.123 UTC`, for people.
-    pub fn moment(self, at_ns: Nanoseconds) -> String {
+    pub(crate) fn moment(self, at_ns: Nanoseconds) -> String {
         let ([year, month, day], [hour, minute, second]) = self.date_and_time(at_ns);
         let milliseconds = self.unix_ns(at_ns) % NANOSECONDS_PER_SECOND / 1_000_000;
         format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02}.{milliseconds:03} UTC")

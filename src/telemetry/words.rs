@@ -11,7 +11,8 @@ mod rejection;
 mod stop;
 
 pub use rejection::{rejection, request};
-pub use stop::{stop, stop_cause, stop_cure};
+pub use stop::stop;
+pub(crate) use stop::{stop_cause, stop_cure};
 
 /// The name of a phase: "moving".
 pub const fn phase(phase: Phase) -> &'static str {

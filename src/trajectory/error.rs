@@ -53,6 +53,7 @@ impl fmt::Display for BrokenLimit {
 /// Why a trajectory is refused: the first thing that is wrong with it. Points and axes are counted from 0. Positions in rad (m),
 /// and seconds. Nothing has changed then.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum TrajectoryError {
     /// There is no point.
     NoPoint,

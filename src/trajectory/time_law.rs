@@ -38,6 +38,7 @@ const SHORTEST_INTERVAL_S: f64 = 2e-5;
 
 /// Why the rate of a trajectory cannot be changed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RateError {
     /// A rate is a finite number from 0 on.
     #[error("{rate} is not a rate: 1 is as written, 0 pauses")]

@@ -1,6 +1,6 @@
 //! Frames that are as long as their content can make them.
 
-use takt::frame_time::{BitRates, FrameShape, worst_case_bits};
+use takt::schedule::{BitRates, FrameShape, worst_case_bits};
 use takt::sim::WireLength;
 use takt_rt::{Frame, FrameKind, Id};
 

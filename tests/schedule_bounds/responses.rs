@@ -1,7 +1,7 @@
 //! Response times of messages that are queued at any moment.
 
 use proptest::prelude::*;
-use takt::frame_time::BitRates;
+use takt::schedule::BitRates;
 use takt::schedule::{Message, response_time};
 use takt::sim;
 use takt_rt::{Frame, FrameKind, Id};

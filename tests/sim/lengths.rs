@@ -2,7 +2,7 @@
 //! The two calculations are independent.
 
 use proptest::prelude::*;
-use takt::frame_time::{FrameShape, worst_case_bits};
+use takt::schedule::{FrameShape, worst_case_bits};
 use takt::sim::WireLength;
 use takt_rt::{Frame, Id};
 

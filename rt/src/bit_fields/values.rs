@@ -50,7 +50,7 @@ pub enum ReplyValue {
 
 /// What a field may carry in one direction.
 pub trait FieldValue: Copy {
-    /// Its place among the values of its direction, below [`SLOTS`].
+    /// Its place among the values of its direction, below 9.
     fn slot(self) -> u8;
     /// Whether a frame may have several fields with it.
     fn may_repeat(self) -> bool;

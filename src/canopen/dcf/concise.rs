@@ -9,6 +9,7 @@ const ENTRY_HEADER_BYTES: usize = 7;
 
 /// Why bytes are not a concise DCF.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ConciseError {
     /// The bytes end early.
     #[error("the bytes end within entry {entry} of {count}")]

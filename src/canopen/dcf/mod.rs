@@ -79,6 +79,7 @@ impl fmt::Display for Omission {
 
 /// Why a configuration cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DcfError {
     /// The file has errors.
     #[error("{}", findings_words(.0))]

@@ -42,6 +42,7 @@ impl EdsProblem {
 
 /// The kinds of problems.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum EdsProblemKind {
     /// The file cannot be read.
     #[error("the file cannot be read: {reason}")]

@@ -89,6 +89,7 @@ pub enum Completed {
 
 /// Why a transfer failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SdoError {
     /// No valid response arrived in time.
     #[error("no reply within {} ms in {attempts} attempts{}", reply_timeout_ns / 1_000_000, unusable_words(*.unusable))]

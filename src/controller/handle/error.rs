@@ -60,6 +60,7 @@ impl Stopped {
 
 /// Why a command was not executed. It has changed nothing.
 #[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CommandError {
     /// The number of values is not the number of axes.
     #[error("{given} values were given for {axes} axes")]
@@ -153,6 +154,7 @@ pub enum CommandError {
 
 /// Why a motion did not reach its targets.
 #[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MotionError {
     /// The callback has panicked, and the group has stopped.
     #[error("the callback has panicked ({message}): {stopped}")]

@@ -16,6 +16,7 @@ use crate::controller::point_check::{PointRefusal, check_point};
 
 /// Why points were not taken; none of them was, then.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StreamError {
     /// A point needs an entry for each axis.
     #[error("there are {axes} axes, and the point has entries for {given}")]

@@ -203,6 +203,13 @@ impl<'a> AxisSession<'a> {
         self.settled(awaited)
     }
 
+    /// Waits for a time; not in a rehearsal.
+    pub async fn pause(&self, duration_ns: Nanoseconds) {
+        if !self.is_rehearsal() {
+            self.bus.sleep(duration_ns).await;
+        }
+    }
+
     /// Writes a number.
     pub async fn write(&self, object: Object, value: i64) -> StepResult {
         let written = self.written(object, value).await;

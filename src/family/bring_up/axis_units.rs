@@ -24,3 +24,29 @@ pub fn counts(axis: &Axis, distance: f64) -> i64 {
 pub fn rounded_up(ns: Nanoseconds, unit_ns: Nanoseconds) -> i64 {
     i64::try_from(ns.div_ceil(unit_ns)).unwrap_or(i64::MAX)
 }
+
+/// The period in the form of object 60C2: `mantissa · 10^exponent` seconds with a mantissa of one byte, if possible in
+/// whole milliseconds. `None` if there is no such form: the drive then keeps its value.
+pub fn interpolation_time(period_ns: Nanoseconds) -> Option<(i64, i64)> {
+    let (mut mantissa, mut exponent) = (period_ns, -9);
+    while mantissa % 10 == 0 && exponent < -3 {
+        mantissa /= 10;
+        exponent += 1;
+    }
+    Some((u8::try_from(mantissa).ok()?.into(), exponent))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn interpolation_periods_have_a_mantissa_of_one_byte_and_a_power_of_ten() {
+        assert_eq!(interpolation_time(1_000_000), Some((1, -3)));
+        assert_eq!(interpolation_time(2_000_000), Some((2, -3)));
+        assert_eq!(interpolation_time(20_000_000), Some((20, -3)));
+        assert_eq!(interpolation_time(500_000), Some((5, -4)));
+        assert_eq!(interpolation_time(1_250_000), Some((125, -5)));
+        assert_eq!(interpolation_time(1_234_567), None);
+    }
+}

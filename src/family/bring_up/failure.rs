@@ -73,6 +73,7 @@ impl fmt::Display for AxisFailure {
 
 /// The cause of a failure: what was expected and what was received.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FailureCause {
     /// The node did not report the commanded NMT state.
     StateNotReached {

@@ -4,10 +4,11 @@ use super::axis_session::{AxisSession, StepResult};
 use super::check::Check;
 use crate::canopen::objects::*;
 
-const PROFILE_CIA402: u16 = 402;
+/// A device of the profile CiA 402.
+pub const PROFILE_CIA402: Check = Check::Profile(402);
 
-/// Compares the drive's identity with the configuration.
-pub async fn compare(c: &AxisSession<'_>) -> StepResult {
+/// Compares the drive's identity with the configuration. `unknown` is expected of a device type that is not configured.
+pub async fn compare(c: &AxisSession<'_>, unknown: Check) -> StepResult {
     c.step(
         "identity",
         "another drive than configured answers under this node ID: check the wiring and the node IDs, or correct \
@@ -16,7 +17,7 @@ pub async fn compare(c: &AxisSession<'_>) -> StepResult {
     let configured = c.axis.identity;
     let expected = |value: Option<u32>| value.map_or(Check::Any, |value| Check::Equals(value.into()));
     let device_type = configured.device_type;
-    let profile = device_type.map_or(Check::Profile(PROFILE_CIA402), |value| Check::Equals(value.into()));
+    let profile = device_type.map_or(unknown, |value| Check::Equals(value.into()));
     c.read(DEVICE_TYPE, profile, |facts, value| facts.identity.device_type = value as u32).await?;
     let vendor = expected(configured.vendor);
     c.read(VENDOR_ID, vendor, |facts, value| facts.identity.vendor_id = value as u32).await?;

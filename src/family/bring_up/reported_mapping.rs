@@ -12,6 +12,7 @@ use crate::family::{self, MappingMatch};
 
 /// Why the PDOs that the drive reports do not suit the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MappingProblem {
     /// No valid PDO carries the object.
     #[error("no valid {} carries {}, which the axis needs", direction.word(), named(*object))]

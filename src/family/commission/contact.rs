@@ -1,10 +1,11 @@
 //! First contact with a drive: checks that it answers SDO requests, and that its vendor ID is the expected one.
 
 use super::failure::Failure;
+use super::report::Report;
 use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
 use crate::canopen::nmt::NmtCommand;
-use crate::canopen::objects::{DEVICE_TYPE, VENDOR_ID};
+use crate::canopen::objects::{DEVICE_TYPE, PRODUCT_CODE, REVISION_NUMBER, VENDOR_ID};
 use crate::canopen::sdo::SdoError;
 use crate::procedure::Access;
 
@@ -52,6 +53,27 @@ pub async fn connect_family(c: &SdoSession, target: &TargetDrive) -> Result<(), 
         None => Ok(()),
         Some(expected) => Err(Failure::OtherDrive { family, expected, received }),
     }
+}
+
+/// Reads the identity into a report, and notes when the vendor is not that of the family.
+pub async fn report_identity(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<(), Failure> {
+    c.step("identity");
+    for (key, object) in [
+        ("device_type", DEVICE_TYPE),
+        ("vendor_id", VENDOR_ID),
+        ("product_code", PRODUCT_CODE),
+        ("revision_number", REVISION_NUMBER),
+    ] {
+        let value = c.read(&object).await?;
+        report.add(key, object.name, value, object.show(value));
+        if object == VENDOR_ID && s.drive.identity.vendor.is_some_and(|vendor| value != i64::from(vendor)) {
+            c.note(format!(
+                "the vendor ID is not that of {}: check that this is the intended drive",
+                s.drive.word
+            ));
+        }
+    }
+    Ok(())
 }
 
 /// Checks for firmware without CANopen, by a request in the vendor's own protocol that changes nothing.

@@ -3,7 +3,7 @@
 //! ```text
 //! task ── procedure ── takes the time and frames; returns frames, events and an outcome
 //!            │
-//!       sdo_session ── transfers, pauses and conditions to await
+//!       sdo_session ── transfers, pauses and conditions to await, each of which may be interrupted
 //!            │
 //!         family ── one folder a family: objects, alarms, motions
 //!            │

@@ -8,7 +8,7 @@ use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::config::{Axis, Control, PdoMapping};
-use crate::family::bring_up::axis_units::{counts, rounded_up};
+use crate::family::bring_up::axis_units::{counts, interpolation_time, rounded_up};
 use crate::family::bring_up::configuration_file::write_unless_in_file;
 use crate::family::bring_up::{AxisSession, Check, ProcessData, RESTART_STEP, StepResult};
 use crate::family::bring_up::{actual_position, configuration_file, heartbeat, identity, pdo_mapping};
@@ -26,7 +26,7 @@ pub(super) async fn configure(c: &AxisSession<'_>) -> StepResult {
          (1 Mbit/s), and its node ID",
     );
     c.restart_communication().await?;
-    identity::compare(c).await?;
+    identity::compare(c, identity::PROFILE_CIA402).await?;
     identity::read_texts(c).await?;
     supported_modes(c).await?;
     come_to_rest(c).await?;
@@ -120,17 +120,6 @@ async fn synchronisation(c: &AxisSession<'_>) -> StepResult {
     Ok(())
 }
 
-/// The period in the form of object 60C2: `mantissa · 10^exponent` seconds with a mantissa of one byte, if possible in
-/// whole milliseconds. `None` if there is no such form: the drive then keeps its value.
-fn interpolation_time(period_ns: Nanoseconds) -> Option<(i64, i64)> {
-    let (mut mantissa, mut exponent) = (period_ns, -9);
-    while mantissa % 10 == 0 && exponent < -3 {
-        mantissa /= 10;
-        exponent += 1;
-    }
-    Some((u8::try_from(mantissa).ok()?.into(), exponent))
-}
-
 async fn process_data(c: &AxisSession<'_>) -> StepResult {
     match c.axis.mapping {
         PdoMapping::Written => {
@@ -218,19 +207,4 @@ async fn heartbeats(c: &AxisSession<'_>) -> StepResult {
         c.write_and_read_back(COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
     }
     heartbeat::watch_master(c).await
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn interpolation_periods_have_a_mantissa_of_one_byte_and_a_power_of_ten() {
-        assert_eq!(interpolation_time(1_000_000), Some((1, -3)));
-        assert_eq!(interpolation_time(2_000_000), Some((2, -3)));
-        assert_eq!(interpolation_time(20_000_000), Some((20, -3)));
-        assert_eq!(interpolation_time(500_000), Some((5, -4)));
-        assert_eq!(interpolation_time(1_250_000), Some((125, -5)));
-        assert_eq!(interpolation_time(1_234_567), None);
-    }
 }

@@ -28,7 +28,7 @@ pub(super) async fn configure(c: &AxisSession<'_>) -> StepResult {
         "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID",
     );
     c.restart_communication().await?;
-    identity::compare(c).await?;
+    identity::compare(c, identity::PROFILE_CIA402).await?;
     come_to_rest(c).await?;
     configuration_file::write(c).await?;
     process_data(c).await?;

@@ -67,6 +67,7 @@ impl fmt::Display for Process {
 
 /// Why there is no lock.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum LockError {
     /// Another process has it.
     Held(Process),
@@ -82,6 +83,7 @@ impl From<io::Error> for LockError {
 
 /// Why a lock was not released.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReleaseError {
     /// The holder belongs to another user; only that user and root may ask.
     #[error("it belongs to another user; only that user and root may have it stopped")]
@@ -189,6 +191,7 @@ impl InterfaceLock {
 
 /// Why a lock was not taken over.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum TakeOverError {
     /// The process that has it does not give it up.
     NotReleased {

@@ -48,6 +48,7 @@ pub struct BusClaim {
 
 /// Why this process may not command a bus. Nothing has been sent then.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ClaimError {
     /// The interface could not be opened.
     #[error(transparent)]

@@ -84,6 +84,8 @@ impl Axis {
         for limit in [places.max_torque, places.positive_torque_limit, places.negative_torque_limit] {
             commission_open(dictionary, limit, (1000.0 * peak_torque / rated_torque).round());
         }
+        // All ones: no window.
+        commission_open(dictionary, places.following_error_window, -1.0);
         let scale = CommissionedScale {
             counts_per_unit: parameters.encoder.counts_per_unit,
             counts_per_turn: parameters.counts_per_turn,

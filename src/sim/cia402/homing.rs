@@ -228,11 +228,13 @@ impl Homing {
             State::Leaving { method, edge } if !is_closed(edge.input, to) => {
                 self.state = State::Searching { method, edge };
             }
-            State::Searching { method, edge } if searches(method) => {
-                if is_closed(edge.input, from) != edge.closes && is_closed(edge.input, to) == edge.closes {
-                    self.state = if method.uses_index { State::Indexing { method } } else { State::Settling };
-                    return (!method.uses_index).then_some(to);
-                }
+            State::Searching { method, edge }
+                if searches(method)
+                    && is_closed(edge.input, from) != edge.closes
+                    && is_closed(edge.input, to) == edge.closes =>
+            {
+                self.state = if method.uses_index { State::Indexing { method } } else { State::Settling };
+                return (!method.uses_index).then_some(to);
             }
             State::Indexing { method } if searches(method) => {
                 let index = switches.index_between(from, to);

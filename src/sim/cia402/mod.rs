@@ -20,6 +20,7 @@
 //! - Without 6083, 6084 or 609A, or where they are 0, the axis reaches its highest velocity in 0.1 s.
 //! - An axis that the file gives no unit for velocities has position units per second.
 //! - 6076 shows the rated torque of the joint, and so do 6072, 60E0 and 60E1 its peak torque where the file leaves them 0.
+//! - There is no following error window (6065) where the file leaves it 0, until it is written.
 //! - A homing method whose switches are not wired is a homing error at once.
 //! - The velocity mode (2), 607B, 60C4, 1007 and 1012 have no effect.
 

@@ -31,6 +31,7 @@ pub use walk::WalkError;
 
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordedError {
     /// It cannot be read.
     #[error("{path}: {error}")]

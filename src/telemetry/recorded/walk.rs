@@ -22,6 +22,7 @@ pub struct Condition {
 
 /// Why a file cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum WalkError {
     /// The file cannot be read.
     #[error(transparent)]

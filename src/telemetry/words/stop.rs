@@ -6,7 +6,7 @@ use super::{category, mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
 
 /// The cause of a stop, without phase and category: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
-pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
+pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
     let axis = stop.axis().map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
     let bus =
         stop.origin.bus().map_or_else(|| "a bus".to_owned(), |bus| format!("bus {}", machine.bus_name(bus)));
@@ -156,7 +156,7 @@ fn drive_error(stop: &StopReason, machine: &Machine, code: u16) -> String {
 }
 
 /// The cure, where a drive has stopped the group and its error is known.
-pub fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
+pub(crate) fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
     let StopCause::Fault(Fault::DriveFault { error_code: code } | Fault::EmergencyMessage { code }) =
         stop.cause
     else {

@@ -6,10 +6,11 @@
 use core::f64::consts::TAU;
 
 use takt_rt::{
-    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CanopenNetwork, Cia402Codec, CommandPdo, ControlLaw, CycleInput,
-    CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince, Follow, Frame,
-    HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request, RequestEnvelope,
-    RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories, TimingLadder, TorqueLimits,
+    AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CanopenNetwork, Cia402Codec, CommandPdo,
+    ControlLaw, CycleInput, CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince,
+    Follow, Frame, HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request,
+    RequestEnvelope, RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories,
+    TimingLadder, TorqueLimits,
 };
 
 // The C library gives the program its entry; nothing else of it is used.
@@ -117,10 +118,10 @@ fn cycles() -> Option<Phase> {
     let requests = [Some(Request::Sync(true)), Some(Request::Activate), Some(Request::Enable)];
     let mut host = Silent { requests };
     let health = [BusHealth::default()];
-    for slot in 0..40 {
+    // Ready to switch on.
+    let mut statusword_low = 0x31;
+    for slot in 0..100 {
         let at_ns = slot * 1_000_000;
-        // Ready to switch on, and operation enabled a while later.
-        let statusword_low = if slot < 20 { 0x31 } else { 0x37 };
         let frame = Frame::of(Id::canopen(0x180, 1), [statusword_low, 0x12, 1, 0, 0, 0]);
         engine.sync(0, slot, at_ns);
         engine.receive(0, &Received { frame, at_ns });
@@ -137,6 +138,12 @@ fn cycles() -> Option<Phase> {
         );
         let mut batch = SendBatch::new();
         engine.encode(0, Deadline::Met, &mut host, &mut batch);
+        // The drive obeys the controlword, the first two bytes of its command.
+        statusword_low = match batch.first().map(Frame::payload) {
+            Some([0x07, ..]) => 0x33, // switched on
+            Some([0x0F, ..]) => 0x37, // operation enabled
+            _ => statusword_low,
+        };
         engine.finish(CycleTiming { slot, ..CycleTiming::default() }, at_ns, &health, &mut host);
     }
     engine.phase(0)

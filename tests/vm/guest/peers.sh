@@ -3,12 +3,12 @@
 # for tests/peers/decode.
 . tests/vm/guest/laboratory.sh
 recorders=()
-for interface in vcan0 vcan1 vcan2; do
+for interface in vcan0 vcan1 vcan2 vcan3; do
     vcan_up $interface
     candump -L -r 4000000 $interface > "$OUT/peers-$interface.log" & recorders+=($!)
 done
 export TAKT PYTHONDONTWRITEBYTECODE=1
-"$PYTHON" tests/peers/run.py ${SUBJECTS:-erob=vcan0 yz_aim=vcan1 slave=vcan2}
+"$PYTHON" tests/peers/run.py ${SUBJECTS:-erob=vcan0 yz_aim=vcan1 slave=vcan2 data_sheets=vcan3}
 status=$?
 kill "${recorders[@]}"
 wait "${recorders[@]}"

@@ -20,30 +20,15 @@ use takt_rt::OperationMode;
 pub async fn info(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
     contact::connect(c, s).await?;
     let mut report = Report::new();
-    identity(c, s, &mut report).await?;
+    contact::report_identity(c, s, &mut report).await?;
+    texts(c, &mut report).await?;
     let rated = ratings(c, s, &mut report).await?;
     condition(c, s, rated, &mut report).await?;
     errors(c, &mut report).await?;
     Ok(report)
 }
 
-async fn identity(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<(), Failure> {
-    c.step("identity");
-    for (key, object) in [
-        ("device_type", DEVICE_TYPE),
-        ("vendor_id", VENDOR_ID),
-        ("product_code", PRODUCT_CODE),
-        ("revision_number", REVISION_NUMBER),
-    ] {
-        let value = c.read(&object).await?;
-        report.add(key, object.name, value, object.show(value));
-        if object == VENDOR_ID && s.drive.identity.vendor.is_some_and(|vendor| value != i64::from(vendor)) {
-            c.note(format!(
-                "the vendor ID is not that of {}: check that this is the intended drive",
-                s.drive.word
-            ));
-        }
-    }
+async fn texts(c: &SdoSession, report: &mut Report) -> Result<(), Failure> {
     for (key, label, address) in [
         ("device_name", "device name", DEVICE_NAME),
         ("hardware_version", "hardware version", HARDWARE_VERSION),

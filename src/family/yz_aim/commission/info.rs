@@ -16,30 +16,10 @@ use crate::family::commission::target::TargetDrive;
 pub async fn info(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
     contact::connect(c, s).await?;
     let mut report = Report::new();
-    identity(c, s, &mut report).await?;
+    contact::report_identity(c, s, &mut report).await?;
     condition(c, s, &mut report).await?;
     settings(c, &mut report).await?;
     Ok(report)
-}
-
-async fn identity(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<(), Failure> {
-    c.step("identity");
-    for (key, object) in [
-        ("device_type", DEVICE_TYPE),
-        ("vendor_id", VENDOR_ID),
-        ("product_code", PRODUCT_CODE),
-        ("revision_number", REVISION_NUMBER),
-    ] {
-        let value = c.read(&object).await?;
-        report.add(key, object.name, value, object.show(value));
-        if object == VENDOR_ID && s.drive.identity.vendor.is_some_and(|vendor| value != i64::from(vendor)) {
-            c.note(format!(
-                "the vendor ID is not that of {}: check that this is the intended drive",
-                s.drive.word
-            ));
-        }
-    }
-    Ok(())
 }
 
 async fn condition(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<(), Failure> {

@@ -1,0 +1,264 @@
+//! Bring-up, start and shutdown of a CiA 402 drive by its data sheet.
+//!
+//! Nothing is demanded that a drive may lack: each object is used if the data sheet has it and lets it be written, and skipped
+//! otherwise. `takt check` says what safety is lost by that: see [`remarks`](super::remarks).
+
+use takt_rt::{CommandSlot, Nanoseconds, controlword};
+
+use super::device::Device;
+use crate::canopen::emcy::ErrorCode;
+use crate::canopen::nmt::{NmtCommand, NmtState};
+use crate::canopen::object::{DataType, Object};
+use crate::canopen::objects::*;
+use crate::config::PdoMapping;
+use crate::family::bring_up::axis_units::{counts, interpolation_time, rounded_up};
+use crate::family::bring_up::configuration_file::{self, write_unless_in_file};
+use crate::family::bring_up::{
+    AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat, identity,
+    pdo_mapping,
+};
+
+const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::U32, "following error window");
+const ABORT_CONNECTION_OPTION: Object = Object::new(0x6007, 0, DataType::I16, "abort connection option code");
+/// Object 6007: the drive reacts as to a fault.
+const FAULT_SIGNAL: i64 = 1;
+/// How long a drive may move on after a quick stop, if it cannot show its velocity.
+const UNSEEN_STANDSTILL_NS: Nanoseconds = 500_000_000;
+
+/// A bring-up of a drive that has this data sheet.
+pub struct Sheet<'a> {
+    pub c: &'a AxisSession<'a>,
+    pub device: &'a Device,
+}
+
+impl Sheet<'_> {
+    /// From any state to pre-operational, configured, without torque.
+    pub async fn configure(&self) -> StepResult {
+        let c = self.c;
+        c.step(
+            RESTART_STEP,
+            "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID",
+        );
+        c.restart_communication().await?;
+        // Some drives leave the profile out of object 1000.
+        identity::compare(c, Check::Any).await?;
+        identity::read_texts(c).await?;
+        self.come_to_rest().await?;
+        configuration_file::write(c).await?;
+        self.synchronisation().await?;
+        self.process_data().await?;
+        self.mode().await?;
+        self.ratings().await?;
+        self.limits().await?;
+        self.target_at_actual_position().await?;
+        self.heartbeats().await
+    }
+
+    /// From configured to operational.
+    pub async fn start(&self) -> StepResult {
+        let c = self.c;
+        c.step("start", "check that no other master commands this node");
+        c.command(NmtCommand::Start, NmtState::Operational).await?;
+        self.read_state().await?;
+        actual_position::read(c).await
+    }
+
+    /// From operational to pre-operational, without torque, heartbeat watchdog off.
+    pub async fn shut_down(&self) -> StepResult {
+        let c = self.c;
+        c.step("shut down", "power-cycle the drive before the next run");
+        c.wake_up(NmtCommand::EnterPreOperational).await?;
+        c.command(NmtCommand::EnterPreOperational, NmtState::PreOperational).await?;
+        self.come_to_rest().await?;
+        if self.device.is_writable(CONSUMER_HEARTBEAT_TIME.address) {
+            heartbeat::end_watch(c, "expect a communication fault of the drive; the next bring-up clears it")
+                .await?;
+        }
+        self.set(PRODUCER_HEARTBEAT_TIME, 0).await
+    }
+
+    /// Writes a number and reads it back, if the drive has the object and lets it be written.
+    async fn set(&self, object: Object, value: i64) -> StepResult {
+        if self.device.is_writable(object.address) {
+            self.c.write_and_read_back(object, value).await
+        } else {
+            self.c.note_absent(object.address);
+            Ok(())
+        }
+    }
+
+    async fn read_state(&self) -> StepResult {
+        let c = self.c;
+        c.read(STATUSWORD, Check::Any, |facts, value| facts.statusword = value as u16).await?;
+        if self.device.has(&ERROR_CODE) {
+            c.read(ERROR_CODE, Check::Any, |facts, value| facts.error_code = ErrorCode(value as u16)).await?;
+        }
+        Ok(())
+    }
+
+    /// Stops and disables the drive. A communication reset ends neither its torque nor its motion.
+    async fn come_to_rest(&self) -> StepResult {
+        let c = self.c;
+        c.step(
+            "standstill without torque",
+            "the drive holds or moves its axis and does not respond: use the emergency stop, then power-cycle it",
+        );
+        self.read_state().await?;
+        if c.facts().state().has_torque() {
+            self.stop_motion().await?;
+        }
+        // Bit 7 stays low, so that a later fault reset is a rising edge.
+        c.write(CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
+        let within_ns = c.timing.confirm_timeout_ns;
+        c.wait_for(STATUSWORD, Check::NoTorque, within_ns, |facts, value| facts.statusword = value as u16)
+            .await
+    }
+
+    /// Stops by a quick stop, with the deceleration of the axis.
+    async fn stop_motion(&self) -> StepResult {
+        let (c, limits) = (self.c, &self.c.axis.limits);
+        if self.device.is_writable(QUICK_STOP_DECELERATION.address) {
+            write_unless_in_file(c, QUICK_STOP_DECELERATION, counts(c.axis, limits.deceleration)).await?;
+        }
+        c.write(CONTROLWORD, controlword::QUICK_STOP.into()).await?;
+        let stopping_ns = (limits.velocity / limits.deceleration * 1e9) as Nanoseconds;
+        if !self.device.has(&VELOCITY_ACTUAL_VALUE) {
+            c.pause(stopping_ns.saturating_add(UNSEEN_STANDSTILL_NS)).await;
+            return Ok(());
+        }
+        let within_ns = c.timing.confirm_timeout_ns.saturating_add(stopping_ns);
+        let standstill = Check::AtMost((self.velocity_units(limits.velocity) / 100).max(1));
+        c.wait_for(VELOCITY_ACTUAL_VALUE, standstill, within_ns, |_, _| ()).await
+    }
+
+    /// A velocity in the drive's units.
+    fn velocity_units(&self, velocity: f64) -> i64 {
+        let axis = self.c.axis;
+        let per_count = axis.drive.velocity_units_per_turn(axis.counts_per_turn) / axis.counts_per_turn;
+        ((counts(axis, velocity) as f64 * per_count).round() as i64).max(1)
+    }
+
+    async fn synchronisation(&self) -> StepResult {
+        let c = self.c;
+        c.step("SYNC", "choose a cycle period that this drive accepts");
+        let period_ns = c.config.bus_cycle(c.axis.bus).period_ns;
+        // Bit 30 would make the drive the SYNC producer. Where the object is constant, it is 80h already.
+        self.set(SYNC_COB_ID, 0x80).await?;
+        self.set(COMMUNICATION_CYCLE_PERIOD, rounded_up(period_ns, 1_000)).await?;
+        if let Some((mantissa, exponent)) = interpolation_time(period_ns) {
+            self.set(INTERPOLATION_TIME_PERIOD, mantissa).await?;
+            self.set(INTERPOLATION_TIME_INDEX, exponent).await?;
+        }
+        Ok(())
+    }
+
+    async fn process_data(&self) -> StepResult {
+        let c = self.c;
+        match c.axis.mapping {
+            PdoMapping::Written => {
+                let ProcessData { commands, feedback, .. } = ProcessData::of(c.axis);
+                let slots = |direction| self.device.pdo_slots(direction);
+                pdo_mapping::write(c, PdoDirection::Receive, &commands, slots(PdoDirection::Receive)).await?;
+                pdo_mapping::write(c, PdoDirection::Transmit, &feedback, slots(PdoDirection::Transmit)).await
+            }
+            PdoMapping::AsStored => pdo_mapping::take_reported(c).await,
+        }
+    }
+
+    async fn mode(&self) -> StepResult {
+        let c = self.c;
+        c.step(
+            "mode of operation",
+            "choose another control mode for this axis; clear the drive's fault if it has one",
+        );
+        let mode = c.axis.control.operation_mode() as i64;
+        c.write(MODES_OF_OPERATION, mode).await?;
+        if !self.device.has(&MODES_OF_OPERATION_DISPLAY) {
+            return Ok(());
+        }
+        let within_ns = c.timing.confirm_timeout_ns;
+        c.wait_for(MODES_OF_OPERATION_DISPLAY, Check::Equals(mode), within_ns, |_, _| ()).await
+    }
+
+    async fn ratings(&self) -> StepResult {
+        let c = self.c;
+        c.step("ratings", "say the rated torque in the configuration: [axis.joint] rated_torque");
+        let thousandths = |value: i64| (value > 0).then_some(value as f64 / 1000.0);
+        c.read_optional(SUPPORTED_DRIVE_MODES, |facts, value| facts.supported_modes = value as u32).await?;
+        c.read_optional(MOTOR_RATED_CURRENT, |facts, value| facts.rated_current_a = thousandths(value))
+            .await?;
+        c.read_optional(MOTOR_RATED_TORQUE, |facts, value| facts.rated_torque = thousandths(value)).await?;
+        c.read_optional(MAX_TORQUE, |facts, value| facts.max_torque_per_mille = Some(value as u16)).await?;
+        let option = QUICK_STOP_OPTION_CODE;
+        c.read_optional(option, |facts, value| facts.quick_stop_option_code = Some(value as i16)).await?;
+        Ok(())
+    }
+
+    /// Whether a mode of the axis has this target.
+    fn has_target(&self, target: CommandSlot) -> bool {
+        self.c.axis.controls().any(|control| control.target_slot() == target)
+    }
+
+    /// Sets the drive's limits beyond those of the controller, which acts first, and its profile to the axis' limits. What the
+    /// axis' configuration file has for them holds instead.
+    async fn limits(&self) -> StepResult {
+        let c = self.c;
+        c.step("limits", "choose limits for this axis that its drive accepts");
+        let (axis, limits) = (c.axis, &c.axis.limits);
+        if self.has_target(CommandSlot::TargetPosition) {
+            // In profile position mode the drive follows its own profile, so its following error is not limited here.
+            let error =
+                if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
+            self.limit(FOLLOWING_ERROR_WINDOW, counts(axis, error)).await?;
+            self.limit(PROFILE_VELOCITY, self.velocity_units(limits.velocity)).await?;
+        }
+        for (object, acceleration) in [
+            (PROFILE_ACCELERATION, limits.acceleration),
+            (PROFILE_DECELERATION, limits.deceleration),
+            (QUICK_STOP_DECELERATION, limits.deceleration),
+        ] {
+            self.limit(object, self.velocity_units(acceleration)).await?;
+        }
+        Ok(())
+    }
+
+    async fn limit(&self, object: Object, value: i64) -> StepResult {
+        if self.device.is_writable(object.address) {
+            write_unless_in_file(self.c, object, value).await?;
+        }
+        Ok(())
+    }
+
+    /// Enabling with an old target would make the axis jump.
+    async fn target_at_actual_position(&self) -> StepResult {
+        let c = self.c;
+        c.step(
+            "target at the actual position",
+            "clear the drive's fault, and check its software limits (607D)",
+        );
+        if self.device.is_writable(TARGET_POSITION.address) {
+            actual_position::make_target(c).await?;
+        } else {
+            actual_position::read(c).await?;
+        }
+        for target in [TARGET_VELOCITY, TARGET_TORQUE, POSITION_OFFSET, VELOCITY_OFFSET, TORQUE_OFFSET] {
+            self.set(target, 0).await?;
+        }
+        Ok(())
+    }
+
+    async fn heartbeats(&self) -> StepResult {
+        let c = self.c;
+        if self.device.is_writable(PRODUCER_HEARTBEAT_TIME.address) {
+            heartbeat::produce(c).await?;
+        }
+        if c.config.master.heartbeat_ns.is_some() {
+            self.set(COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
+            self.set(ABORT_CONNECTION_OPTION, FAULT_SIGNAL).await?;
+        }
+        if self.device.is_writable(CONSUMER_HEARTBEAT_TIME.address) {
+            heartbeat::watch_master(c).await?;
+        }
+        Ok(())
+    }
+}

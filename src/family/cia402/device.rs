@@ -1,0 +1,208 @@
+//! A drive as its data sheet (EDS or DCF) describes it, with the quirks that are known of it.
+
+use std::path::Path;
+
+use takt_rt::OperationMode;
+
+use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary};
+use crate::canopen::object::{Object, ObjectAddress};
+use crate::canopen::objects::{
+    CONTROLWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE, PdoDirection, STATUSWORD,
+};
+use crate::config::quirks::{MotionUnit, Quirks};
+use crate::config::{Control, DriveFacts, Identity, ModeSet, VelocityUnit};
+
+/// A data sheet, and the quirks of the drive.
+#[derive(Clone, Debug)]
+pub struct Device {
+    /// The object dictionary of the data sheet.
+    pub dictionary: ObjectDictionary,
+    /// In what the drive deviates from it.
+    pub quirks: Quirks,
+}
+
+const DEVICE_TYPE: ObjectAddress = ObjectAddress::new(0x1000, 0);
+const VENDOR: ObjectAddress = ObjectAddress::new(0x1018, 1);
+const PRODUCT: ObjectAddress = ObjectAddress::new(0x1018, 2);
+const SUPPORTED_MODES: ObjectAddress = ObjectAddress::new(0x6502, 0);
+const ENCODER_INCREMENTS: ObjectAddress = ObjectAddress::new(0x608F, 1);
+const ENCODER_REVOLUTIONS: ObjectAddress = ObjectAddress::new(0x608F, 2);
+const FEED: ObjectAddress = ObjectAddress::new(0x6092, 1);
+const FEED_REVOLUTIONS: ObjectAddress = ObjectAddress::new(0x6092, 2);
+const VELOCITY_NUMERATOR: ObjectAddress = ObjectAddress::new(0x6096, 1);
+const VELOCITY_DIVISOR: ObjectAddress = ObjectAddress::new(0x6096, 2);
+const VELOCITY_UNIT: ObjectAddress = ObjectAddress::new(0x60A9, 0);
+
+/// The modes that takt commands, each with the object of its target.
+const TARGETS: [(OperationMode, u16); 7] = [
+    (OperationMode::CyclicSynchronousPosition, 0x607A),
+    (OperationMode::CyclicSynchronousVelocity, 0x60FF),
+    (OperationMode::CyclicSynchronousTorque, 0x6071),
+    (OperationMode::InterpolatedPosition, 0x60C1),
+    (OperationMode::ProfilePosition, 0x607A),
+    (OperationMode::ProfileVelocity, 0x60FF),
+    (OperationMode::ProfileTorque, 0x6071),
+];
+
+impl Device {
+    /// Reads the data sheet, and the quirks if there is a file of them.
+    ///
+    /// # Errors
+    /// In words for the reader of a configuration: the file, the line, what is wrong.
+    pub fn load(eds: &Path, quirks: Option<&Path>) -> Result<Self, String> {
+        let loaded = crate::canopen::eds::load(eds).map_err(|findings| findings.to_string())?;
+        let quirks = match quirks {
+            Some(path) => crate::config::quirks::load(path).map_err(|error| error.to_string())?,
+            None => Quirks::default(),
+        };
+        let device = Self { dictionary: loaded.dictionary, quirks };
+        let needed = [CONTROLWORD, STATUSWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE];
+        match needed.into_iter().find(|object| !device.has(object)) {
+            Some(object) => Err(format!("the data sheet has no {object}, which every CiA 402 drive needs")),
+            None if device.modes().0 == 0 => {
+                Err("the data sheet has no target (607A, 60FF, 6071) of a mode that takt commands".to_owned())
+            }
+            None => Ok(device),
+        }
+    }
+
+    /// What the data sheet says of an object; `None` if the drive lacks it.
+    pub fn entry(&self, address: ObjectAddress) -> Option<&DictionaryEntry> {
+        self.dictionary.entry(address).filter(|_| !self.quirks.is_missing(address))
+    }
+
+    /// Whether the drive has an object.
+    pub fn has(&self, object: &Object) -> bool {
+        self.entry(object.address).is_some()
+    }
+
+    /// Whether the drive lets an object be written.
+    pub fn is_writable(&self, address: ObjectAddress) -> bool {
+        let writable = |entry: &DictionaryEntry| {
+            matches!(
+                entry.access,
+                AccessType::ReadWrite
+                    | AccessType::WriteOnly
+                    | AccessType::ReadWriteRead
+                    | AccessType::ReadWriteWrite
+            )
+        };
+        self.entry(address).is_some_and(writable) && !self.quirks.is_constant(address)
+    }
+
+    /// Whether a PDO can carry an object.
+    pub fn is_mappable(&self, address: ObjectAddress) -> bool {
+        self.entry(address).is_some_and(|entry| entry.is_mappable)
+    }
+
+    /// How many PDOs of a direction the drive has, of the first four.
+    pub fn pdo_slots(&self, direction: PdoDirection) -> u8 {
+        let (parameters, mapping) = match direction {
+            PdoDirection::Receive => (0x1400, 0x1600),
+            PdoDirection::Transmit => (0x1800, 0x1A00),
+        };
+        let has_slot = |number: &u8| {
+            let of = |first: u16| self.dictionary.object(first + u16::from(*number) - 1).is_some();
+            of(parameters) && of(mapping)
+        };
+        (1..=4).take_while(has_slot).last().unwrap_or(0)
+    }
+
+    /// The value that an object has by the data sheet, or by the configuration of a DCF.
+    pub fn number(&self, address: ObjectAddress) -> Option<i64> {
+        let value = self.entry(address)?.value()?.number(self.dictionary.commissioned_node())?;
+        i64::try_from(value).ok()
+    }
+
+    fn ratio(&self, numerator: ObjectAddress, divisor: ObjectAddress) -> Option<f64> {
+        let (numerator, divisor) = (self.number(numerator)?, self.number(divisor).unwrap_or(1));
+        (numerator > 0 && divisor > 0).then(|| numerator as f64 / divisor as f64)
+    }
+
+    /// Counts of one turn of the reported position: by the feed constant (6092), or else by the resolution of the encoder (608F).
+    pub fn counts_per_turn(&self) -> Option<f64> {
+        self.ratio(FEED, FEED_REVOLUTIONS).or_else(|| self.ratio(ENCODER_INCREMENTS, ENCODER_REVOLUTIONS))
+    }
+
+    /// The modes: those of the quirks, or of object 6502, or, where neither tells, those whose target the drive has. takt commands
+    /// no other ones.
+    pub fn modes(&self) -> ModeSet {
+        let stated =
+            self.number(SUPPORTED_MODES).and_then(|bits| u32::try_from(bits).ok()).filter(|bits| *bits != 0);
+        let has_target =
+            |(_, target): &&(OperationMode, u16)| self.entry(ObjectAddress::new(*target, 0)).is_some();
+        let with_target: Vec<OperationMode> =
+            TARGETS.iter().filter(has_target).map(|(mode, _)| *mode).collect();
+        match (&self.quirks.modes, stated) {
+            (Some(modes), _) => ModeSet::of(modes),
+            (None, Some(bits)) => ModeSet(bits & ModeSet::of(&with_target).0),
+            (None, None) => ModeSet::of(&with_target),
+        }
+    }
+
+    /// The unit of velocities: by the quirks, by the SI unit (60A9), or by the velocity factor (6096), or else counts per second.
+    fn velocity_unit(&self) -> VelocityUnit {
+        let of_motion = |unit| match unit {
+            MotionUnit::PositionUnits(factor) => VelocityUnit::Counts(factor),
+            MotionUnit::RevolutionsPerMinute(factor) => VelocityUnit::RevolutionsPerMinute(factor),
+        };
+        let by_quirks = self.quirks.unit(0x60FF).or(self.quirks.unit(0x606C)).map(of_motion);
+        let by_si = || si_velocity_unit(u32::try_from(self.number(VELOCITY_UNIT)?).ok()?);
+        let by_factor =
+            || Some(VelocityUnit::Counts(1.0 / self.ratio(VELOCITY_NUMERATOR, VELOCITY_DIVISOR)?));
+        by_quirks.or_else(by_si).or_else(by_factor).unwrap_or(VelocityUnit::Counts(1.0))
+    }
+
+    /// Whether the controller can map the PDOs: the mapping of RPDO 1 and that of TPDO 1 are writable.
+    fn is_mapped_freely(&self) -> bool {
+        [0x1600, 0x1A00].into_iter().all(|index| self.is_writable(ObjectAddress::new(index, 0)))
+    }
+
+    /// What is known of the drive.
+    pub fn facts(&self, standard: DriveFacts) -> DriveFacts {
+        let modes = self.modes();
+        let device = &self.dictionary.device;
+        let number = |address| {
+            self.number(address).and_then(|value| u32::try_from(value).ok()).filter(|value| *value != 0)
+        };
+        let usual = [
+            Control::Position,
+            Control::Interpolated,
+            Control::ProfilePosition,
+            Control::ProfileVelocity,
+            Control::ProfileTorque,
+        ];
+        DriveFacts {
+            identity: Identity {
+                device_type: number(DEVICE_TYPE),
+                vendor: device.vendor_number.filter(|number| *number != 0).or(number(VENDOR)),
+                product: device.product_number.filter(|number| *number != 0).or(number(PRODUCT)),
+                revision: None,
+            },
+            counts_per_turn: self.counts_per_turn(),
+            velocity_unit: self.velocity_unit(),
+            modes,
+            usual_mode: usual
+                .into_iter()
+                .find(|control| modes.contains(control.operation_mode()))
+                .unwrap_or(Control::Position),
+            has_fixed_process_data: !self.is_mapped_freely(),
+            reports_mode: self.is_mappable(ObjectAddress::new(0x6061, 0)),
+            sends_emergencies: self.entry(ObjectAddress::new(0x1014, 0)).is_some(),
+            ..standard
+        }
+    }
+}
+
+/// A velocity by its SI unit (CiA 303-2): the power of ten in the highest byte, the numerator and the divisor in the next ones.
+/// 0xB4 is a revolution, 0xB5 an increment, 0x03 a second, 0x47 a minute.
+fn si_velocity_unit(unit: u32) -> Option<VelocityUnit> {
+    let [exponent, numerator, divisor, _] = unit.to_be_bytes();
+    let factor = 10_f64.powi(i32::from(exponent as i8));
+    match (numerator, divisor) {
+        (0xB4, 0x47) => Some(VelocityUnit::RevolutionsPerMinute(factor)),
+        (0xB4, 0x03) => Some(VelocityUnit::RevolutionsPerMinute(60.0 * factor)),
+        (0xB5, 0x03) => Some(VelocityUnit::Counts(factor)),
+        _ => None,
+    }
+}

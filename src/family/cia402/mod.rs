@@ -1,0 +1,126 @@
+//! Any CiA 402 drive, by its electronic data sheet: `drive = "cia402"`, `eds = "my-drive.eds"`.
+//!
+//! The data sheet (EDS or DCF) says which modes the drive has, which objects its PDOs can carry, how it counts, and what it lacks.
+//! A small file beside it says in what the drive deviates from the sheet (`quirks = "my-drive.toml"`, see `drives/`).
+
+mod bring_up;
+mod device;
+mod remarks;
+mod simulated;
+mod starting;
+
+pub use device::Device;
+pub use remarks::remarks;
+pub use starting::starting_configuration;
+
+use std::path::PathBuf;
+
+use super::bring_up::{AxisSession, ProcessData, mapped_objects};
+use super::commission::{Failure, SdoSession, TargetDrive, Task};
+use super::{CarryingOut, Family, SettingUp};
+use crate::canopen::object::ObjectAddress;
+use crate::config::{
+    Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, FamilyKeys, PdoMapping,
+};
+use crate::sim::Drive;
+use bring_up::Sheet;
+
+/// The family.
+#[derive(Clone, Copy, Debug)]
+pub struct Cia402;
+
+const FACTS: DriveFacts = DriveFacts::standard("cia402", "CiA 402 drive");
+
+/// The drive that a data sheet describes.
+pub fn drive(device: Device) -> DriveFamily {
+    DriveFamily::of_drive(device.facts(FACTS), device)
+}
+
+/// The data sheet of an axis of this family.
+///
+/// # Panics
+/// The drive of the axis is of another family.
+pub fn device(axis: &Axis) -> &Device {
+    axis.drive.description().expect("a drive of this family is made from its data sheet")
+}
+
+impl ConfiguredFamily for Cia402 {
+    fn word(&self) -> &'static str {
+        FACTS.word
+    }
+
+    fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
+        let quirks: Option<PathBuf> = keys.path("quirks");
+        keys.require("eds", "the electronic data sheet of the drive: eds = \"my-drive.eds\"");
+        let eds = keys.path("eds")?;
+        match Device::load(&eds, quirks.as_deref()) {
+            Ok(device) => Some(drive(device)),
+            Err(reason) => {
+                keys.refuse(
+                    "eds",
+                    eds.display().to_string(),
+                    format!("the data sheet of a CiA 402 drive: {reason}"),
+                );
+                None
+            }
+        }
+    }
+}
+
+impl Family for Cia402 {
+    /// Nothing is known of a drive without its data sheet but what the standard says.
+    fn unconfigured(&self) -> Option<DriveFamily> {
+        None
+    }
+
+    fn process_data(&self, axis: &Axis) -> ProcessData {
+        let mut data = ProcessData::mapped_freely(axis);
+        if axis.control == Control::Interpolated && has_interpolation_record(device(axis)) {
+            for object in data.commands.iter_mut().flat_map(|pdo| &mut pdo.objects) {
+                if *object == mapped_objects::TARGET_POSITION {
+                    *object = mapped_objects::INTERPOLATION_DATA;
+                }
+            }
+        }
+        if axis.mapping == PdoMapping::AsStored { data.padded() } else { data }
+    }
+
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(async move { sheet(c).configure().await })
+    }
+
+    fn start<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(async move { sheet(c).start().await })
+    }
+
+    fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(async move { sheet(c).shut_down().await })
+    }
+
+    fn remarks(&self, axis: &Axis) -> Vec<&'static str> {
+        remarks(device(axis))
+    }
+
+    fn carry_out<'a>(&'a self, _: &'a SdoSession, _: &'a TargetDrive, _: Task) -> CarryingOut<'a> {
+        Box::pin(async move {
+            Err(Failure::Unsupported {
+                what: "only objects of a drive of the family cia402 are read and written here".to_owned(),
+                instead: "move it by `takt run`, or write its objects".to_owned(),
+            })
+        })
+    }
+
+    fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
+        simulated::drive(axis, device(axis), &config.simulation)
+    }
+}
+
+/// Whether the drive has the target of interpolated position, 60C1:1.
+fn has_interpolation_record(device: &Device) -> bool {
+    device.is_mappable(ObjectAddress::new(0x60C1, 1))
+}
+
+/// The bring-up by the data sheet of the axis.
+fn sheet<'a>(c: &'a AxisSession<'a>) -> Sheet<'a> {
+    Sheet { c, device: device(c.axis) }
+}

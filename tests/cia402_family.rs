@@ -1,0 +1,101 @@
+//! Any CiA 402 drive from its data sheet: `drive = "cia402"`, brought up, moved and simulated by the file alone.
+
+use std::path::{Path, PathBuf};
+
+use takt::controller::{Outcome, VirtualRun};
+use takt::family::cia402::{self, Device};
+use takt::{Config, OperationMode};
+
+const CYCLES_AT_MOST: u64 = 60_000;
+
+fn repository() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn sheets() -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(repository().join("tests/eds/vendors")).unwrap();
+    let mut sheets: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
+    sheets.retain(|path| path.extension().is_some_and(|extension| extension == "eds"));
+    sheets.push(repository().join("configs/eds/erob-canopen.eds"));
+    sheets.sort();
+    sheets
+}
+
+/// Runs the program, and returns how far each axis is from 0 at its end.
+fn run(config: &Config) -> Vec<f64> {
+    let mut run = VirtualRun::simulated(config).unwrap().0;
+    let mut farthest = vec![0.0_f64; config.axes.len()];
+    let outcome = run.run(CYCLES_AT_MOST, |run| {
+        for (farthest, axis) in farthest.iter_mut().zip(&run.snapshot().axes) {
+            *farthest = farthest.max(axis.position.abs());
+        }
+    });
+    assert_eq!(outcome, Some(Outcome::Finished), "{}: {:?}", config.name, run.snapshot().groups[0].stop);
+    assert!(farthest.iter().all(|position| *position > 0.1), "{}: {farthest:?}", config.name);
+    run.snapshot().axes.iter().map(|axis| axis.position).collect()
+}
+
+#[test]
+fn an_arm_of_three_makers_drives_runs_its_program_at_1_ms() {
+    let config = Config::load(&repository().join("configs/three-drives.toml")).unwrap();
+    assert_eq!(config.cycle.period_ns, 1_000_000);
+    let makers: std::collections::BTreeSet<_> =
+        config.axes.iter().map(|axis| cia402::device(axis).dictionary.device.vendor_name.clone()).collect();
+    assert_eq!(makers.len(), 3);
+    for (axis, position) in config.axes.iter().zip(run(&config)) {
+        assert!(position.abs() < 0.01, "{}: {position}", axis.name);
+    }
+}
+
+#[test]
+fn every_data_sheet_gives_a_configuration_that_runs_as_it_is() {
+    for sheet in sheets() {
+        let device = Device::load(&sheet, None).unwrap();
+        let text = cia402::starting_configuration(&device, &sheet, 5);
+        let config =
+            Config::parse("starting.toml", &text).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
+        let axis = &config.axes[0];
+        let mode = axis.control.operation_mode();
+        assert!(axis.drive.modes.contains(mode), "{}", sheet.display());
+        if mode != OperationMode::ProfileVelocity && mode != OperationMode::ProfileTorque {
+            run(&config);
+        }
+    }
+}
+
+fn configuration(axis: &str) -> String {
+    format!(
+        "name = \"one\"\n[[bus]]\nname = \"can\"\n[[axis]]\nname = \"joint\"\nbus = \"can\"\nnode = 1\ndrive = \"cia402\"\n{axis}\n\
+         limits = {{ position = [-1, 1], velocity = 1, acceleration = 5, torque = 10 }}\n"
+    )
+}
+
+#[test]
+fn a_drive_without_its_data_sheet_is_refused_with_the_key_that_is_missing() {
+    let error = format!("{:?}", Config::parse("one.toml", &configuration("")).unwrap_err());
+    assert!(error.contains("`axis.eds` is missing"), "{error}");
+}
+
+#[test]
+fn a_file_that_is_of_no_drive_is_refused_with_what_it_lacks() {
+    let file = tempfile::Builder::new().suffix(".eds").tempfile().unwrap();
+    std::fs::write(
+        file.path(),
+        "[1000]\nParameterName=Device type\nDataType=7\nAccessType=ro\n[MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n",
+    )
+    .unwrap();
+    let text = configuration(&format!("eds = {:?}", file.path().display().to_string()));
+    let error = format!("{:?}", Config::parse("one.toml", &text).unwrap_err());
+    assert!(error.contains("6040"), "{error}");
+}
+
+#[test]
+fn what_a_drive_lacks_is_said_and_not_demanded() {
+    let sheet = repository().join("tests/eds/vendors/schunk-lwa4p.eds");
+    let text = configuration(&format!("eds = {:?}\ncounts_per_turn = 65536", sheet.display().to_string()));
+    let config = Config::parse("one.toml", &text).unwrap();
+    let warnings: Vec<String> = config.warnings().iter().map(ToString::to_string).collect();
+    for object in ["1029", "6085", "603F", "6076"] {
+        assert!(warnings.iter().any(|warning| warning.contains(object)), "{object}: {warnings:?}");
+    }
+}
