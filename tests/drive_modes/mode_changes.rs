@@ -118,7 +118,7 @@ fn positions_velocities_and_a_soft_spring_follow_each_other_on_one_drive_under_l
         world.request(Request::Stop(StopCategory::Two));
         world.run_until(|world| world.phase() == Phase::Holding);
         // A joint that has not come to rest yet would be stopped once more, to be disabled.
-        world.run_for(100);
+        world.run_for(300);
         world.events.clear();
     }
     move_to(&mut world, 0.0);
