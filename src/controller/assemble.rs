@@ -95,7 +95,7 @@ pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
         cycles: cycles(ns).max(1),
         timeout_cycles: cycles(config.master.heartbeat_timeout_ns),
     });
-    let engine = Engine::new(EngineParameters {
+    boxed(EngineParameters {
         period_ns,
         axes,
         groups: groups(config),
@@ -113,8 +113,15 @@ pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
         },
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
-    .map_err(AssembleError::Engine)?;
-    Ok(Box::new(engine))
+}
+
+/// Moves the engine to the heap. Each step that passes it on by value would take its size of the stack once more, so there is only one.
+#[inline(never)]
+fn boxed(parameters: EngineParameters) -> Result<Box<Engine>, AssembleError> {
+    match Engine::new(parameters) {
+        Ok(engine) => Ok(Box::new(engine)),
+        Err(error) => Err(AssembleError::Engine(error)),
+    }
 }
 
 /// The groups with their numbers in place of the names. A checked configuration has no number that does not fit.

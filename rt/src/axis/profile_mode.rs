@@ -243,7 +243,9 @@ impl Axis {
         if !self.is_profile() || self.feedback_age() > 0 {
             return Ok(());
         }
-        if self.velocity().abs() > VELOCITY_OVERSHOOT * limits.velocity {
+        // The velocity comes from positions in whole counts: on a coarse encoder, one count in a cycle is fast.
+        let one_count = 1.0 / (self.parameters.scale.resolution() * self.reception.cycle_s());
+        if self.velocity().abs() > VELOCITY_OVERSHOOT * limits.velocity + one_count {
             return Err(Fault::VelocityLimit { velocity: self.velocity(), limit: limits.velocity });
         }
         if self.profile.is_stalled(self.parameters.following_error_cycles) {

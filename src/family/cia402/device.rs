@@ -44,6 +44,14 @@ const TARGETS: [(OperationMode, u16); 7] = [
     (OperationMode::ProfileTorque, 0x6071),
 ];
 
+/// Modes with an object that no other mode has. The cyclic synchronous ones have none, so they are never assumed.
+const MARKS: [(OperationMode, u16); 4] = [
+    (OperationMode::InterpolatedPosition, 0x60C1),
+    (OperationMode::ProfilePosition, 0x6081),
+    (OperationMode::ProfileVelocity, 0x60FF),
+    (OperationMode::ProfileTorque, 0x6087),
+];
+
 impl Device {
     /// Reads the data sheet, and the quirks if there is a file of them.
     ///
@@ -124,20 +132,23 @@ impl Device {
         self.ratio(FEED, FEED_REVOLUTIONS).or_else(|| self.ratio(ENCODER_INCREMENTS, ENCODER_REVOLUTIONS))
     }
 
-    /// The modes: those of the quirks, or of object 6502, or, where neither tells, those whose target the drive has. takt commands
-    /// no other ones.
+    /// The modes: those of the quirks, or of object 6502, or, where neither tells, those that have an object of their own. Only those
+    /// count that takt commands, and whose target the drive has.
     pub fn modes(&self) -> ModeSet {
-        let stated =
-            self.number(SUPPORTED_MODES).and_then(|bits| u32::try_from(bits).ok()).filter(|bits| *bits != 0);
-        let has_target =
-            |(_, target): &&(OperationMode, u16)| self.entry(ObjectAddress::new(*target, 0)).is_some();
-        let with_target: Vec<OperationMode> =
-            TARGETS.iter().filter(has_target).map(|(mode, _)| *mode).collect();
-        match (&self.quirks.modes, stated) {
+        let stated = self.number(SUPPORTED_MODES).and_then(|bits| u32::try_from(bits).ok());
+        let has = |index: u16| {
+            self.dictionary.object(index).is_some() && !self.quirks.is_missing(ObjectAddress::new(index, 0))
+        };
+        let having = |objects: &[(OperationMode, u16)]| {
+            let modes = objects.iter().filter(|(_, index)| has(*index));
+            ModeSet::of(&modes.map(|(mode, _)| *mode).collect::<Vec<_>>())
+        };
+        let told = match (&self.quirks.modes, stated.filter(|bits| *bits != 0)) {
             (Some(modes), _) => ModeSet::of(modes),
-            (None, Some(bits)) => ModeSet(bits & ModeSet::of(&with_target).0),
-            (None, None) => ModeSet::of(&with_target),
-        }
+            (None, Some(bits)) => ModeSet(bits),
+            (None, None) => having(&MARKS),
+        };
+        ModeSet(told.0 & having(&TARGETS).0)
     }
 
     /// The unit of velocities: by the quirks, by the SI unit (60A9), or by the velocity factor (6096), or else counts per second.
