@@ -101,7 +101,21 @@ impl SimulatedDictionary {
             }));
         }
         entries.sort_by_key(|entry| entry.address);
-        Self { entries, dummies: sheet.dummies.iter().map(|code| code.0).collect() }
+        let mut own = Self { entries, dummies: sheet.dummies.iter().map(|code| code.0).collect() };
+        own.take_identity(&sheet.device);
+        own
+    }
+
+    /// The identity of the device, where object 1018 has no default: the file says it in `[DeviceInfo]` as well.
+    fn take_identity(&mut self, device: &eds::DeviceInfo) {
+        let stated = [device.vendor_number, device.product_number, device.revision_number];
+        for (subindex, number) in (1..).zip(stated) {
+            if let (Some(place), Some(number)) = (self.place(0x1018, subindex), number)
+                && self.entry(place).value == 0
+            {
+                self.set_factory(place, number.into());
+            }
+        }
     }
 
     /// The place of an entry, or why there is none.
