@@ -56,6 +56,8 @@ struct Check {
     buses: Vec<BusSchedule>,
     /// What is possible and implausible.
     warnings: Vec<String>,
+    /// What axes have to do without, because their drives lack it.
+    losses: Vec<String>,
 }
 
 /// A group of axes, by names.
@@ -165,6 +167,7 @@ impl Check {
             axes: config.axes.iter().map(|axis| AxisCheck::of(axis, config)).collect(),
             buses,
             warnings: config.warnings().iter().map(ToString::to_string).collect(),
+            losses: config.losses(),
         }
     }
 }

@@ -61,8 +61,6 @@ pub enum WarningKind {
         /// The object.
         object: ObjectAddress,
     },
-    /// The drive lacks something; the text says what is lost by that.
-    Lacks(&'static str),
     /// A velocity of a program that the drive cannot have exactly.
     RoundedVelocity {
         /// What is commanded, with its unit.
@@ -122,7 +120,6 @@ impl fmt::Display for WarningKind {
                 f,
                 "bring-up overwrites the value that `dcf` has for {object}, because the controller needs another one"
             ),
-            Self::Lacks(loss) => f.write_str(loss),
             Self::RoundedVelocity { commanded, rounded } => write!(
                 f,
                 "its drive takes whole numbers of r/min only: the program's velocity of {commanded} becomes {rounded}"
@@ -140,10 +137,19 @@ impl Config {
             kinds.extend(self.rounded_velocities(index, axis));
             let overwritten = bring_up::overwritten(self, axis);
             kinds.extend(overwritten.into_iter().map(|object| WarningKind::Overwritten { object }));
-            kinds.extend(registry::of(&axis.drive).remarks(axis).into_iter().map(WarningKind::Lacks));
             warnings.extend(kinds.into_iter().map(|kind| Warning { axis: axis.name.clone(), kind }));
         }
         warnings
+    }
+
+    /// What each axis has to do without, because its drive lacks something: sentences with the name of the axis. `takt check` says
+    /// them.
+    pub fn losses(&self) -> Vec<String> {
+        let of_axis = |axis: &Axis| {
+            let losses = registry::of(&axis.drive).remarks(axis).into_iter();
+            losses.map(|loss| format!("axis `{}`: {loss}", axis.name)).collect::<Vec<_>>()
+        };
+        self.axes.iter().flat_map(of_axis).collect()
     }
 
     /// The velocities of the program that the drive of an axis cannot have, each once.

@@ -55,6 +55,10 @@ pub fn whole(check: &Check, config: &Config) -> String {
         "\nresponse: from being queued until received, whatever else is queued when (Davis, Burns, Bril, Lukkien \
          2007)\nin slot by: after SYNC is due, with everything in its place in the slot\n",
     );
+    if !check.losses.is_empty() {
+        text.push_str("\nWhat drives lack, by their data sheets\n");
+        check.losses.iter().for_each(|loss| text.push_str(&format!("  {loss}\n")));
+    }
     if !check.warnings.is_empty() {
         text.push_str("\nWarnings\n");
         check.warnings.iter().for_each(|warning| text.push_str(&format!("  {warning}\n")));
