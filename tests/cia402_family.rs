@@ -95,6 +95,28 @@ fn a_file_that_is_of_no_drive_is_refused_with_what_it_lacks() {
 }
 
 #[test]
+fn a_mode_whose_target_no_pdo_can_carry_is_refused() {
+    // Its interpolation data record (60C1:1) cannot be mapped.
+    let sheet = repository().join("tests/eds/vendors/eyou-euservo.eds");
+    let text = configuration(&format!(
+        "eds = {:?}\ncounts_per_turn = 65536\nmode = \"ip\"",
+        sheet.display().to_string()
+    ));
+    let error = format!("{:?}", Config::parse("one.toml", &text).unwrap_err());
+    assert!(error.contains("`axis.mode` cannot be \"ip\""), "{error}");
+}
+
+#[test]
+fn a_drive_that_has_them_runs_its_program_in_every_mode_of_positions() {
+    let sheet = repository().join("tests/eds/vendors/eyou-euservo.eds");
+    let text = cia402::starting_configuration(&Device::load(&sheet, None).unwrap(), &sheet, 5);
+    for mode in ["csp", "csv", "cst", "pp"] {
+        let config = Config::parse("starting.toml", &text.replace("\"csp\"", &format!("{mode:?}"))).unwrap();
+        run(&config);
+    }
+}
+
+#[test]
 fn what_a_drive_lacks_is_said_and_not_demanded() {
     let sheet = repository().join("tests/eds/vendors/schunk-lwa4p.eds");
     let text = configuration(&format!("eds = {:?}\ncounts_per_turn = 65536", sheet.display().to_string()));

@@ -31,6 +31,7 @@ const FEED: ObjectAddress = ObjectAddress::new(0x6092, 1);
 const FEED_REVOLUTIONS: ObjectAddress = ObjectAddress::new(0x6092, 2);
 const VELOCITY_NUMERATOR: ObjectAddress = ObjectAddress::new(0x6096, 1);
 const VELOCITY_DIVISOR: ObjectAddress = ObjectAddress::new(0x6096, 2);
+const INTERPOLATION_DATA: ObjectAddress = ObjectAddress::new(0x60C1, 1);
 const VELOCITY_UNIT: ObjectAddress = ObjectAddress::new(0x60A9, 0);
 
 /// The modes that takt commands, each with the object of its target.
@@ -133,7 +134,7 @@ impl Device {
     }
 
     /// The modes: those of the quirks, or of object 6502, or, where neither tells, those that have an object of their own. Only those
-    /// count that takt commands, and whose target the drive has.
+    /// count that takt commands, and whose target the drive has; interpolated position only if a PDO can carry its target.
     pub fn modes(&self) -> ModeSet {
         let stated = self.number(SUPPORTED_MODES).and_then(|bits| u32::try_from(bits).ok());
         let has = |index: u16| {
@@ -148,7 +149,10 @@ impl Device {
             (None, Some(bits)) => ModeSet(bits),
             (None, None) => having(&MARKS),
         };
-        ModeSet(told.0 & having(&TARGETS).0)
+        let can_interpolate = self.entry(INTERPOLATION_DATA).is_none_or(|data| data.is_mappable);
+        let not_by_process_data =
+            if can_interpolate { 0 } else { ModeSet::of(&[OperationMode::InterpolatedPosition]).0 };
+        ModeSet(told.0 & having(&TARGETS).0 & !not_by_process_data)
     }
 
     /// The unit of velocities: by the quirks, by the SI unit (60A9), or by the velocity factor (6096), or else counts per second.
