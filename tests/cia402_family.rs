@@ -3,7 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use takt::Config;
+use takt::canopen::objects::PdoDirection;
+use takt::canopen::pdo_configuration::PdoConfiguration;
 use takt::controller::{Outcome, VirtualRun};
+use takt::family::bring_up::{PdoPlan, ProcessData};
 use takt::family::cia402::{self, Device};
 
 const CYCLES_AT_MOST: u64 = 60_000;
@@ -104,6 +107,41 @@ fn a_mode_whose_target_no_pdo_can_carry_is_refused() {
     ));
     let error = format!("{:?}", Config::parse("one.toml", &text).unwrap_err());
     assert!(error.contains("`axis.mode` cannot be \"ip\""), "{error}");
+}
+
+#[test]
+fn interpolated_position_has_the_same_target_in_a_written_and_in_a_stored_mapping() {
+    // This drive has an interpolation data record (60C1:1), and no cyclic synchronous modes.
+    let sheet = repository().join("tests/eds/vendors/schunk-lwa4p.eds");
+    let eds = format!("eds = {:?}\ncounts_per_turn = 65536\nmode = \"ip\"", sheet.display().to_string());
+    let config = Config::parse("one.toml", &configuration(&eds)).unwrap();
+    let written = ProcessData::of(&config.axes[0]);
+    let carried = |data: &ProcessData| {
+        data.commands
+            .iter()
+            .flat_map(|pdo| &pdo.objects)
+            .any(|object| (object.index, object.subindex) == (0x60C1, 1))
+    };
+    assert!(carried(&written));
+    let reported = |direction, plans: &[PdoPlan]| -> Vec<PdoConfiguration> {
+        let report = |plan: &PdoPlan| PdoConfiguration {
+            id: Some(plan.id),
+            transmission_type: Some(plan.transmission_type),
+            objects: plan.objects.clone(),
+            direction,
+            number: plan.number.into(),
+            is_valid: true,
+            inhibit_time_100us: None,
+            event_timer_ms: None,
+        };
+        plans.iter().map(report).collect()
+    };
+    let all = [
+        reported(PdoDirection::Receive, &written.commands),
+        reported(PdoDirection::Transmit, &written.feedback),
+    ];
+    let stored = ProcessData::as_reported(&config.axes[0], &all.concat()).unwrap();
+    assert!(carried(&stored));
 }
 
 #[test]

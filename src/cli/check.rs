@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use takt::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel};
+use takt::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel, mode_word};
 use takt::rt::ModeCondition;
 use takt::schedule::{self, BusSchedule};
 
@@ -141,19 +141,6 @@ impl ComplianceCheck {
     }
 }
 
-/// The word for a mode in a configuration.
-fn mode(control: &Control) -> &'static str {
-    match control {
-        Control::Position => "csp",
-        Control::Velocity { .. } => "csv",
-        Control::Torque { .. } => "cst",
-        Control::Interpolated => "ip",
-        Control::ProfilePosition => "pp",
-        Control::ProfileVelocity => "pv",
-        Control::ProfileTorque => "pt",
-    }
-}
-
 impl Check {
     fn of(config: &Config) -> Self {
         let buses = schedule::analyse(config);
@@ -183,8 +170,8 @@ impl AxisCheck {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
             node: axis.node,
-            mode: mode(&axis.control),
-            other_modes: axis.other_modes.iter().map(mode).collect(),
+            mode: mode_word(axis.control.operation_mode()),
+            other_modes: axis.other_modes.iter().map(|control| mode_word(control.operation_mode())).collect(),
             mode_change: (!axis.other_modes.is_empty())
                 .then(|| axis.drive.mode_changes.condition())
                 .flatten()

@@ -9,7 +9,7 @@ use std::ops::Deref;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use takt_rt::{Cia402Codec, ModeCondition, OperationMode};
+use takt_rt::{Cia402Codec, MappedObject, ModeCondition, OperationMode};
 
 use super::model::{Control, Identity};
 use super::read::section::Section;
@@ -52,6 +52,8 @@ pub struct DriveFacts {
     pub usual_mode: Control,
     /// Whether they take another mode at run time.
     pub mode_changes: ModeChangeRule,
+    /// The object that has the target of interpolated position mode.
+    pub interpolation_target: MappedObject,
     /// The only period of interpolated position mode, where there is only one.
     pub interpolation_period_ns: Option<u64>,
     /// The highest speed that objects 60FF and 6081 can hold, in r/min of the reported position.
@@ -168,6 +170,7 @@ impl DriveFacts {
             modes: ModeSet::of(&OperationMode::ALL),
             usual_mode: Control::Position,
             mode_changes: ModeChangeRule::When(ModeCondition::Disabled),
+            interpolation_target: MappedObject::new(0x607A, 0, 32),
             interpolation_period_ns: None,
             highest_speed_rpm: None,
             bit_rates: &[],

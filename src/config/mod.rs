@@ -12,6 +12,7 @@ mod drive_family;
 mod error;
 mod in_code;
 mod interface;
+mod mode_words;
 mod model;
 mod problem_kind;
 pub(crate) mod quantities;
@@ -32,6 +33,7 @@ pub use drive_family::{
 };
 pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;
+pub use mode_words::{MODES, mode_word};
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};

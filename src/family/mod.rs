@@ -25,7 +25,7 @@ pub use warning::{Warning, WarningKind, is_rounded};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
-use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily};
+use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{Failure, Report, SdoSession, TargetDrive, Task};
@@ -51,7 +51,8 @@ pub trait Family: ConfiguredFamily {
     /// The process data of an axis. A drive whose own mapping is used tells it at bring-up; until then this has as many PDOs as a
     /// written mapping, each of full length.
     fn process_data(&self, axis: &Axis) -> ProcessData {
-        ProcessData::mapped_freely(axis)
+        let written = ProcessData::mapped_freely(axis);
+        if axis.mapping == PdoMapping::AsStored { written.padded() } else { written }
     }
 
     /// How the PDOs that a drive reports are matched with those that its axis needs.

@@ -24,7 +24,7 @@ pub struct Target {
     /// The node ID
     #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
-    /// The family: erob-canopen, yz-aim
+    /// The family, as `drive` names it in a configuration
     #[arg(long, value_name = "FAMILY", global = true, value_parser = family)]
     family: Option<DriveFamily>,
     /// The bit rate of an interface without a configuration

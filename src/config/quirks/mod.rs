@@ -5,6 +5,7 @@ mod read;
 
 use takt_rt::{Nanoseconds, OperationMode};
 
+use super::PowerUpState;
 use crate::canopen::object::ObjectAddress;
 
 pub use read::{load, parse};
@@ -87,16 +88,6 @@ pub struct Delays {
     pub mode_change_ns: Option<Nanoseconds>,
     /// From "save" in 1010 until it has taken effect.
     pub save_ns: Option<Nanoseconds>,
-}
-
-/// The NMT state after the boot-up message.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PowerUpState {
-    /// As CiA 301 says, unless object 1F80 says otherwise.
-    #[default]
-    PreOperational,
-    /// The drive starts itself.
-    Operational,
 }
 
 /// In what a drive deviates from its data sheet and from CiA 402. The default deviates in nothing.

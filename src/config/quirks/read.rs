@@ -6,28 +6,18 @@ use std::path::Path;
 use takt_rt::{Nanoseconds, OperationMode};
 use toml::de::DeTable;
 
-use super::{Confirmation, Delays, MotionUnit, ObjectPattern, PowerUpState, Quirks, QuirkyDrive};
+use super::{Confirmation, Delays, MotionUnit, ObjectPattern, Quirks, QuirkyDrive};
 use crate::canopen::object::ObjectAddress;
 use crate::config::ConfigError;
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::spot::Problems;
+use crate::config::{MODES, PowerUpState};
 use crate::printable::printable_path;
 
 /// The longest delay; a longer one is a mistake in the unit.
 const LONGEST_S: f64 = 600.0;
-
-const MODES: [(&str, OperationMode); 8] = [
-    ("pp", OperationMode::ProfilePosition),
-    ("pv", OperationMode::ProfileVelocity),
-    ("pt", OperationMode::ProfileTorque),
-    ("homing", OperationMode::Homing),
-    ("ip", OperationMode::InterpolatedPosition),
-    ("csp", OperationMode::CyclicSynchronousPosition),
-    ("csv", OperationMode::CyclicSynchronousVelocity),
-    ("cst", OperationMode::CyclicSynchronousTorque),
-];
 
 const CONFIRMATIONS: [(&str, Confirmation); 2] = [
     (Confirmation::DataSheetOnly.name(), Confirmation::DataSheetOnly),
@@ -66,8 +56,9 @@ pub fn parse(source_name: &str, text: &str) -> Result<Quirks, ConfigError> {
 fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
     let mut root = Section::new("", 0..0, table, problems);
     let drive = drive(root.section("drive"));
+    let known: Vec<_> = MODES.into_iter().chain([("homing", OperationMode::Homing)]).collect();
     let modes = optional(root.get("modes"), |entry| {
-        each(&entry, |entry| entry.choice(&MODES)).filter(|modes| {
+        each(&entry, |entry| entry.choice(&known)).filter(|modes| {
             let has_modes = !modes.is_empty();
             if !has_modes {
                 entry.report_range("an empty list".to_owned(), "at least one mode".to_owned());

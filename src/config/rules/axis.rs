@@ -5,6 +5,7 @@ use takt_rt::{MAX_AXES, OperationMode};
 use super::loops::Surroundings;
 use super::{Fields, limits, loops, master, name, simulation};
 use crate::config::drive_family::{DriveFacts, ModeChangeRule};
+use crate::config::mode_words::{MODES, mode_word};
 use crate::config::model::{
     Axis, Config, Control, FeedForward, Feedback, Interface, Joint, Limits, PdoMapping, Travel,
 };
@@ -228,23 +229,8 @@ fn mode(spot: &Spot<'_>, drive: &DriveFacts, control: Control) {
     }
 }
 
-/// The modes that an axis may have, by their words.
-const MODES: [(&str, OperationMode); 7] = [
-    ("csp", OperationMode::CyclicSynchronousPosition),
-    ("csv", OperationMode::CyclicSynchronousVelocity),
-    ("cst", OperationMode::CyclicSynchronousTorque),
-    ("ip", OperationMode::InterpolatedPosition),
-    ("pp", OperationMode::ProfilePosition),
-    ("pv", OperationMode::ProfileVelocity),
-    ("pt", OperationMode::ProfileTorque),
-];
-
-/// The modes that an axis may be changed to at run time, by their words.
-pub const CHANGEABLE_MODES: [(&str, OperationMode); 3] = [
-    ("csp", OperationMode::CyclicSynchronousPosition),
-    ("csv", OperationMode::CyclicSynchronousVelocity),
-    ("cst", OperationMode::CyclicSynchronousTorque),
-];
+/// The modes that an axis may be changed to at run time, by their words: the cyclic synchronous ones.
+pub const CHANGEABLE_MODES: [(&str, OperationMode); 3] = [MODES[0], MODES[1], MODES[2]];
 
 fn validate_other_modes(axis: &Axis, spot: &Spot<'_>) {
     if axis.other_modes.is_empty() || !has_other_modes(spot, &axis.drive, axis.control) {
@@ -279,8 +265,7 @@ pub fn has_other_modes(spot: &Spot<'_>, drive: &DriveFacts, control: Control) ->
 }
 
 pub fn repeated_mode(spot: &Spot<'_>, mode: OperationMode) {
-    let word = CHANGEABLE_MODES.iter().find(|(_, own)| *own == mode).map_or("", |(word, _)| word);
-    spot.report(ProblemKind::Repeated { key: spot.key.clone(), given: word.to_owned() });
+    spot.report(ProblemKind::Repeated { key: spot.key.clone(), given: mode_word(mode).to_owned() });
 }
 
 /// The period in which the drive interpolates from target to target, where it has only one.

@@ -4,7 +4,7 @@
 //! object that a drive may lack is an optional one: it returns `false` then, and notes the object in
 //! [`AxisFacts::absent`].
 //!
-//! In a rehearsal there is no drive: each read gives what is expected, and each write is accepted and listed.
+//! In a dry run there is no drive: each read gives what is expected, and each write is accepted and listed.
 
 use std::cell::{Cell, Ref, RefCell};
 
@@ -53,8 +53,8 @@ pub struct AxisSession<'a> {
     /// The remedy of the current step.
     advice: Cell<&'static str>,
     first_failure: Cell<Option<StepFailure>>,
-    /// In a rehearsal: every number that was written, in order.
-    rehearsed: Option<RefCell<Vec<(ObjectAddress, i64)>>>,
+    /// In a dry run: every number that was written, in order.
+    dry_writes: Option<RefCell<Vec<(ObjectAddress, i64)>>>,
 }
 
 impl<'a> AxisSession<'a> {
@@ -76,22 +76,22 @@ impl<'a> AxisSession<'a> {
             facts: RefCell::new(facts),
             advice: Cell::new(""),
             first_failure: Cell::new(None),
-            rehearsed: None,
+            dry_writes: None,
         }
     }
 
     /// The same procedure without a drive.
-    pub(super) fn rehearsal(self) -> Self {
-        Self { rehearsed: Some(RefCell::default()), ..self }
+    pub(super) fn dry_run(self) -> Self {
+        Self { dry_writes: Some(RefCell::default()), ..self }
     }
 
-    pub(super) fn is_rehearsal(&self) -> bool {
-        self.rehearsed.is_some()
+    pub(super) fn is_dry_run(&self) -> bool {
+        self.dry_writes.is_some()
     }
 
-    /// Every number that was written in a rehearsal, in order.
-    pub(super) fn rehearsed(self) -> Vec<(ObjectAddress, i64)> {
-        self.rehearsed.map(RefCell::into_inner).unwrap_or_default()
+    /// Every number that was written in a dry run, in order.
+    pub(super) fn dry_writes(self) -> Vec<(ObjectAddress, i64)> {
+        self.dry_writes.map(RefCell::into_inner).unwrap_or_default()
     }
 
     /// The facts, or the first failure.
@@ -159,7 +159,7 @@ impl<'a> AxisSession<'a> {
         object: ObjectAddress,
         keep: impl FnOnce(&mut AxisFacts, String),
     ) -> StepResult<bool> {
-        if self.is_rehearsal() {
+        if self.is_dry_run() {
             return self.settled(Ok(false));
         }
         let read = match self.bus.read_bytes(object).await {
@@ -203,9 +203,9 @@ impl<'a> AxisSession<'a> {
         self.settled(awaited)
     }
 
-    /// Waits for a time; not in a rehearsal.
+    /// Waits for a time; not in a dry run.
     pub async fn pause(&self, duration_ns: Nanoseconds) {
-        if !self.is_rehearsal() {
+        if !self.is_dry_run() {
             self.bus.sleep(duration_ns).await;
         }
     }
@@ -253,7 +253,7 @@ impl<'a> AxisSession<'a> {
     }
 
     async fn written_download(&self, download: &Download) -> StepResult {
-        if self.is_rehearsal() {
+        if self.is_dry_run() {
             return Ok(());
         }
         let Download { object, data } = download;
@@ -282,8 +282,8 @@ impl<'a> AxisSession<'a> {
 
     async fn written(&self, object: Object, value: i64) -> StepResult {
         let data = object.data_type.encode(value).ok_or(FailureCause::DoesNotFit { object, value })?;
-        if let Some(rehearsed) = &self.rehearsed {
-            rehearsed.borrow_mut().push((object.address, value));
+        if let Some(writes) = &self.dry_writes {
+            writes.borrow_mut().push((object.address, value));
             return Ok(());
         }
         let failed = |error| FailureCause::Transfer { object, access: Access::Write(value), error };
@@ -292,7 +292,7 @@ impl<'a> AxisSession<'a> {
     }
 
     async fn number(&self, object: Object, access: Access, expected: Check) -> StepResult<i64> {
-        if self.is_rehearsal() {
+        if self.is_dry_run() {
             return Ok(expected.example());
         }
         let failed = |error| FailureCause::Transfer { object, access, error };

@@ -1,18 +1,12 @@
 //! Distances and times of an axis in the units of its drive.
 
-use std::f64::consts::TAU;
-
 use takt_rt::Nanoseconds;
 
-use crate::config::{Axis, Travel};
+use crate::config::Axis;
 
 /// Turns of the drive's encoder for a distance (rad, m), or turns per second for a velocity.
 pub fn turns(axis: &Axis, distance: f64) -> f64 {
-    let travel_per_turn = match axis.travel {
-        Travel::Rotary => TAU,
-        Travel::Linear { lead_m } => lead_m,
-    };
-    (distance / travel_per_turn * axis.gear_ratio).abs()
+    (distance / axis.travel.per_turn() * axis.gear_ratio).abs()
 }
 
 /// Counts for a distance (rad, m), a velocity or an acceleration: at least 1, at most the range of 32 bits.

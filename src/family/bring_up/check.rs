@@ -45,7 +45,7 @@ impl Check {
         }
     }
 
-    /// A value that meets the condition, for a rehearsal without a drive.
+    /// A value that meets the condition, for a dry run without a drive.
     pub(super) const fn example(self) -> i64 {
         match self {
             Self::Any | Self::NoTorque | Self::AtMost(_) => 0,

@@ -11,8 +11,6 @@ pub const TORQUE_OFFSET: MappedObject = MappedObject::new(0x60B2, 0, 16);
 pub const OPERATION_MODE: MappedObject = MappedObject::new(0x6060, 0, 8);
 pub const STATUSWORD: MappedObject = MappedObject::new(0x6041, 0, 16);
 pub const POSITION: MappedObject = MappedObject::new(0x6064, 0, 32);
-/// The target of interpolated position.
-pub const INTERPOLATION_DATA: MappedObject = MappedObject::new(0x60C1, 1, 32);
 pub const OPERATION_MODE_DISPLAY: MappedObject = MappedObject::new(0x6061, 0, 8);
 pub const VELOCITY: MappedObject = MappedObject::new(0x606C, 0, 32);
 pub const TORQUE: MappedObject = MappedObject::new(0x6077, 0, 16);

@@ -63,7 +63,7 @@ impl AxisSession<'_> {
     /// Repeats an NMT command and an SDO upload of object 1000 until the node answers. The node may have been absent,
     /// and a node in NMT stopped has no SDO server before the command.
     pub async fn wake_up(&self, command: NmtCommand) -> StepResult {
-        let woken = if self.is_rehearsal() {
+        let woken = if self.is_dry_run() {
             Ok(())
         } else {
             match self.bus.read_bytes_after_command(command, DEVICE_TYPE.address).await {
@@ -78,7 +78,7 @@ impl AxisSession<'_> {
     }
 
     async fn reach(&self, change: StateChange) -> StepResult {
-        if self.is_rehearsal() {
+        if self.is_dry_run() {
             return Ok(());
         }
         let StateChange { command, awaited, within_ns, repeat_ns } = change;

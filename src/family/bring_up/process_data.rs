@@ -96,6 +96,7 @@ impl ProcessData {
         let target_of = |control: &Control| match control.target_slot() {
             CommandSlot::TargetVelocity => TARGET_VELOCITY,
             CommandSlot::TargetTorque => TARGET_TORQUE,
+            _ if *control == Control::Interpolated => axis.drive.interpolation_target,
             _ => TARGET_POSITION,
         };
         let mut objects = vec![CONTROLWORD, target_of(&axis.control)];
@@ -106,12 +107,14 @@ impl ProcessData {
             objects.push(OPERATION_MODE);
         }
         objects.extend(axis.other_modes.iter().map(target_of));
-        let follows = |target| axis.controls().map(target_of).any(|own| own == target);
+        let follows = |target| axis.controls().any(|control| control.target_slot() == target);
         // It fits beside the target, where there is one.
-        if axis.feed_forward.has_torque() && (follows(TARGET_POSITION) || follows(TARGET_VELOCITY)) {
+        if axis.feed_forward.has_torque()
+            && (follows(CommandSlot::TargetPosition) || follows(CommandSlot::TargetVelocity))
+        {
             objects.push(TORQUE_OFFSET);
         }
-        if axis.feed_forward.has_velocity() && follows(TARGET_POSITION) {
+        if axis.feed_forward.has_velocity() && follows(CommandSlot::TargetPosition) {
             objects.push(VELOCITY_OFFSET);
         }
         objects

@@ -92,7 +92,7 @@ pub fn overwritten(config: &Config, axis: &Axis) -> Vec<ObjectAddress> {
     let Some(file) = &axis.dcf else { return vec![] };
     // The last write of each object counts: a PDO is made invalid before it is made valid.
     let mut last: Vec<(ObjectAddress, i64)> = vec![];
-    for (object, value) in rehearse(Part::Configure, config, axis).writes {
+    for (object, value) in dry_run(Part::Configure, config, axis).writes {
         last.retain(|(address, _)| *address != object);
         last.push((object, value));
     }
@@ -236,7 +236,7 @@ impl Group {
         let begun = self.members.iter_mut().zip(&config.axes).map(|(member, axis)| {
             let unknown = || AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
             let facts = facts.next().unwrap_or_else(unknown);
-            member.accesses = rehearse(part, config, axis).accesses;
+            member.accesses = dry_run(part, config, axis).accesses;
             member.session.begin_again();
             // The progress shows it before the first poll.
             member.session.resume_step(RESTART_STEP);
@@ -355,18 +355,18 @@ async fn carry_out<'a>(part: Part, c: &'a AxisSession<'a>) -> StepResult {
 }
 
 /// What a part does when the drive answers as expected.
-struct Rehearsal {
+struct DryRun {
     accesses: usize,
     /// Every number that it writes, in order. Values of a configuration file are not listed.
     writes: Vec<(ObjectAddress, i64)>,
 }
 
-fn rehearse(part: Part, config: &Config, axis: &Axis) -> Rehearsal {
+fn dry_run(part: Part, config: &Config, axis: &Axis) -> DryRun {
     let timing = BringUpTiming::default();
     let session = session(axis, timing);
     let facts = AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
-    let c = AxisSession::new(session.clone(), config, axis, timing, part.on_failure(), facts).rehearsal();
+    let c = AxisSession::new(session.clone(), config, axis, timing, part.on_failure(), facts).dry_run();
     // Nothing is waited for without a drive, so one poll is enough.
     let _ = part.of_family(&c).as_mut().poll(&mut Context::from_waker(Waker::noop()));
-    Rehearsal { accesses: session.done(), writes: c.rehearsed() }
+    DryRun { accesses: session.done(), writes: c.dry_writes() }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use takt_rt::OperationMode;
+use takt_rt::{MappedObject, OperationMode};
 
 use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary};
 use crate::canopen::object::{Object, ObjectAddress};
@@ -201,6 +201,10 @@ impl Device {
                 .into_iter()
                 .find(|control| modes.contains(control.operation_mode()))
                 .unwrap_or(Control::Position),
+            interpolation_target: match self.is_mappable(INTERPOLATION_DATA) {
+                true => MappedObject::new(INTERPOLATION_DATA.index, INTERPOLATION_DATA.subindex, 32),
+                false => standard.interpolation_target,
+            },
             has_fixed_process_data: !self.is_mapped_freely(),
             reports_mode: self.is_mappable(ObjectAddress::new(0x6061, 0)),
             sends_emergencies: self.entry(ObjectAddress::new(0x1014, 0)).is_some(),

@@ -15,13 +15,10 @@ pub use starting::starting_configuration;
 
 use std::path::PathBuf;
 
-use super::bring_up::{AxisSession, ProcessData, mapped_objects};
+use super::bring_up::AxisSession;
 use super::commission::{Failure, SdoSession, TargetDrive, Task};
 use super::{CarryingOut, Family, SettingUp};
-use crate::canopen::object::ObjectAddress;
-use crate::config::{
-    Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, FamilyKeys, PdoMapping,
-};
+use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use crate::sim::Drive;
 use bring_up::Sheet;
 
@@ -73,18 +70,6 @@ impl Family for Cia402 {
         None
     }
 
-    fn process_data(&self, axis: &Axis) -> ProcessData {
-        let mut data = ProcessData::mapped_freely(axis);
-        if axis.control == Control::Interpolated && has_interpolation_record(device(axis)) {
-            for object in data.commands.iter_mut().flat_map(|pdo| &mut pdo.objects) {
-                if *object == mapped_objects::TARGET_POSITION {
-                    *object = mapped_objects::INTERPOLATION_DATA;
-                }
-            }
-        }
-        if axis.mapping == PdoMapping::AsStored { data.padded() } else { data }
-    }
-
     fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
         Box::pin(async move { sheet(c).configure().await })
     }
@@ -113,11 +98,6 @@ impl Family for Cia402 {
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
         simulated::drive(axis, device(axis), &config.simulation)
     }
-}
-
-/// Whether the drive has the target of interpolated position, 60C1:1.
-fn has_interpolation_record(device: &Device) -> bool {
-    device.is_mappable(ObjectAddress::new(0x60C1, 1))
 }
 
 /// The bring-up by the data sheet of the axis.

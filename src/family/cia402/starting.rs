@@ -3,21 +3,10 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use takt_rt::OperationMode;
+use takt_rt::CommandSlot;
 
 use super::device::Device;
-use crate::config::{Control, DriveFacts};
-
-/// The words of the modes in a configuration.
-const WORDS: [(&str, OperationMode); 7] = [
-    ("csp", OperationMode::CyclicSynchronousPosition),
-    ("csv", OperationMode::CyclicSynchronousVelocity),
-    ("cst", OperationMode::CyclicSynchronousTorque),
-    ("ip", OperationMode::InterpolatedPosition),
-    ("pp", OperationMode::ProfilePosition),
-    ("pv", OperationMode::ProfileVelocity),
-    ("pt", OperationMode::ProfileTorque),
-];
+use crate::config::{DriveFacts, MODES, mode_word};
 
 /// The text of a configuration with one axis, which has this drive. It is complete, and runs on a simulated bus; what nobody but
 /// the owner of the machine can know is marked.
@@ -36,25 +25,24 @@ pub fn starting_configuration(device: &Device, eds: &Path, node: u8) -> String {
     line(format!("node = {node}"));
     line(format!("drive = \"{}\"", facts.word));
     line(format!("eds = {:?}", eds.display().to_string()));
-    line(format!("mode = \"{}\"  # the drive has {}", word(&facts.usual_mode), modes(&facts)));
+    line(format!(
+        "mode = \"{}\"  # the drive has {}",
+        mode_word(facts.usual_mode.operation_mode()),
+        modes(&facts)
+    ));
     match facts.counts_per_turn {
         Some(counts) => line(format!("counts_per_turn = {counts}  # by the data sheet")),
         None => line("counts_per_turn = 65536  # YOURS: the data sheet does not say".to_owned()),
     }
     line("gear_ratio = 1  # YOURS: turns of the reported position for one turn of the joint".to_owned());
     line("limits = { position = [\"-90 deg\", \"90 deg\"], velocity = \"30 deg/s\", acceleration = \"60 deg/s2\", torque = 10 }  # YOURS".to_owned());
-    if facts.usual_mode.target_slot() == takt_rt::CommandSlot::TargetPosition {
+    if facts.usual_mode.target_slot() == CommandSlot::TargetPosition {
         line("\n[[program.move]]\nto = \"10 deg\"\n\n[[program.move]]\nto = \"0 deg\"".to_owned());
     }
     text
 }
 
-fn word(control: &Control) -> &'static str {
-    let mode = control.operation_mode();
-    WORDS.iter().find(|(_, own)| *own == mode).map_or("csp", |(word, _)| word)
-}
-
 fn modes(facts: &DriveFacts) -> String {
-    let own = WORDS.iter().filter(|(_, mode)| facts.modes.contains(*mode));
+    let own = MODES.iter().filter(|(_, mode)| facts.modes.contains(*mode));
     own.map(|(word, _)| *word).collect::<Vec<_>>().join(", ")
 }

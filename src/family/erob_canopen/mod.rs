@@ -13,8 +13,8 @@ use takt_rt::{Frame, Id};
 use super::{CarryingOut, Family, OtherProtocol, SettingUp};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
-use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys, PdoMapping};
-use crate::family::bring_up::{AxisSession, ProcessData};
+use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
+use crate::family::bring_up::AxisSession;
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{SdoSession, TargetDrive, Task};
 use crate::sim::Drive;
@@ -37,11 +37,6 @@ impl ConfiguredFamily for ErobCanopen {
 impl Family for ErobCanopen {
     fn unconfigured(&self) -> Option<DriveFamily> {
         Some(super::EROB_CANOPEN)
-    }
-
-    fn process_data(&self, axis: &Axis) -> ProcessData {
-        let written = ProcessData::mapped_freely(axis);
-        if axis.mapping == PdoMapping::AsStored { written.padded() } else { written }
     }
 
     fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {

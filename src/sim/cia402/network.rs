@@ -3,7 +3,7 @@
 
 use takt_rt::{Id, Nanoseconds};
 
-use crate::config::quirks::PowerUpState;
+use crate::config::PowerUpState;
 use crate::sim::drive::NodeState;
 use crate::sim::object_dictionary::SimulatedDictionary;
 

@@ -181,7 +181,7 @@ fn a_delay_before_the_first_pdo_and_a_start_by_itself_are_quirks() {
     assert_eq!(synced(&mut tried), 0);
     tried.bench.run_ms(60);
     assert_eq!(synced(&mut tried), 1);
-    let power_up = quirks::PowerUpState::Operational;
+    let power_up = takt::config::PowerUpState::Operational;
     let mut tried = Tried::with(sheet("schunk-lwa4p"), Quirks { power_up, ..Quirks::default() });
     assert_eq!(tried.bench.observe().nmt, NodeState::Operational);
 }
