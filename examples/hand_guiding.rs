@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use takt::channels::ring;
+use takt::ring;
 use takt::{CallbackOptions, Config, Controller, FaultInjector, Scenario, SessionOptions};
 
 const PATIENCE: Duration = Duration::from_secs(60);

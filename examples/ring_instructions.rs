@@ -7,8 +7,8 @@
 
 use std::hint::black_box;
 
-use takt::channels::{ChannelSizes, GroupStream, channels};
-use takt::link::trace::traced;
+use takt::internals::channels::{ChannelSizes, GroupStream, channels};
+use takt::internals::link::trace::traced;
 use takt_rt::{BusHealth, BusPort, CycleRecord, Frame, HostInterface, Id, ReceiveBatch, Received, Snapshot};
 
 /// A bus with drives that answer SYNC.

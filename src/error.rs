@@ -1,12 +1,14 @@
-//! One error for a program that embeds takt.
+//! One error for a program that embeds takt, and what it may have inside.
 
 use std::fmt;
 
 use crate::config::{ConfigError, OverrideError};
-use crate::controller::assemble::AssembleError;
 use crate::controller::session::SessionError;
 use crate::controller::{CommandError, MotionError, StartFailure, StreamError, WaitError};
 use crate::faults::ScenarioError;
+
+pub use crate::controller::assemble::AssembleError;
+pub use crate::controller::realtime_thread::StartError;
 
 /// The result of a program, or of a function of it.
 pub type Result<T = (), E = Error> = std::result::Result<T, E>;

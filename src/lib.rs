@@ -22,11 +22,34 @@
 //!
 //! This crate is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
 //! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
-//! bounded, lock-free channels ([`channels`]), and nothing else.
+//! bounded, lock-free channels, and nothing else.
 //!
+//! # What is here
+//! The root has what most programs need: [`Config`], [`Controller`] and its [`Handle`]s, [`VirtualRun`], [`Trajectory`], the
+//! [`Snapshot`] and the [`Event`]s that they give, and their errors. The rest is in modules, one for each subject:
+//!
+//! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
+//! - [`trajectory`]: points with times, checked as a whole before they are carried out.
+//! - [`schedule`]: whether everything fits on the buses in the worst case.
+//! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
+//! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
+//! - [`faults`]: what can go wrong on a bus or in a drive, on purpose, from a scenario file.
+//! - [`family`]: what takt knows of each family of drives, and how to add one of your own; [`canopen`] has the protocols
+//!   (CiA 301 and 306) that it needs.
+//! - [`link`]: what a bus is connected to, and who commands it.
+//! - [`error`]: one error for a program that embeds takt.
+//! - [`rt`]: what runs inside the real-time thread.
+//!
+//! # To embed takt
+//! A program depends on this crate alone: what it needs of `takt_rt` is re-exported. It makes or reads a [`Config`], starts a
+//! [`Controller`], and commands and observes it through [`Handle`]s, from any thread. `examples/` has a short program for
+//! each way to move. Every error is readable when `main` returns it: see [`Error`].
+//!
+//! # To read takt
 //! Each folder uses only what stands below it in this picture (`tests/arrows.rs` proves it):
 //!
 //! ```text
+//! internals                           what the tests see beyond the public face
 //! cli                                 the program `takt`
 //! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
 //! error                               one error for a program that embeds takt
@@ -41,43 +64,40 @@
 //! trajectory frame_time sleep_alignment source_text printable text_file
 //! ```
 //!
-//! A tour, in the order in which a run meets the parts:
-//!
-//! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
-//! - [`link`]: what a bus is connected to, and who commands it.
-//! - [`schedule`]: whether everything fits on the buses in the worst case.
-//! - [`family`], [`procedure`] and [`canopen`]: what takt knows of each family of drives, and how it sets one up, without I/O.
-//! - [`procedure`]: the engine of procedures on drives, for bring-up, shutdown and [`commission`]ing.
-//! - [`controller`]: assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its
-//!   life: bring-up, enable, program, stop, disable, leave.
-//! - [`commission`]: what a single drive is set up, moved and looked at with, apart from any run.
-//! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
-//! - [`faults`]: what can go wrong on a bus or in a drive, on purpose, from a scenario file.
-//! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
-//! - [`doctor`] and [`jitter`]: whether a machine is fit for it, and how evenly it paces the loop.
-//!
-//! # To embed takt
-//! A program depends on this crate alone: what it needs of `takt_rt` is re-exported. It makes or reads a [`Config`], starts a
-//! [`Controller`], and commands and observes it through [`Handle`]s, from any thread. `examples/` has a short program for
-//! each way to move. Every error is readable when `main` returns it: see [`Error`].
+//! A run meets the parts in this order: `config` reads the file, `link` opens the buses, `schedule` says whether everything fits,
+//! `controller` assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its life (bring-up by
+//! `family`, `procedure` and `canopen`; enable, program, stop, disable, leave), and `telemetry` writes down what happened.
 #![deny(unsafe_code)]
+// Some names are passed on for the tests alone, to whom types of private modules are open.
+#![cfg_attr(not(feature = "internals"), allow(unused_imports))]
+#![cfg_attr(feature = "internals", allow(unnameable_types))]
+// Some functions are for the program alone.
+#![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
 pub mod canopen;
-pub mod channels;
-pub mod commission;
+mod channels;
+#[cfg(feature = "cli")]
+mod cli;
+#[cfg(feature = "cli")]
+mod commission;
 pub mod config;
-pub mod controller;
-pub mod doctor;
-mod error;
+mod controller;
+#[cfg(feature = "cli")]
+mod doctor;
+pub mod error;
 pub mod family;
 pub mod faults;
 mod frame_time;
-pub mod jitter;
-pub mod link;
-pub mod play;
+#[cfg(feature = "internals")]
 #[doc(hidden)]
-pub mod printable;
-pub mod procedure;
+pub mod internals;
+#[cfg(feature = "cli")]
+mod jitter;
+pub mod link;
+#[cfg(feature = "cli")]
+mod play;
+mod printable;
+mod procedure;
 pub mod schedule;
 pub mod sim;
 mod sleep_alignment;
@@ -86,16 +106,24 @@ pub mod telemetry;
 mod text_file;
 pub mod trajectory;
 
+#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub use cli::main as program;
+
+pub use channels::{Consumer, Producer, ring};
 pub use config::{Config, ConfigError};
+pub use controller::port::Port;
+pub use controller::realtime_thread::{Begun, Ended};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
     CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, CommandError, Controller,
-    Events, GroupHandle, Handle, MotionError, MotionId, MoveOptions, Outcome, PointRefusal, Refused,
-    StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualRun, WaitError,
+    Events, GroupHandle, Handle, Interrupt, MotionError, MotionId, MoveOptions, Outcome, PointRefusal,
+    Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualClock, VirtualRun,
+    WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
-pub use link::ownership::IfOwned;
+pub use link::IfOwned;
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 

@@ -1,9 +1,7 @@
-//! The command line of takt.
+//! The program `takt`: its command line is in the library, whose private parts it uses.
 
-mod cli;
+use std::process::ExitCode;
 
-use clap::Parser;
-
-fn main() -> cli::Exit {
-    cli::CommandLine::try_parse().map_or_else(|error| cli::refuse(&error), cli::CommandLine::execute)
+fn main() -> ExitCode {
+    takt::program()
 }

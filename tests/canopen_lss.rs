@@ -1,13 +1,13 @@
 //! The LSS master against several simulated devices at once.
 
 use proptest::prelude::*;
-use takt::canopen::lss::{
+use takt::VirtualClock;
+use takt::internals::canopen::lss::{
     BitTiming, Inquiry, LssAddress, LssBusy, LssError, LssMaster, LssMode, LssOutcome, LssResult, LssTask,
     LssTiming,
 };
-use takt::commission::layer_settings::{ImplausibleIdentity, LayerSettingFailure, LayerSettings};
-use takt::controller::VirtualClock;
-use takt::sim::lss::{LssBus, LssDevice, LssStack};
+use takt::internals::commission::layer_settings::{ImplausibleIdentity, LayerSettingFailure, LayerSettings};
+use takt::internals::sim::lss::{LssBus, LssDevice, LssStack};
 use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch};
 
 const MILLISECOND_NS: u64 = 1_000_000;

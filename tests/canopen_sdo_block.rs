@@ -2,10 +2,8 @@
 
 use proptest::prelude::*;
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{
-    AbortCode, BlockSegment, BlockSize, Completed, Expedited, SdoClient, SdoError, SdoRequest, SdoResponse,
-    SdoTiming, Transfer, Uploaded,
-};
+use takt::canopen::sdo::{AbortCode, Completed, SdoError, SdoTiming, Transfer, Uploaded};
+use takt::internals::canopen::sdo::{BlockSegment, BlockSize, Expedited, SdoClient, SdoRequest, SdoResponse};
 use takt_rt::{Frame, Id};
 
 const NODE: u8 = 2;

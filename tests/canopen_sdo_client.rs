@@ -2,9 +2,8 @@
 
 use proptest::prelude::*;
 use takt::canopen::object::{DataType, ObjectAddress};
-use takt::canopen::sdo::{
-    AbortCode, Completed, MAX_UPLOAD_BYTES, SdoBusy, SdoClient, SdoError, SdoTiming, Transfer, Uploaded,
-};
+use takt::canopen::sdo::{AbortCode, Completed, SdoError, SdoTiming, Transfer, Uploaded};
+use takt::internals::canopen::sdo::{MAX_UPLOAD_BYTES, SdoBusy, SdoClient};
 use takt_rt::{Frame, Id};
 
 const NODE: u8 = 2;

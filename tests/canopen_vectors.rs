@@ -3,7 +3,8 @@
 
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{Completed, Expedited, SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
+use takt::canopen::sdo::{Completed, SdoTiming, Transfer};
+use takt::internals::canopen::sdo::{Expedited, SdoClient, SdoRequest, SdoResponse};
 use takt_rt::{CommandSlot, Frame, Id, MappedObject, Mapping, ProcessImage};
 
 const VECTORS: &str = include_str!("vectors/erob-can.csv");

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use takt::Config;
 use takt::canopen::objects::PdoDirection;
 use takt::canopen::pdo_configuration::PdoConfiguration;
-use takt::controller::{Outcome, VirtualRun};
 use takt::family::bring_up::{PdoPlan, ProcessData};
 use takt::family::cia402::{self, Device};
+use takt::{Outcome, VirtualRun};
 
 const CYCLES_AT_MOST: u64 = 60_000;
 

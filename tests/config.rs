@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use takt::config::{
     Config, Control, Feedback, Interface, OverrideError, PowerUpState, ProblemKind, ProgramTarget, Travel,
 };
-use takt::sim::yz_aim::YzAimParameters;
+use takt::internals::sim::yz_aim::YzAimParameters;
 
 /// The configurations that come with takt; other folders in there hold other things.
 fn configs() -> Vec<PathBuf> {

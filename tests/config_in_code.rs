@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
+use takt::SessionOptions;
 use takt::config::{
     Axis, Bus, Config, Control, DriveFamily, Feedback, Interface, Limits, Program, ProgramMove,
     ProgramTarget, StreamDelay, Travel,
 };
-use takt::controller::session::SessionOptions;
-use takt::controller::{Controller, VirtualRun, assemble};
 use takt::family;
+use takt::internals::controller::assemble;
+use takt::{Controller, VirtualRun};
 
 fn sound() -> Config {
     Config::parse("arm6-erob.toml", include_str!("../configs/arm6-erob.toml")).unwrap()

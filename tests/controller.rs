@@ -5,8 +5,9 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use takt::config::{Config, Control};
-use takt::controller::{Interrupt, Outcome, VirtualRun};
+use takt::internals::RunInside;
 use takt::sim::{DriveFault, Observation, SimulatedBus};
+use takt::{Interrupt, Outcome, VirtualRun};
 use takt_rt::{
     Answer, BusHealth, BusPort, Clock, DriveState, Frame, Id, MAX_AXES, MotionState, Move, Phase,
     ReceiveBatch, RejectReason, Request, RequestKind, Rule, StopCategory,

@@ -13,7 +13,7 @@ use nix::unistd::Pid;
 use proptest::prelude::*;
 use serde_json::Value;
 use takt::config::Config;
-use takt::doctor::{Examination, Finding, Source, Subject, Verdict, examine};
+use takt::internals::doctor::{Examination, Finding, Source, Subject, Verdict, examine};
 use takt::telemetry::Emphasis;
 use takt_rt::linux::{Outcome, Policy, STEP_COUNT, Scheduling, Step, StepResult, ThreadReport};
 use tempfile::TempDir;

@@ -3,9 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use takt::controller::VirtualRun;
-use takt::controller::{MotionError, Outcome};
+use takt::VirtualRun;
+use takt::internals::RunInside;
 use takt::{AxisPoint, CommandError, Config, Controller, SessionOptions, StreamHandle, TrajectoryPoint};
+use takt::{MotionError, Outcome};
 use takt_rt::{ControlLaw, EventKind, OperationMode, Phase, Rule, StopCategory, StreamState};
 
 const LONG: Duration = Duration::from_secs(20);

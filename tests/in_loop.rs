@@ -9,7 +9,9 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, ThreadId};
 use std::time::Duration;
 
-use takt::channels::{CallbackRecord, GivenCallback, ring};
+use takt::internals::RunInside;
+use takt::internals::channels::{CallbackRecord, GivenCallback};
+use takt::ring;
 use takt::rt::{AxisLimits, CallbackId, CallbackRun, Fault, MotionState};
 use takt::sim::SimulatedBus;
 use takt::{

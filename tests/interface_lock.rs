@@ -9,7 +9,9 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 use std::time::Duration;
 
 use nix::unistd::{geteuid, getuid};
-use takt::link::ownership::{InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError};
+use takt::internals::link::ownership::{
+    InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError,
+};
 use tempfile::TempDir;
 
 /// Names the interface for the other process.

@@ -6,9 +6,10 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
+use takt::Port;
+use takt::VirtualRun;
 use takt::config::Config;
-use takt::controller::VirtualRun;
-use takt::controller::port::Port;
+use takt::internals::RunInside;
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingDestination, WallClock};
 
 /// Bytes that all threads together hold on the heap.

@@ -8,16 +8,20 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use takt::channels::{ChannelSizes, HostSide, LogSide, channels};
+use takt::Ended;
+use takt::Outcome;
+use takt::Port;
 use takt::config::Config;
-use takt::controller::port::Port;
-use takt::controller::realtime_thread::{self, Ended, LoopParts};
-use takt::controller::session::{self, Session, SessionOptions};
-use takt::controller::{Outcome, Supervisor, assemble};
-use takt::link::trace::Trace;
+use takt::internals::channels::{ChannelSizes, HostSide, LogSide, channels};
+use takt::internals::controller::realtime_thread::{self, LoopParts};
+use takt::internals::controller::session::{self};
+use takt::internals::controller::{Supervisor, assemble};
+use takt::internals::link::trace::Trace;
+use takt::internals::telemetry::LoggerThread;
 use takt::telemetry::{
-    BlackBoxOptions, Incident, Logger, LoggerOptions, LoggerThread, Machine, Notice, Recorded, WallClock,
+    BlackBoxOptions, Incident, Logger, LoggerOptions, Machine, Notice, Recorded, WallClock,
 };
+use takt::{Session, SessionOptions};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{
     BusHealth, BusPort, Clock, EventKind, Frame, Phase, ReceiveBatch, Request, Snapshot, StopCategory,

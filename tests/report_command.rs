@@ -7,16 +7,16 @@ use std::sync::Arc;
 
 use mcap::records::op;
 use serde_json::Value;
-use takt::channels::{ChannelSizes, GroupStream, channels};
 use takt::config::Config;
-use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario};
-use takt::link::trace::traced;
+use takt::internals::channels::{ChannelSizes, GroupStream, channels};
+use takt::internals::link::trace::traced;
 use takt::sim::SimulatedBus;
 use takt::telemetry::{
     BlackBoxOptions, BusDescription, Emphasis, LogSummary, Logger, LoggerOptions, Machine, RealtimeReport,
     Recorded, RecordingDestination, RunEnd, RunOutcome, RunReport, WallClock,
 };
+use takt::{Outcome, VirtualRun};
 use takt_rt::{CycleRecord, HostInterface, Rule};
 use tempfile::TempDir;
 

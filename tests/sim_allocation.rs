@@ -6,14 +6,14 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
-use takt::controller::port::Port;
+use takt::Port;
 use takt::faults::{
     DelayPlace, DriveEffect, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect,
     Part, ScenarioFault, Selection, Trigger, Window,
 };
-use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::internals::sim::erob::{ErobJoint, ErobParameters};
+use takt::internals::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::plant::{Encoder, JointParameters};
-use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::{Defect, Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 

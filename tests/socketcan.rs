@@ -5,11 +5,12 @@ use std::process::Command;
 use std::thread::sleep;
 use std::time::Duration;
 
+use takt::Port;
 use takt::config::Config;
-use takt::controller::port::Port;
-use takt::link::{
-    InterfaceError, InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
+use takt::internals::link::{
+    InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
 };
+use takt::link::InterfaceError;
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
 use takt_rt::{BusPort, BusState, Clock, Frame, Id, Outgoing, ReceiveBatch, Received};
 

@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
+use takt::internals::sim::yz_aim::{Gearing, Model, OBJECTS, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::plant::JointParameters;
-use takt::sim::yz_aim::{Gearing, Model, OBJECTS, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 

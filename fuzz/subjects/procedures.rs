@@ -2,12 +2,13 @@
 
 use std::sync::OnceLock;
 
-use takt::canopen::lss::{
-    BitTiming, Inquiry, LssAddress, LssMaster, LssMode, LssRequest, LssTask, LssTiming,
-};
 use takt::canopen::sdo;
 use takt::config::Config;
-use takt::family::bring_up::{BringUp, BringUpTiming, Shutdown};
+use takt::family::bring_up::BringUpTiming;
+use takt::internals::canopen::lss::{
+    BitTiming, Inquiry, LssAddress, LssMaster, LssMode, LssRequest, LssTask, LssTiming,
+};
+use takt::internals::family::bring_up::{BringUp, Shutdown};
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 

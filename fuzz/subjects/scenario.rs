@@ -2,8 +2,8 @@
 
 use std::sync::OnceLock;
 
+use takt::Port;
 use takt::config::Config;
-use takt::controller::port::Port;
 use takt::faults::{FaultInjector, Scenario};
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, Phase, ReceiveBatch, Snapshot};

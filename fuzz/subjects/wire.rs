@@ -3,12 +3,13 @@
 use std::sync::OnceLock;
 
 use takt::canopen::emcy::Emergency;
-use takt::canopen::lss::{LssRequest, LssResponse};
 use takt::canopen::nmt::{ErrorControl, NmtCommand};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
-use takt::canopen::time::TimeOfDay;
+use takt::canopen::sdo::{SdoTiming, Transfer};
 use takt::config::Config;
+use takt::internals::canopen::lss::{LssRequest, LssResponse};
+use takt::internals::canopen::sdo::{SdoClient, SdoRequest, SdoResponse};
+use takt::internals::canopen::time::TimeOfDay;
 use takt::sim::SimulatedBus;
 use takt_rt::{
     BusPort, DriveState, Frame, Id, MAX_OBJECTS, MappedObject, Mapping, ProcessImage, ReceiveBatch,

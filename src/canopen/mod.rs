@@ -1,31 +1,29 @@
-//! The CANopen services (CiA 301) of a master, without input and output: the caller passes time and frames in, and
-//! sends the frames that come out.
+//! The CANopen services (CiA 301) of a master, as far as a family of drives or a data sheet needs them, without input and output:
+//! the caller passes time and frames in, and sends the frames that come out.
 //!
 //! - [`nmt`]: network management: commands, states, boot-up and heartbeat.
-//! - [`sdo`]: service data objects: the messages, and a client that transfers one object at a time, expedited,
-//!   segmented or in blocks.
+//! - [`sdo`]: service data objects: what one transfers, and how it fails.
 //! - [`emcy`]: emergency messages and the names of their codes.
-//! - [`time`]: the TIME message.
-//! - [`lss`]: layer setting services: node IDs and bit rates.
 //! - [`dcf`]: the values that a configuration file writes to a device, and their order.
 //! - [`eds`]: electronic data sheets and device configuration files.
-//! - [`pdo_configuration`]: the configuration of a PDO, from a device or a file; [`pdo_reader`] reads it from a device.
+//! - [`pdo_configuration`]: the configuration of a PDO, from a device or a file.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard objects used here.
 
 pub mod dcf;
 pub mod eds;
 pub mod emcy;
-pub mod lss;
+#[cfg(feature = "cli")]
+pub(crate) mod lss;
 pub mod nmt;
 pub mod object;
 pub mod objects;
 pub mod pdo_configuration;
-pub mod pdo_reader;
+pub(crate) mod pdo_reader;
 pub mod sdo;
-pub mod time;
+pub(crate) mod time;
 
 /// Function codes of the pre-defined connection set (CiA 301, 7.3.3), to which the node ID is added.
-pub mod function_code {
+pub(crate) mod function_code {
     /// Network management, without a node ID.
     pub const NMT: u16 = 0x000;
     /// SYNC, without a node ID.

@@ -52,7 +52,7 @@ impl DataType {
     }
 
     /// The type with this length and the sign of this one; `None` if there is none.
-    pub const fn of_length(self, length: usize) -> Option<Self> {
+    pub(crate) const fn of_length(self, length: usize) -> Option<Self> {
         let is_signed = matches!(self, Self::I8 | Self::I16 | Self::I32);
         Some(match (length, is_signed) {
             (1, true) => Self::I8,

@@ -92,10 +92,10 @@ pub const HARDWARE_VERSION: ObjectAddress = ObjectAddress::new(0x1009, 0);
 pub const SOFTWARE_VERSION: ObjectAddress = ObjectAddress::new(0x100A, 0);
 
 /// Bit of a PDO's COB-ID that makes the PDO invalid (CiA 301, 7.5.2.35).
-pub const PDO_INVALID: u32 = 1 << 31;
+pub(crate) const PDO_INVALID: u32 = 1 << 31;
 /// The valid bit and the 11-bit identifier of a PDO's COB-ID. Bit 30 (no RTR) is excluded, because some devices force
 /// it.
-pub const PDO_IDENTITY: u32 = PDO_INVALID | 0x7FF;
+pub(crate) const PDO_IDENTITY: u32 = PDO_INVALID | 0x7FF;
 
 /// The direction of a PDO, seen from the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,22 +149,22 @@ impl PdoParameters {
     }
 
     /// Sub-index 3, in 100 µs.
-    pub const fn inhibit_time(self) -> Object {
+    pub(crate) const fn inhibit_time(self) -> Object {
         Object::new(self.communication, 3, DataType::U16, "PDO inhibit time")
     }
 
     /// Sub-index 5, in ms.
-    pub const fn event_timer(self) -> Object {
+    pub(crate) const fn event_timer(self) -> Object {
         Object::new(self.communication, 5, DataType::U16, "PDO event timer")
     }
 
     /// Sub-index 0 of the mapping: the number of mapped objects.
-    pub const fn mapped_count(self) -> Object {
+    pub(crate) const fn mapped_count(self) -> Object {
         Object::new(self.mapping, 0, DataType::U8, "number of mapped objects")
     }
 
     /// Sub-index `position` of the mapping, counted from 1.
-    pub const fn mapped_object(self, position: u8) -> Object {
+    pub(crate) const fn mapped_object(self, position: u8) -> Object {
         Object::new(self.mapping, position, DataType::U32, "mapped object")
     }
 }

@@ -22,6 +22,7 @@ pub struct CallbackRecord {
 
 /// How the calls of a callback have gone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct CallbackTimes {
     /// How often it was called.
     pub calls: u64,

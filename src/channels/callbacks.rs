@@ -139,6 +139,7 @@ impl GivenCallback {
     }
 
     /// The group.
+    #[cfg(feature = "internals")]
     pub fn group(&self) -> u8 {
         self.group
     }

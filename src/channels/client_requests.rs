@@ -119,6 +119,7 @@ pub struct ClientRequests {
 
 impl ClientRequests {
     /// Submits a request for all groups. `None` if too many requests wait already.
+    #[cfg(feature = "internals")]
     pub fn submit(&self, request: Request) -> Option<RequestId> {
         self.submit_to(RequestTarget::All, request)
     }

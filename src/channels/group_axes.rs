@@ -18,6 +18,7 @@ impl GroupAxes {
     }
 
     /// How many axes the group has.
+    #[cfg(feature = "internals")]
     pub fn count(&self) -> usize {
         self.places.len()
     }

@@ -309,6 +309,7 @@ impl HostSide {
     ///
     /// # Errors
     /// [`ChannelError::Full`]; nothing is sent then.
+    #[cfg(feature = "internals")]
     pub fn run_callback(
         &mut self,
         given: GivenCallback,
@@ -352,7 +353,7 @@ impl HostSide {
 
     /// The events from now on, for another thread.
     pub fn events(&self) -> EventReader {
-        self.observed.from_now_on()
+        self.observed.begin_now()
     }
 
     /// The writing ends of the points of streams, for any thread.

@@ -31,7 +31,7 @@ pub struct EventReader {
 
 impl EventReader {
     /// A place behind the newest event.
-    pub fn from_now_on(&self) -> Self {
+    pub fn begin_now(&self) -> Self {
         Self { next: self.reader.completed() + 1, missed: 0, reader: self.reader.clone() }
     }
 
@@ -84,7 +84,7 @@ mod tests {
         let (mut writer, mut first) = observed_events(4);
         assert_eq!(first.next(), None);
         (1..=2).for_each(|slot| writer.write(&event(slot)));
-        let mut second = first.from_now_on();
+        let mut second = first.begin_now();
         writer.write(&event(3));
         assert_eq!((slots(&mut first), slots(&mut second)), (vec![1, 2, 3], vec![3]));
         writer.write(&event(4));

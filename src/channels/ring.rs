@@ -66,7 +66,7 @@ impl<T> Producer<T> {
     }
 
     /// Counts an item that was dropped before it came here.
-    pub fn count_dropped(&mut self) {
+    pub(crate) fn count_dropped(&mut self) {
         self.dropped += 1;
         self.shared.dropped.store(self.dropped, Ordering::Relaxed);
     }

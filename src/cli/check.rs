@@ -5,11 +5,11 @@ mod unattended;
 
 use std::path::PathBuf;
 
+use crate::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel, mode_word};
+use crate::schedule::{self, BusSchedule};
 use clap::Args;
 use serde::Serialize;
-use takt::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel, mode_word};
-use takt::rt::ModeCondition;
-use takt::schedule::{self, BusSchedule};
+use takt_rt::ModeCondition;
 
 use super::exit::Exit;
 use super::print;

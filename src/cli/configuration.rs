@@ -4,7 +4,7 @@ use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
 
-use takt::config::Config;
+use crate::config::Config;
 
 use super::usage_error::UsageError;
 

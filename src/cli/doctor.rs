@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use takt::doctor::{SelfTest, Source, Subject, Verdict, attempt, examine};
-use takt::jitter::{self, JitterOptions, Pacing};
+use crate::doctor::{SelfTest, Source, Subject, Verdict, attempt, examine};
+use crate::jitter::{self, JitterOptions, Pacing};
 
 use super::configuration;
 use super::exit::Exit;

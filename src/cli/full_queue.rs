@@ -1,7 +1,7 @@
 //! Why frames found no room in the queue of an interface, and what mends it.
 
-use takt::config::{Bus, Config, Interface};
-use takt::link::transmit_queue_length;
+use crate::config::{Bus, Config, Interface};
+use crate::link::transmit_queue_length;
 use takt_rt::{BusHealth, BusState, Snapshot};
 
 /// As many frames as takt hands to an interface at once, at most. A queue that is shorter can be full on a healthy bus.

@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use takt::config::Interface;
-use takt::jitter::{self, JitterOptions, JitterReport, Measurement, Pacing};
+use crate::config::Interface;
+use crate::jitter::{self, JitterOptions, JitterReport, Measurement, Pacing};
 
 use super::exit::Exit;
 use super::interruption;
@@ -43,7 +43,7 @@ pub struct Arguments {
 }
 
 fn interface(text: &str) -> Result<Interface, String> {
-    text.parse().map_err(|error: takt::config::InterfaceError| format!("{error}: {}", error.help()))
+    text.parse().map_err(|error: crate::config::InterfaceError| format!("{error}: {}", error.help()))
 }
 
 impl Arguments {

@@ -24,15 +24,23 @@ mod sim;
 mod table;
 mod usage_error;
 
-pub use exit::Exit;
-pub use usage_error::of_command_line as refuse;
+use std::process::{ExitCode, Termination};
 
 use clap::{Parser, Subcommand};
+
+use exit::Exit;
+
+/// The program `takt`: does what the command line says.
+pub fn main() -> ExitCode {
+    let exit = CommandLine::try_parse()
+        .map_or_else(|error| usage_error::of_command_line(&error), CommandLine::execute);
+    exit.report()
+}
 
 /// Hard-real-time joint-motion controller for CAN drives.
 #[derive(Parser, Debug)]
 #[command(version, arg_required_else_help = true)]
-pub struct CommandLine {
+struct CommandLine {
     #[command(subcommand)]
     command: Command,
 }
@@ -54,7 +62,7 @@ enum Command {
 
 impl CommandLine {
     /// Does what the command line says.
-    pub fn execute(self) -> Exit {
+    fn execute(self) -> Exit {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Report(arguments) => report::run(&arguments),

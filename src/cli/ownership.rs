@@ -1,6 +1,6 @@
 //! `--take-over`, and the message when another master is found.
 
-use takt::link::ownership::{ClaimError, IfOwned};
+use crate::link::ownership::{ClaimError, IfOwned};
 
 use super::usage_error::UsageError;
 

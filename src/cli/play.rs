@@ -9,16 +9,16 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use takt::config::Config;
-use takt::controller::realtime_thread::StartError;
-use takt::controller::session::{SessionError, SessionOptions};
-use takt::controller::{Controller, Outcome, StartFailure};
-use takt::play::{
+use crate::config::Config;
+use crate::controller::realtime_thread::StartError;
+use crate::controller::session::{SessionError, SessionOptions};
+use crate::controller::{Controller, Outcome, StartFailure};
+use crate::play::{
     ArmedFrom, AxisMaxima, FileStream, FileTrajectory, PlayError, PlayFile, PlayFileError, PlayedGroup,
     RealStage, SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
 };
-use takt::schedule;
-use takt::telemetry::{Machine, StopReport, words};
+use crate::schedule;
+use crate::telemetry::{Machine, StopReport, words};
 use takt_rt::{Follow, NANOSECONDS_PER_SECOND, Snapshot, StopReason, StreamDelay};
 
 use super::configuration::{self, BusOverride};
@@ -210,7 +210,7 @@ pub fn run(arguments: &Arguments) -> Exit {
 /// The file, and what is to be played of it.
 fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, Piece), Exit> {
     let wrong_file = |error: PlayFileError| print_problem(&arguments.file, &error, arguments.json);
-    let bytes = takt::play::read(&arguments.file).map_err(|error| {
+    let bytes = crate::play::read(&arguments.file).map_err(|error| {
         let words = format!("cannot read {}: {error}", arguments.file.display());
         UsageError::from(words).print(arguments.json)
     })?;

@@ -3,8 +3,8 @@
 use std::env;
 use std::io::{self, ErrorKind, IsTerminal, Write, stdout};
 
+use crate::telemetry::Emphasis;
 use serde::Serialize;
-use takt::telemetry::Emphasis;
 
 use super::exit::Exit;
 

@@ -10,13 +10,13 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use takt::config::{Config, Interface, Master};
-use takt::controller::realtime_thread::StartError;
-use takt::controller::session::{self, Session, SessionError, SessionOptions};
-use takt::controller::{Interrupt, Outcome, Progress};
-use takt::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
-use takt::schedule;
-use takt::telemetry::{
+use crate::config::{Config, Interface, Master};
+use crate::controller::realtime_thread::StartError;
+use crate::controller::session::{self, Session, SessionError, SessionOptions};
+use crate::controller::{Interrupt, Outcome, Progress};
+use crate::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
+use crate::schedule;
+use crate::telemetry::{
     Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
 };
 use takt_rt::{Event, EventKind, Fault, Snapshot, StopReason};

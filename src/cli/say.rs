@@ -5,7 +5,7 @@
 use std::fmt;
 use std::io::{Write, stderr};
 
-use takt::printable::printable;
+use crate::printable::printable;
 
 /// Writes a line, as `eprintln!` does.
 macro_rules! say {

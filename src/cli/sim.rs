@@ -10,12 +10,12 @@ use std::thread;
 
 use clap::Args;
 
-use takt::config::{Config, Interface};
-use takt::controller::port::open_configured;
-use takt::family::simulated_drives;
-use takt::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
-use takt::link::{OpenError, SocketCanOptions};
-use takt::sim::LiveDrives;
+use crate::config::{Config, Interface};
+use crate::controller::port::open_configured;
+use crate::family::simulated_drives;
+use crate::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
+use crate::link::{OpenError, SocketCanOptions};
+use crate::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;

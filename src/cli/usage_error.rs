@@ -3,9 +3,9 @@
 use std::env;
 use std::ffi::OsStr;
 
+use crate::config::ConfigError;
+use crate::printable::printable;
 use serde::Serialize;
-use takt::config::ConfigError;
-use takt::printable::printable;
 
 use super::exit::Exit;
 use super::print;

@@ -13,9 +13,8 @@
 pub mod bus_session;
 pub mod layer_settings;
 
-pub use crate::family::commission::{
-    CommandValue, DEFAULT_SHARE, DriveProfile, Failure, MotionProfile, MoveKind, Procedure, ProcedureError,
-    ReadObject, Report, ReportItem, SdoSession, TargetDrive, Task, command_value, dictionary, meaning,
-    procedure,
+pub(crate) use crate::family::commission::{
+    CommandValue, Failure, MotionProfile, MoveKind, Procedure, ProcedureError, ReadObject, Report,
+    TargetDrive, Task, command_value, dictionary, meaning, procedure,
 };
-pub use crate::procedure::{AxisReading, ProcedureEvent, SdoQuirks};
+pub(crate) use crate::procedure::{AxisReading, ProcedureEvent};

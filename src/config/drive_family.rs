@@ -101,6 +101,7 @@ impl ModeSet {
 
 /// The unit of a drive's velocities.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum VelocityUnit {
     /// So many counts of the reported position in a second.
     Counts(f64),
@@ -110,7 +111,7 @@ pub enum VelocityUnit {
 
 impl VelocityUnit {
     /// What the drive calls a speed of one turn of its position in a second.
-    pub const fn units_per_turn(self, counts_per_turn: f64) -> f64 {
+    pub(crate) const fn units_per_turn(self, counts_per_turn: f64) -> f64 {
         match self {
             Self::Counts(counts) => counts_per_turn / counts,
             Self::RevolutionsPerMinute(rpm) => 60.0 / rpm,
@@ -120,6 +121,7 @@ impl VelocityUnit {
 
 /// Whether drives take another mode at run time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ModeChangeRule {
     /// They do, under this condition.
     When(ModeCondition),
@@ -154,7 +156,7 @@ pub struct Plausible {
 
 impl Plausible {
     /// Nothing is known.
-    pub const ANYTHING: Self =
+    pub(crate) const ANYTHING: Self =
         Self { fastest_turns_per_s: f64::INFINITY, usual_velocity: f64::INFINITY, inner_gear_from: None };
 }
 
@@ -186,7 +188,7 @@ impl DriveFacts {
     }
 
     /// Whether the drives have the mode.
-    pub fn has_mode(&self, control: &Control) -> bool {
+    pub(crate) fn has_mode(&self, control: &Control) -> bool {
         self.modes.contains(control.operation_mode())
     }
 

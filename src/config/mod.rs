@@ -33,7 +33,7 @@ pub use drive_family::{
 };
 pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;
-pub use mode_words::{MODES, mode_word};
+pub(crate) use mode_words::{MODES, mode_word};
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};

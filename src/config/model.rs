@@ -159,6 +159,7 @@ pub struct Bus {
 
 /// What a bus is connected to.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Interface {
     /// Simulated drives inside this process.
     Simulated,
@@ -269,6 +270,7 @@ impl Travel {
 
 /// Whose mapping of a drive's PDOs counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PdoMapping {
     /// The controller writes it at bring-up.
     Written,
@@ -279,6 +281,7 @@ pub enum PdoMapping {
 /// Something a drive can report every cycle beside statusword and position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum Feedback {
     /// 6061, one byte.
     OperationMode,
@@ -380,6 +383,7 @@ pub struct ProgramMove {
 
 /// What a move wants of every axis.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ProgramTarget {
     /// To be there: rad (m).
     Position(Vec<f64>),
@@ -445,6 +449,7 @@ pub struct Joint {
 
 /// The NMT state of a simulated drive after power-up. Not every manual says which one real units have.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PowerUpState {
     /// Pre-operational, as CiA 301 has it.
     #[default]

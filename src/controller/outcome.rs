@@ -8,6 +8,7 @@ use crate::telemetry::{Machine, words};
 
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Outcome {
     /// The program has finished, or its time has passed.
     Finished,
@@ -140,6 +141,7 @@ impl Outcome {
 
 /// How a run is asked to end before its program has finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Interrupt {
     /// Decelerate, hold, disable, shut down.
     Controlled,

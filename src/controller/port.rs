@@ -16,6 +16,7 @@ use crate::sim::SimulatedBus;
 const TRACE_FRAMES: usize = 1 << 13;
 
 /// A bus port of any kind.
+#[non_exhaustive]
 pub enum Port {
     /// A bus with simulated drives inside this process.
     Simulated(Box<SimulatedBus>),

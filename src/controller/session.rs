@@ -51,6 +51,7 @@ pub struct SessionOptions {
 
 /// The result of a run.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Session {
     /// How it ended.
     pub outcome: Outcome,
@@ -59,9 +60,10 @@ pub struct Session {
     /// The target of the last move of each axis (rad or m); `None` where that has no target position. Empty if the program did
     /// not finish.
     pub targets: Vec<Option<f64>>,
-    /// The axes whose drives did not answer during the shut-down: see [`Supervisor::unreached`].
+    /// The axes whose drives were brought up and did not answer during the shut-down. It is unknown whether they have stopped.
     pub unreached: Vec<usize>,
-    /// The axes whose drives showed an error during the shut-down, with its code: see [`Supervisor::drive_errors`].
+    /// The axes whose drives showed an error during the shut-down, with its code. A drive without an error code in its process
+    /// data tells it there alone.
     pub drive_errors: Vec<(usize, u16)>,
     /// The result of the real-time set-up.
     pub begun: Begun,

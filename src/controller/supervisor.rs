@@ -127,6 +127,7 @@ impl Supervisor {
     }
 
     /// The data that the drives have reported about themselves; empty before they are configured.
+    #[cfg(feature = "internals")]
     pub fn facts(&self) -> &[AxisFacts] {
         &self.facts
     }

@@ -106,7 +106,7 @@ impl VirtualRun<SimulatedBus> {
     /// A controller of this configuration on simulated buses, and the side for its logger.
     ///
     /// # Errors
-    /// See [`assemble::engine`].
+    /// See [`AssembleError`].
     pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
         // The simulated drives take the values as they are.
         config.validate()?;
@@ -119,7 +119,7 @@ impl VirtualRun<Port> {
     /// A controller of this configuration on simulated buses with injected faults, and the side for its logger.
     ///
     /// # Errors
-    /// See [`assemble::engine`].
+    /// See [`AssembleError`].
     pub fn with_faults(
         config: &Config,
         fault_injector: Arc<FaultInjector>,
@@ -136,17 +136,17 @@ impl<P: BusPort> VirtualRun<P> {
     /// A controller of this configuration on these ports, and the side for its logger.
     ///
     /// # Errors
-    /// See [`assemble::engine`].
+    /// See [`AssembleError`].
     pub fn new(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
         Self::with_supervisor(Supervisor::new(config, None), config, ports)
     }
 
     /// The same as [`VirtualRun::new`], without a program: after bring-up the group executes the requests of
-    /// [`VirtualRun::host`], until it is interrupted.
+    /// its host, until it is interrupted.
     ///
     /// # Errors
-    /// See [`assemble::engine`].
-    pub fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
+    /// See [`AssembleError`].
+    pub(crate) fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
         Self::with_supervisor(Supervisor::serving(config), config, ports)
     }
 
@@ -234,12 +234,12 @@ impl<P: BusPort> VirtualRun<P> {
     }
 
     /// The life cycle.
-    pub fn supervisor(&self) -> &Supervisor {
+    pub(crate) fn supervisor(&self) -> &Supervisor {
         &self.supervisor
     }
 
     /// The host's side of the host interface, to command the group directly.
-    pub fn host(&mut self) -> &mut HostSide {
+    pub(crate) fn host(&mut self) -> &mut HostSide {
         &mut self.host
     }
 

@@ -30,6 +30,7 @@ impl Source {
 
     /// A machine whose files lie below `root`, and whose programs, by their command line, answer so. Others are not
     /// installed there.
+    #[cfg(feature = "internals")]
     pub fn recorded(root: &Path, answers: BTreeMap<String, String>) -> Self {
         Self { root: root.to_owned(), answers: Some(answers) }
     }

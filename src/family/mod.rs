@@ -7,21 +7,24 @@
 pub mod bring_up;
 pub mod cia402;
 pub mod commission;
-pub mod erob_canopen;
+pub(crate) mod erob_canopen;
 mod error_words;
 mod registry;
 mod simulated_bus;
 mod warning;
-pub mod yz_aim;
+pub(crate) mod yz_aim;
 
 use std::pin::Pin;
 
 use takt_rt::{Frame, Id};
 
+pub use crate::procedure::{AxisReading, CanopenClient, CanopenSession, ProcedureSession, SdoQuirks};
 pub use error_words::{error_cure, error_words};
-pub use registry::{NameTaken, all, named, of, register};
-pub use simulated_bus::simulated_drives;
-pub use warning::{Warning, WarningKind, is_rounded};
+pub use registry::{NameTaken, all, register};
+pub(crate) use registry::{named, of};
+pub(crate) use simulated_bus::simulated_drives;
+pub(crate) use warning::is_rounded;
+pub use warning::{Warning, WarningKind};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
@@ -29,7 +32,6 @@ use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{Failure, Report, SdoSession, TargetDrive, Task};
-use crate::procedure::SdoQuirks;
 use crate::sim::Drive;
 
 /// ZeroErr eRob with CANopen firmware.
@@ -123,6 +125,7 @@ pub trait Family: ConfiguredFamily {
 
 /// How the PDOs that a drive reports are matched with those that its axis needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MappingMatch {
     /// Any PDO may carry an object.
     ByContent,
@@ -143,7 +146,7 @@ pub struct OtherProtocol {
 
 /// Every identifier between a drive and its master: those that CANopen gives to its node (CiA 301, 7.3.3), and those of
 /// the vendor's own protocol.
-pub fn identifiers(family: &DriveFamily, node: u8) -> Vec<Id> {
+pub(crate) fn identifiers(family: &DriveFamily, node: u8) -> Vec<Id> {
     let canopen = (1..=0xE).map(|function| Id::canopen(function << 7, node));
     let other = of(family).other_protocol(node);
     canopen.chain(other.into_iter().flat_map(|other| [other.request.id(), other.answer])).collect()

@@ -15,7 +15,7 @@ fn simulated(axis: &Axis, config: &Config) -> Box<dyn Drive> {
 }
 
 /// The drives that simulate the axes of a bus.
-pub fn simulated_drives(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
+pub(crate) fn simulated_drives(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
     let axes = config.axes.iter().filter(|axis| axis.bus == bus);
     axes.map(|axis| simulated(axis, config)).collect()
 }

@@ -182,7 +182,7 @@ impl Config {
 }
 
 /// Whether a drive that gets `rounded` runs otherwise than commanded.
-pub fn is_rounded(commanded: f64, rounded: f64) -> bool {
+pub(crate) fn is_rounded(commanded: f64, rounded: f64) -> bool {
     (commanded - rounded).abs() > ROUNDING * commanded.abs()
 }
 

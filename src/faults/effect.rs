@@ -6,6 +6,7 @@ use super::injectable::DriveEffect;
 
 /// The effect of a fault while it is active.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Effect {
     /// On the selected frames.
     Frames(FrameEffect),
@@ -24,6 +25,7 @@ pub enum Effect {
 
 /// The effect on a selected frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FrameEffect {
     /// The frame is lost; a sent one counts as confirmed.
     Drop,
@@ -56,7 +58,7 @@ pub enum FrameEffect {
 
 impl FrameEffect {
     /// Whether this effect exists for sent frames only.
-    pub const fn is_of_sending(self) -> bool {
+    pub(crate) const fn is_of_sending(self) -> bool {
         matches!(self, Self::EchoLoss | Self::FullQueue)
     }
 }
@@ -81,6 +83,7 @@ pub enum Part {
 
 /// The effect on the interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum InterfaceEffect {
     /// The controller has gone off the bus: nothing is sent or received.
     BusOff,
@@ -92,6 +95,7 @@ pub enum InterfaceEffect {
 
 /// The frames of a foreign station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ForeignFrames {
     /// One frame, once or periodically.
     Frame {

@@ -7,6 +7,7 @@ use crate::sim::{Defect, DriveFault, InjectDefectError, SimulatedBus, UnknownNod
 
 /// An effect on a simulated drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum DriveEffect {
     /// The drive is disconnected from the bus but keeps running.
     Silent,
@@ -22,7 +23,7 @@ pub enum DriveEffect {
 
 impl DriveEffect {
     /// Whether this is a momentary event, so that nothing has to be undone later.
-    pub const fn is_event(self) -> bool {
+    pub(crate) const fn is_event(self) -> bool {
         match self {
             Self::Reboot | Self::Cause(_) => true,
             Self::Silent | Self::LoadTorque(_) => false,

@@ -48,6 +48,7 @@ impl FaultInjector {
 
 /// A change of a fault's state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Transition {
     /// The fault has begun.
     Began,
@@ -68,6 +69,7 @@ pub struct FaultEvents {
 
 /// An event of a fault, for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FaultEvent<'a> {
     /// The fault.
     pub fault: &'a ScenarioFault,

@@ -21,6 +21,7 @@ pub enum Direction {
 
 /// The function of a frame by the pre-defined connection set (CiA 301, 7.3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum FrameFunction {
     /// Network management, 000.
     Nmt,
@@ -40,7 +41,7 @@ pub enum FrameFunction {
 
 impl FrameFunction {
     /// Whether an identifier has this function.
-    pub fn includes(self, id: u32) -> bool {
+    pub(crate) fn includes(self, id: u32) -> bool {
         let is_of = |functions: &[u16]| functions.iter().any(|function| id & !0x7F == u32::from(*function));
         match self {
             Self::Nmt => id == u32::from(function_code::NMT),
@@ -90,7 +91,7 @@ impl Default for Selection {
 
 impl Selection {
     /// Whether a frame of this direction ([`Direction::Sent`] or [`Direction::Received`]) meets the conditions.
-    pub fn includes(&self, frame: &Frame, direction: Direction) -> bool {
+    pub(crate) fn includes(&self, frame: &Frame, direction: Direction) -> bool {
         let id = frame.id().value();
         let is_canopen = !frame.id().is_extended();
         (self.direction == Direction::Both || self.direction == direction)

@@ -6,6 +6,7 @@ use takt_rt::{Nanoseconds, Phase, Snapshot};
 
 /// The trigger from which a fault's time is counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Trigger {
     /// The opening of the bus, before the drives are brought up.
     Start,

@@ -81,7 +81,7 @@ pub fn traced<P: BusPort>(port: P, name: &str, capacity: usize) -> (TracedPort<P
 
 impl Trace {
     /// The name of the bus.
-    pub fn name(&self) -> &str {
+    pub(crate) fn name(&self) -> &str {
         &self.name
     }
 

@@ -14,12 +14,12 @@ mod stream;
 mod table;
 mod trajectory;
 
-pub use error::{FileProblem, PlayFileError};
-pub use file::{JointColumns, JointPoint, PlayFile, PlayRow, read};
+pub use error::PlayFileError;
+pub use file::{PlayFile, read};
 pub use groups::PlayedGroup;
 pub use in_real_time::{RealStage, SharedSetPointLog};
 pub use in_virtual_time::VirtualStage;
-pub use performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage, StreamSummary, execute, stream};
+pub use performance::{PlayError, Stage, StreamSummary, execute, stream};
 pub use set_points::{ArmedFrom, AxisMaxima, SetPointLog};
 pub use stream::FileStream;
 pub use trajectory::FileTrajectory;

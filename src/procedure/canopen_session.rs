@@ -45,23 +45,23 @@ impl CanopenSession {
     }
 
     /// Whether restarts of the node are watched for.
-    pub fn watches_restarts(&self) -> bool {
+    pub(crate) fn watches_restarts(&self) -> bool {
         self.client().expected_boot_ups.is_some()
     }
 
     /// From now on, a boot-up beyond the first `expected` is a restart, unless they are watched for already.
-    pub fn watch_restarts(&self, expected: u32) {
+    pub(crate) fn watch_restarts(&self, expected: u32) {
         self.client_mut().expected_boot_ups.get_or_insert(expected);
     }
 
     /// Whether the node has restarted, and so has lost its configuration.
-    pub fn has_restarted(&self) -> bool {
+    pub(crate) fn has_restarted(&self) -> bool {
         let client = self.client();
         client.expected_boot_ups.is_some_and(|expected| client.boot_ups > expected)
     }
 
     /// Takes note of one restart.
-    pub fn accept_restart(&self) {
+    pub(crate) fn accept_restart(&self) {
         let mut client = self.client_mut();
         client.expected_boot_ups = client.expected_boot_ups.map(|expected| expected.saturating_add(1));
     }
@@ -103,12 +103,12 @@ impl CanopenSession {
     }
 
     /// Starts to collect all frames on the bus.
-    pub fn begin_collecting(&self) {
+    pub(crate) fn begin_collecting(&self) {
         self.client_mut().collected = Some(vec![]);
     }
 
     /// Stops collecting and returns the frames.
-    pub fn end_collecting(&self) -> Vec<Frame> {
+    pub(crate) fn end_collecting(&self) -> Vec<Frame> {
         self.client_mut().collected.take().unwrap_or_default()
     }
 
@@ -148,7 +148,7 @@ impl CanopenSession {
     ///
     /// # Errors
     /// That of the transfer.
-    pub async fn read_bytes_after_command(
+    pub(crate) async fn read_bytes_after_command(
         &self,
         command: NmtCommand,
         object: ObjectAddress,
@@ -161,7 +161,7 @@ impl CanopenSession {
     }
 
     /// Forgets a transfer that was given up, without an abort, and what belongs to it.
-    pub fn reset_transfer(&self) {
+    pub(crate) fn reset_transfer(&self) {
         let mut client = self.client_mut();
         client.sdo.reset();
         client.before_request = None;
@@ -169,7 +169,7 @@ impl CanopenSession {
     }
 
     /// Changes the number of retries of the next transfers.
-    pub fn set_retries(&self, retries: u8) {
+    pub(crate) fn set_retries(&self, retries: u8) {
         let mut client = self.client_mut();
         let timing = SdoTiming { retries, ..client.quirks.timing };
         client.sdo = SdoClient::new(client.node, timing);

@@ -31,7 +31,6 @@ mod session;
 pub use access::Access;
 pub use canopen_client::CanopenClient;
 pub use canopen_session::{CanopenSession, POLL_NS};
-pub use client::Client;
 pub use event::{AxisReading, ProcedureEvent};
 pub use parallel::Parallel;
 pub use running::{Procedure, ProcedureError};

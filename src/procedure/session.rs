@@ -109,17 +109,17 @@ impl<C> ProcedureSession<C> {
     }
 
     /// Continues an earlier step without reporting it again.
-    pub fn resume_step(&self, name: &'static str) {
+    pub(crate) fn resume_step(&self, name: &'static str) {
         self.state_mut().step = name;
     }
 
     /// The name of the current step.
-    pub fn step_name(&self) -> &'static str {
+    pub(crate) fn step_name(&self) -> &'static str {
         self.state().step
     }
 
     /// Keeps the current step as the failing one, although further steps follow.
-    pub fn keep_failing_step(&self) {
+    pub(crate) fn keep_failing_step(&self) {
         let mut state = self.state_mut();
         state.failing_step = state.failing_step.or(Some(state.step));
     }
@@ -141,17 +141,17 @@ impl<C> ProcedureSession<C> {
     }
 
     /// Counts a finished access, for the progress.
-    pub fn count_done(&self) {
+    pub(crate) fn count_done(&self) {
         self.state_mut().done += 1;
     }
 
     /// The number of finished accesses.
-    pub fn done(&self) -> usize {
+    pub(crate) fn done(&self) -> usize {
         self.state().done
     }
 
     /// Sets the progress back to the beginning.
-    pub fn begin_again(&self) {
+    pub(crate) fn begin_again(&self) {
         self.state_mut().done = 0;
     }
 

@@ -11,6 +11,7 @@ use crate::frame_time::FrameShape;
 /// What a message is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
+#[non_exhaustive]
 pub enum MessageKind {
     /// SYNC of the controller (CiA 301, 7.2.5).
     Sync,

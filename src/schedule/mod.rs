@@ -20,9 +20,9 @@ mod command_phase;
 mod loading;
 mod messages;
 mod remedy;
-mod response_time;
+pub(crate) mod response_time;
 mod slot;
-pub mod text;
+pub(crate) mod text;
 
 use serde::Serialize;
 use thiserror::Error;
@@ -31,15 +31,15 @@ use crate::config::{Config, Cycle};
 use bound::Traffic;
 use messages::BusMessage;
 
-pub use crate::frame_time::{BitCount, BitRates, FrameShape, worst_case_bits};
+pub(crate) use crate::frame_time::{BitRates, worst_case_bits};
 pub use command_phase::{NoCommandPhase, automatic_command_phase};
 pub use messages::MessageKind;
 pub use remedy::Remedy;
-pub use response_time::{Message, response_time};
 pub use slot::Slot;
 
 /// The result of the analysis of one bus. Times are in ns.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct BusSchedule {
     /// Its name.
     pub name: String,
@@ -86,6 +86,7 @@ pub const COMPUTE_RESERVE_NS: u64 = 20_000;
 
 /// What one emergency message does to the worst slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct EmergencyEffect {
     /// How long it is on the wire.
     pub transmission_ns: u64,
@@ -113,6 +114,7 @@ impl EmergencyEffect {
 
 /// The result of the analysis of one message. Times are in ns.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct MessageSchedule {
     /// What it is.
     pub kind: MessageKind,

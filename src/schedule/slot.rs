@@ -21,6 +21,7 @@ use crate::frame_time::{BitRates, worst_case_bits};
 
 /// The worst slot of a bus. All times are counted from the start of the slot or are lengths, in ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
 pub struct Slot {
     /// What SYNC may have to wait for.
     pub wait_before_sync_ns: u64,

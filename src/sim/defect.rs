@@ -6,6 +6,7 @@ use takt_rt::Frame;
 /// A defect of a drive or its joint. Most are states that last until they are removed; the others are momentary events
 /// ([`Defect::is_event`]).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Defect {
     /// The joint is blocked.
     BlockedJoint,

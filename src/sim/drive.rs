@@ -103,6 +103,7 @@ impl NodeState {
 /// The cause of a drive fault. The error codes are those of CiA 402-2 (IEC 61800-7-201), unless the drive's own is
 /// known.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum DriveFault {
     /// Short circuit or over-current at the motor: 0x2310. Power is cut at once.
     OverCurrent,

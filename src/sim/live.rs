@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use takt_rt::Frame;
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
-use takt_rt::{BusHealth, BusPort, Clock, Nanoseconds, ReceiveBatch};
+use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::drive::Drive;
 use super::lss::LssDevice;
@@ -82,11 +82,6 @@ impl LiveDrives {
     /// The node IDs, in the order of the configuration.
     pub fn nodes(&self) -> impl Iterator<Item = u8> + '_ {
         self.stations.iter().map(|(drive, _)| drive.node())
-    }
-
-    /// The state of the interface.
-    pub fn health(&mut self) -> BusHealth {
-        self.port.health()
     }
 
     fn receive_frames(&mut self, now_ns: Nanoseconds) {
@@ -199,7 +194,7 @@ mod tests {
         let answer = received(&mut drives, &mut master, 1);
         assert_eq!(answer[0].id(), Id::canopen(0x580, nodes[1]));
         assert_eq!(answer[0].payload()[..4], [0x43, 0x00, 0x10, 0]);
-        assert_eq!(drives.health().rx_frames, 1);
+        assert_eq!(drives.port.health().rx_frames, 1);
     }
 
     #[test]

@@ -74,16 +74,19 @@ impl LssDevice {
     }
 
     /// Its node ID; `None` while it is unconfigured.
+    #[cfg(feature = "internals")]
     pub fn node(&self) -> Option<u8> {
         self.active.node
     }
 
     /// The bit rate in use.
+    #[cfg(feature = "internals")]
     pub fn bit_timing(&self) -> BitTiming {
         self.active.bit_timing
     }
 
     /// Its LSS state.
+    #[cfg(feature = "internals")]
     pub fn mode(&self) -> LssMode {
         self.mode
     }
@@ -249,6 +252,7 @@ impl LssBus {
     }
 
     /// The devices.
+    #[cfg(feature = "internals")]
     pub fn devices(&self) -> &[LssDevice] {
         &self.devices
     }

@@ -20,40 +20,34 @@
 //! construction.
 //!
 //! ```
-//! use takt::sim::{WireBitRates, SimulatedBus};
-//! use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
+//! use takt::Config;
+//! use takt::rt::{BusPort, Frame, Id, ReceiveBatch};
+//! use takt::sim::SimulatedBus;
 //!
-//! # fn parameters() -> takt::sim::erob::ErobParameters {
-//! #     use takt::sim::erob::ErobParameters;
-//! #     use takt::sim::plant::{Encoder, JointParameters};
-//! #     ErobParameters {
-//! #         node: 5,
-//! #         joint: JointParameters { inertia: 0.3, viscous_friction: 1.0, coulomb_friction: 3.0, brake_torque: 60.0 },
-//! #         encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
-//! #         counts_per_turn: 524_288.0, initial_position: 0.0, rated_torque: 31.0, peak_torque: 60.0,
-//! #         highest_velocity: 3.0, power_up_ns: 1_000_000, feedback_delay_ns: 20_000, has_battery: true,
-//! #         has_interpolated_position: false, is_upload_segmented: false, seed: 1,
-//! #     }
-//! # }
-//! let drive = takt::sim::erob::ErobJoint::new(parameters());
-//! let rates = WireBitRates { nominal: 1_000_000, data: None };
-//! let mut bus = SimulatedBus::with_drives(rates, u64::MAX, vec![Box::new(drive)]);
-//!
-//! let mut batch = ReceiveBatch::new();
+//! let config = Config::load("configs/first.toml".as_ref())?;
+//! let mut bus = SimulatedBus::new(&config, 0);
 //! bus.send(0, &[]); // the supply is switched on
-//! bus.receive(2_000_000, &mut batch); // two milliseconds later
-//! assert_eq!(batch[0].frame, Frame::of(Id::canopen(0x700, 5), [0])); // boot-up
+//! let mut batch = ReceiveBatch::new();
+//! let mut now_ns = 0;
+//! while batch.is_empty() {
+//!     now_ns += 1_000_000;
+//!     bus.receive(now_ns, &mut batch);
+//! }
+//! assert_eq!(batch[0].frame, Frame::of(Id::canopen(0x700, 1), [0])); // boot-up
+//! # Ok::<(), takt::ConfigError>(())
 //! ```
 
 pub mod cia402;
 mod defect;
 mod drive;
-pub mod erob;
+pub(crate) mod erob;
 pub mod homing_switches;
-mod live;
-pub mod lss;
-mod mailbox;
-mod medium;
+#[cfg(feature = "cli")]
+pub(crate) mod live;
+#[cfg(feature = "cli")]
+pub(crate) mod lss;
+pub(crate) mod mailbox;
+pub(crate) mod medium;
 mod object_dictionary;
 mod pdo_engine;
 pub mod plant;
@@ -62,15 +56,14 @@ pub(crate) mod random;
 mod sdo_reply;
 mod sdo_server;
 mod servo;
-mod wire_length;
-pub mod yz_aim;
+pub(crate) mod wire_length;
+pub(crate) mod yz_aim;
 
 pub use defect::{Defect, Unsupported};
 pub use drive::{Drive, DriveFault, NodeState, Observation};
-pub use live::LiveDrives;
+#[cfg(feature = "cli")]
+pub(crate) use live::LiveDrives;
 pub use mailbox::{Mailbox, QueueOrder};
-pub use medium::{FrameOnWire, Medium, WireBitRates};
+pub use medium::WireBitRates;
 pub use plant::Gravity;
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
-pub use sdo_reply::AbortCode;
-pub use wire_length::{INTERMISSION_BITS, WireLength, bits_ns};

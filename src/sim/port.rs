@@ -48,6 +48,7 @@ pub struct UnknownNode {
 
 /// Why a defect could not be injected.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum InjectDefectError {
     /// The drive does not exist.
     #[error(transparent)]

@@ -43,6 +43,7 @@ pub struct BlackBoxOptions {
 
 /// What makes the black box write a file.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Incident {
     /// A group stopped for a fault.
     Stop {

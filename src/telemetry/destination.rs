@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 /// Where a recording or a log is written.
+#[non_exhaustive]
 pub enum RecordingDestination {
     /// A new file in this folder, named after the machine and the time. The folder is made if it does not exist.
     Directory(PathBuf),
@@ -17,7 +18,7 @@ pub enum RecordingDestination {
 }
 
 /// An open destination.
-pub struct Opened {
+pub(crate) struct Opened {
     /// Its name in messages.
     pub label: String,
     /// The file, if it is one.
@@ -29,14 +30,14 @@ pub struct Opened {
 /// Why a file could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[error("{path}: {reason}")]
-pub struct OpenError {
+pub(crate) struct OpenError {
     path: String,
     reason: io::Error,
 }
 
 impl RecordingDestination {
     /// Opens it. For a folder, `stem` and `extension` make the file name.
-    pub fn open(self, stem: &str, extension: &str) -> Result<Opened, OpenError> {
+    pub(crate) fn open(self, stem: &str, extension: &str) -> Result<Opened, OpenError> {
         let path = match self {
             Self::Directory(directory) => directory.join(format!("{}.{extension}", file_name(stem))),
             Self::File(path) => path,

@@ -45,8 +45,9 @@ pub struct LoggerOptions {
 
 /// Something that people may want to know at once.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Notice {
-    /// An event; [`words::event`] gives its text.
+    /// An event; [`event_words`](super::event_words) gives its text.
     Event(Event),
     /// A file can no longer be written: which one, and why. Each failure is reported once. The motion goes on.
     NotWritten(String),
@@ -54,6 +55,7 @@ pub enum Notice {
 
 /// The result of a logger.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct LogSummary {
     /// Names and units.
     pub machine: Machine,
@@ -141,7 +143,7 @@ impl Logger {
 
     /// Also calls this with the record of each cycle, in the thread that drains. It must not panic.
     #[must_use]
-    pub fn with_each_cycle(self, each_cycle: Option<EachCycle>) -> Self {
+    pub(crate) fn with_each_cycle(self, each_cycle: Option<EachCycle>) -> Self {
         Self { each_cycle, ..self }
     }
 

@@ -83,7 +83,7 @@ impl Unit {
     }
 
     /// `mrad` or `mm`.
-    pub const fn milli_symbol(self) -> &'static str {
+    pub(crate) const fn milli_symbol(self) -> &'static str {
         match self {
             Self::Radian => "mrad",
             Self::Metre => "mm",
@@ -139,12 +139,12 @@ impl Machine {
     }
 
     /// An error code of the drive of an axis, in words.
-    pub fn drive_error(&self, axis: u8, code: u16) -> String {
+    pub(crate) fn drive_error(&self, axis: u8, code: u16) -> String {
         family::error_words(self.family(axis), code)
     }
 
     /// The cure of an error of the drive of an axis.
-    pub fn drive_cure(&self, axis: u8, code: u16) -> &'static str {
+    pub(crate) fn drive_cure(&self, axis: u8, code: u16) -> &'static str {
         family::error_cure(self.family(axis), code)
     }
 

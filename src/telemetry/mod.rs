@@ -1,8 +1,8 @@
 //! What a run makes visible: statistics, recordings, reports, and texts about events.
 //!
 //! The real-time thread puts a record of every cycle, and an event for each change, into lock-free rings
-//! ([`crate::channels`]). A [`Logger`] empties them, in a thread of its own that is not real-time
-//! ([`LoggerThread`]), or step by step in virtual time. A failure in this module never reaches the motion. A full ring
+//! ([`LogSide`] reads them). A [`Logger`] empties them, in a thread of its own that is not real-time
+//! (`LoggerThread`), or step by step in virtual time. A failure in this module never reaches the motion. A full ring
 //! drops records and counts them. A full disk ends the recording with one message. A caller's function that panics is not
 //! called again.
 //!
@@ -25,22 +25,26 @@ mod recording_report;
 pub(crate) mod render;
 mod report;
 mod statistics;
-mod thread;
+pub(crate) mod thread;
 mod wall_clock;
-pub mod words;
+pub(crate) mod words;
 
+pub use crate::channels::LogSide;
 pub use black_box::{BlackBoxOptions, Incident};
 pub use destination::RecordingDestination;
 pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use recorded::{Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, WalkError};
-pub use recording_report::{AxisCycle, AxisCycles, AxisSummary, BusChange, RecordingReport, ReportedEvent};
+pub use recording_report::{
+    AxisCycle, AxisCycles, AxisSummary, BusChange, GroupSummary, RecordingReport, ReportedEvent,
+};
 pub use render::Emphasis;
 pub use report::{
-    AxisReport, BusReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport, SetPointParts,
-    StopReport, TelemetryReport,
+    AxisReport, BusReport, GroupReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport,
+    SetPointParts, StopReport, TelemetryReport,
 };
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
-pub use thread::LoggerThread;
+pub(crate) use thread::LoggerThread;
 pub use wall_clock::WallClock;
+pub use words::event as event_words;

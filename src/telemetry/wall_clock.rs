@@ -26,7 +26,7 @@ impl WallClock {
     }
 
     /// Nanoseconds since 1970-01-01 UTC at an instant of the monotonic clock.
-    pub const fn unix_ns(self, at_ns: Nanoseconds) -> u64 {
+    pub(crate) const fn unix_ns(self, at_ns: Nanoseconds) -> u64 {
         self.unix_at_zero_ns.saturating_add(at_ns)
     }
 

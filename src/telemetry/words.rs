@@ -10,7 +10,7 @@ use super::machine::Machine;
 mod rejection;
 mod stop;
 
-pub use rejection::{rejection, request};
+pub use rejection::rejection;
 pub use stop::stop;
 pub(crate) use stop::{stop_cause, stop_cure};
 

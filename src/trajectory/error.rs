@@ -4,6 +4,7 @@ use std::fmt;
 
 /// What of a point is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum PointQuantity {
     /// Its position.
     Position,
@@ -25,6 +26,7 @@ impl fmt::Display for PointQuantity {
 
 /// The limit that a motion breaks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum BrokenLimit {
     /// The lowest or the highest position.
     Position,

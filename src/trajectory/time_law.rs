@@ -71,7 +71,7 @@ pub enum RateError {
 
 impl Trajectory {
     /// How far along its path the group is so long after the beginning, and how fast it goes along it.
-    pub fn path_time(&self, at_s: f64) -> PathTime {
+    pub(crate) fn path_time(&self, at_s: f64) -> PathTime {
         self.view().path_time(at_s)
     }
 

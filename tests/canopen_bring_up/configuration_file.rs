@@ -6,7 +6,8 @@ use takt::canopen::dcf::{self, DeviceConfiguration, Download};
 use takt::canopen::eds;
 use takt::canopen::sdo::AbortCode;
 use takt::config::Config;
-use takt::family::bring_up::{BringUp, BringUpError};
+use takt::family::bring_up::BringUpError;
+use takt::internals::family::bring_up::BringUp;
 
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, ReceiveBatch};

@@ -3,7 +3,8 @@
 use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
-use takt::family::bring_up::{BringUp, FailureCause, ProbeResult, Shutdown};
+use takt::family::bring_up::{FailureCause, ProbeResult};
+use takt::internals::family::bring_up::{BringUp, Shutdown};
 use takt_rt::DriveState;
 
 use super::scripted_drive::{ScriptedDrive, at};

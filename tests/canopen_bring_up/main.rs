@@ -11,7 +11,8 @@ use scripted_drive::at;
 use takt::canopen::emcy::ErrorCode;
 use takt::canopen::nmt::{ErrorControl, NmtState};
 use takt::config::{Config, Control};
-use takt::family::bring_up::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage};
+use takt::family::bring_up::BringUpTiming;
+use takt::internals::family::bring_up::{BringUp, BringUpProgress, NotConfigured, Shutdown, Stage};
 use takt_rt::{DriveState, Frame, Id};
 use world::{World, config};
 

@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse, Segment};
+use takt::canopen::sdo::AbortCode;
+use takt::internals::canopen::sdo::{Expedited, SdoRequest, SdoResponse, Segment};
 use takt_rt::{Command, DriveState, Frame, Id, controlword};
 
 const INVALID: u32 = 1 << 31;

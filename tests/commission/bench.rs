@@ -2,13 +2,13 @@
 
 use std::cell::Cell;
 
-use takt::commission::bus_session::{self, SessionEvent};
-use takt::commission::dictionary::{self, SelectedObject};
-use takt::commission::{
-    CommandValue, MotionProfile, MoveKind, ProcedureError, ProcedureEvent, ReadObject, Report, TargetDrive,
-    Task, procedure,
+use takt::VirtualClock;
+use takt::family::commission::{
+    CommandValue, MotionProfile, MoveKind, ReadObject, Report, TargetDrive, Task,
 };
-use takt::controller::VirtualClock;
+use takt::internals::commission::bus_session::{self, SessionEvent};
+use takt::internals::commission::dictionary::{self, SelectedObject};
+use takt::internals::commission::{ProcedureError, ProcedureEvent, procedure};
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use takt::commission::dictionary::{self, SelectedObject};
-use takt::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::config::Config;
 use takt::family;
+use takt::family::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
+use takt::internals::commission::dictionary::{self, SelectedObject};
 use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::{BusPort, Clock, DriveState, Frame, Id};
 

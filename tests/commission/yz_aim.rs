@@ -2,12 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use takt::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::config::{Limits, Travel};
 use takt::family;
+use takt::family::commission::{
+    CommandValue, Failure, MotionProfile, MoveKind, ReadObject, TargetDrive, Task,
+};
+use takt::internals::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::homing_switches::{HomingSwitches, Switch};
 use takt::sim::plant::{EndStops, JointParameters};
-use takt::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Clock, Frame, Id, Scale, ScaleParameters};
 
@@ -415,7 +417,7 @@ fn the_gear_is_read_and_changed_and_command_keys_are_refused() {
 #[test]
 fn a_missing_object_is_named_after_a_timeout() {
     let mut bench = bench();
-    let object = takt::commission::ReadObject {
+    let object = ReadObject {
         address: takt::canopen::object::ObjectAddress::new(0x6502, 0),
         entry: None,
         data_type: None,

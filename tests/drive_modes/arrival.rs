@@ -1,7 +1,7 @@
 //! Every configuration reaches what its program asks for.
 
+use takt::Outcome;
 use takt::config::ProgramTarget;
-use takt::controller::Outcome;
 use takt_rt::{DriveState, Phase};
 
 use crate::world::{World, counts_per_unit, load};

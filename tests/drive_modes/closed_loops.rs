@@ -2,8 +2,8 @@
 //! gains that a configuration may have.
 
 use proptest::prelude::*;
+use takt::Outcome;
 use takt::config::Config;
-use takt::controller::Outcome;
 use takt_rt::Phase;
 
 use crate::world::{World, parse};

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use takt::Outcome;
 use takt::canopen::dcf::{self, DeviceConfiguration, Download};
 use takt::canopen::eds;
 use takt::canopen::object::ObjectAddress;
 use takt::config::Config;
-use takt::controller::Outcome;
 
 use crate::world::{World, id, one_yz_aim, parse};
 

@@ -1,7 +1,7 @@
 //! Interpolated position on YZ-AIMs as it is on the wire: RPDO4 to every axis, then SYNC, every 2 ms.
 
+use takt::Outcome;
 use takt::config::{Config, ProgramTarget};
-use takt::controller::Outcome;
 use takt_rt::Phase;
 
 use crate::world::{

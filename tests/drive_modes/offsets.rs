@@ -1,5 +1,6 @@
 //! What is sent beside the target: the velocity offset (object 60B1) and the torque offset (object 60B2).
 
+use takt::internals::RunInside;
 use takt_rt::{AxisPoint, MAX_AXES, Phase, PointRole, PositionPoint, Request, StreamPoint};
 
 use crate::world::{World, counts_per_unit, id, parse, text_of};

@@ -1,7 +1,7 @@
 //! Profile position: the handshake, targets in motion, every stop, and what is refused.
 
+use takt::Outcome;
 use takt::config::Config;
-use takt::controller::Outcome;
 use takt::sim::Defect;
 use takt_rt::{
     Frame, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory, controlword, statusword,

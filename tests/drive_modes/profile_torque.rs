@@ -1,8 +1,8 @@
 //! Profile torque: within its limit, by the rated torque that the drive reports, and let go when the joint is too fast.
 
+use takt::Outcome;
 use takt::config::Config;
-use takt::controller::Outcome;
-use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::internals::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::{DriveState, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory};
 

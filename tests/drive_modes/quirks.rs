@@ -1,8 +1,8 @@
 //! What real YZ-AIMs do beside their manual keeps neither bring-up nor motion from working.
 
+use takt::Outcome;
 use takt::config::Config;
-use takt::controller::Outcome;
-use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
+use takt::internals::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::Phase;
 

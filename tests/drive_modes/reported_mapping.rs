@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
+use takt::Outcome;
 use takt::canopen::dcf::DeviceConfiguration;
 use takt::canopen::eds;
 use takt::config::Config;
-use takt::controller::Outcome;
-use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
+use takt::internals::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 
 use crate::world::{World, counts_per_unit, id, load, one_yz_aim, parse, text_of, word};

@@ -1,7 +1,7 @@
 //! The controller falls silent in motion and comes back, as a process that was stopped and continued.
 
+use takt::Outcome;
 use takt::config::Config;
-use takt::controller::Outcome;
 use takt::family;
 use takt_rt::{BusPort, DriveState, Phase, Rule};
 

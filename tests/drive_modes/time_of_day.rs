@@ -1,7 +1,7 @@
 //! TIME: when it is sent, what it says, and that nobody minds.
 
-use takt::canopen::time::TimeOfDay;
-use takt::controller::Outcome;
+use takt::Outcome;
+use takt::internals::canopen::time::TimeOfDay;
 use takt::schedule::{self, MessageKind};
 use takt_rt::TIME_ID;
 

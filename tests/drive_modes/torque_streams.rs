@@ -1,5 +1,6 @@
 //! Streams of torques and impedances on a simulated eRob in cyclic synchronous torque.
 
+use takt::internals::RunInside;
 use takt_rt::{AxisPoint, MAX_AXES, Phase, PointRole, Request, Rule, StopCategory, StreamPoint, StreamState};
 
 use crate::world::{World, load};

@@ -3,10 +3,11 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use takt::channels::LogSide;
 use takt::config::{Axis, Config, ProgramMove, ProgramTarget, Travel};
-use takt::controller::{Outcome, VirtualRun};
+use takt::internals::RunInside;
+use takt::internals::channels::LogSide;
 use takt::sim::{Observation, SimulatedBus};
+use takt::{Outcome, VirtualRun};
 use takt_rt::{
     BusHealth, BusPort, Event, EventKind, Frame, Id, MotionState, Phase, ProfileMove, ProfileTarget,
     ReceiveBatch, Received, Request, RequestId, StopReason,

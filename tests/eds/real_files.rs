@@ -3,7 +3,7 @@
 use takt::canopen::eds::{self, AccessType, DataTypeCode, DictionaryEntry, Loaded, ObjectType};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
-use takt::sim::erob;
+use takt::internals::sim::erob;
 
 fn load(name: &str) -> Loaded {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(name);

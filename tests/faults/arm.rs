@@ -4,11 +4,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use takt::Port;
 use takt::config::{Axis, Config, Feedback};
-use takt::controller::port::Port;
-use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultEvents, FaultInjector, Scenario};
 use takt::sim::Observation;
+use takt::{Outcome, VirtualRun};
 use takt_rt::{AxisSnapshot, DriveState, EventKind, Phase, StopReason};
 
 /// Timeout: twenty seconds are longer than the shortened program.

@@ -1,7 +1,7 @@
 //! Scenario files: the examples, the reference, and the messages about invalid files.
 
+use takt::Outcome;
 use takt::config::Config;
-use takt::controller::Outcome;
 use takt::faults::Scenario;
 
 use crate::arm::{arm, folder, play_scenario};

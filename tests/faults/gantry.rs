@@ -1,7 +1,7 @@
 //! Reactions of the controller to faults of YZ-AIM servos.
 
+use takt::Outcome;
 use takt::config::Config;
-use takt::controller::Outcome;
 use takt::faults::Scenario;
 use takt_rt::{Phase, Rule, StopCategory};
 

@@ -1,6 +1,6 @@
 //! Drives whose replies are always whole cycles late, so that each reply looks like one to the next SYNC or set-point.
 
-use takt::controller::Outcome;
+use takt::Outcome;
 use takt_rt::{Phase, Rule, StopCategory};
 
 use takt::config::Config;

@@ -1,7 +1,7 @@
 //! A lost heartbeat of the controller: drives begin to monitor it with the first one that they receive.
 
+use takt::VirtualRun;
 use takt::config::Config;
-use takt::controller::VirtualRun;
 use takt::sim::SimulatedBus;
 use takt_rt::{BusHealth, BusPort, DriveState, Frame, Id, Phase, ReceiveBatch};
 

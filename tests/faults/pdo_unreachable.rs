@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
+use takt::Port;
 use takt::config::Config;
-use takt::controller::port::Port;
-use takt::controller::{Interrupt, VirtualRun};
 use takt::faults::FaultInjector;
+use takt::internals::RunInside;
 use takt::sim::NodeState;
+use takt::{Interrupt, VirtualRun};
 use takt_rt::Phase;
 
 use crate::arm::{folder, scenario};

@@ -1,6 +1,6 @@
 //! The controller's reaction to each fault that has a rule, and the invariants for all faults.
 
-use takt::controller::Outcome;
+use takt::Outcome;
 use takt_rt::{BusState, Origin, Phase, Rule, StopCategory};
 
 use crate::arm::{Played, arm, play};

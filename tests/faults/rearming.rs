@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use takt::Port;
+use takt::VirtualRun;
 use takt::config::Config;
-use takt::controller::VirtualRun;
-use takt::controller::port::Port;
 use takt::faults::FaultInjector;
+use takt::internals::RunInside;
 use takt::sim::SimulatedBus;
 use takt_rt::{Fault, Phase, Request, Rule, StopCause, StopReason};
 

@@ -2,7 +2,7 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-use takt::controller::VirtualRun;
+use takt::VirtualRun;
 
 use crate::arm::{arm, play};
 

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use takt::Port;
 use takt::config::Config;
-use takt::controller::port::Port;
-use takt::controller::{Outcome, VirtualRun};
 use takt::faults::FaultInjector;
+use takt::internals::RunInside;
+use takt::{Outcome, VirtualRun};
 use takt_rt::{Phase, Rule};
 
 use crate::arm::{arm, scenario};

@@ -5,8 +5,8 @@ mod belt_servo;
 
 use std::sync::Once;
 
-use takt::controller::{Outcome, VirtualRun};
 use takt::{Config, family};
+use takt::{Outcome, VirtualRun};
 
 const CONFIGURATION: &str = "name = \"belt\"\n[[bus]]\nname = \"can\"\n[[axis]]\nname = \"belt\"\nbus = \"can\"\nnode = 4\n\
     drive = \"belt-servo\"\npulley = \"large\"\ntravel = \"linear\"\nlead = \"100 mm\"\n\

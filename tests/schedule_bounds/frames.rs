@@ -1,7 +1,7 @@
 //! Frames that are as long as their content can make them.
 
-use takt::schedule::{BitRates, FrameShape, worst_case_bits};
-use takt::sim::WireLength;
+use takt::internals::schedule::{BitRates, FrameShape, worst_case_bits};
+use takt::internals::sim::WireLength;
 use takt_rt::{Frame, FrameKind, Id};
 
 /// Runs of four equal bits, shifted, and runs of five: what needs the most stuff bits depends on the bits before.

@@ -1,8 +1,8 @@
 //! Response times of messages that are queued at any moment.
 
 use proptest::prelude::*;
-use takt::schedule::BitRates;
-use takt::schedule::{Message, response_time};
+use takt::internals::schedule::BitRates;
+use takt::internals::schedule::{Message, response_time};
 use takt::sim;
 use takt_rt::{Frame, FrameKind, Id};
 

@@ -2,7 +2,8 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use takt::sim::{Mailbox, Medium, QueueOrder, WireBitRates};
+use takt::internals::sim::Medium;
+use takt::sim::{Mailbox, QueueOrder, WireBitRates};
 use takt_rt::{Frame, Id};
 
 /// A frame that has been received, times in ns.

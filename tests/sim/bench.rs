@@ -1,6 +1,6 @@
 //! A bus with simulated eRob joints and a master that the test controls, in virtual time.
 
-use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::internals::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Drive, Observation, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch, Received};

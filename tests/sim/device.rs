@@ -1,7 +1,7 @@
 //! The CiA 402 state machine: the statuswords of real units, faults and fault resets.
 
+use takt::internals::sim::erob::ErobParameters;
 use takt::sim::DriveFault;
-use takt::sim::erob::ErobParameters;
 use takt_rt::DriveState;
 
 use super::bench::{Bench, NODE, parameters};

@@ -2,8 +2,8 @@
 //! The two calculations are independent.
 
 use proptest::prelude::*;
-use takt::schedule::{FrameShape, worst_case_bits};
-use takt::sim::WireLength;
+use takt::internals::schedule::{FrameShape, worst_case_bits};
+use takt::internals::sim::WireLength;
 use takt_rt::{Frame, Id};
 
 fn identifiers() -> impl Strategy<Value = Id> {

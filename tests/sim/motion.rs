@@ -1,6 +1,6 @@
 //! The modes in which the master generates the trajectory: CSP, CSV, CST.
 
-use takt::sim::erob::ErobParameters;
+use takt::internals::sim::erob::ErobParameters;
 use takt::sim::plant::Encoder;
 use takt_rt::DriveState;
 

@@ -1,6 +1,6 @@
 //! NMT, boot-up, heartbeat producer and consumer, node guarding, emergency messages.
 
-use takt::sim::erob::ErobParameters;
+use takt::internals::sim::erob::ErobParameters;
 use takt::sim::{DriveFault, NodeState};
 use takt_rt::{DriveState, Frame, Id};
 

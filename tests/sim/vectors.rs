@@ -45,7 +45,7 @@ fn split(line: &str) -> Vec<String> {
 #[test]
 fn the_drive_answers_every_printed_canopen_exchange_as_printed() {
     // One capture shows that mode 7 is accepted, although object 6502 of other units excludes it.
-    let mut bench = Bench::with(vec![takt::sim::erob::ErobParameters {
+    let mut bench = Bench::with(vec![takt::internals::sim::erob::ErobParameters {
         has_interpolated_position: true,
         ..parameters(2)
     }]);

@@ -10,8 +10,8 @@ mod set_up;
 
 use std::f64::consts::TAU;
 
+use takt::internals::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::plant::JointParameters;
-use takt::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
 
 use super::bench::{Bench, MILLISECOND_NS, NODE};
 

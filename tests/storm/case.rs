@@ -1,7 +1,7 @@
 //! A case: everything that its seed decides.
 
+use takt::Interrupt;
 use takt::config::{Axis, Config, Control, Follow, Group, ProgramMove, ProgramTarget};
-use takt::controller::Interrupt;
 use takt::faults::Scenario;
 
 use crate::dice::Dice;

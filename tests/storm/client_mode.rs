@@ -1,7 +1,8 @@
 //! Somebody who changes the modes of axes, mostly when that is possible: while the group is disabled.
 
+use takt::VirtualRun;
 use takt::config::{Axis, Config, Control};
-use takt::controller::VirtualRun;
+use takt::internals::RunInside;
 use takt_rt::{MAX_AXES, ModeChange, OperationMode, Phase, Request, RequestTarget, Snapshot};
 
 use crate::dice::Dice;

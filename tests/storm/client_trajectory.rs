@@ -3,9 +3,10 @@
 
 use std::sync::Arc;
 
-use takt::channels::{GivenTrajectory, GroupAxes};
+use takt::VirtualRun;
 use takt::config::{Axis, Config};
-use takt::controller::VirtualRun;
+use takt::internals::RunInside;
+use takt::internals::channels::{GivenTrajectory, GroupAxes};
 use takt::trajectory::{Trajectory, TrajectoryConditions, TrajectoryPoint};
 use takt_rt::plan::State;
 use takt_rt::{

@@ -1,8 +1,9 @@
 //! A machine that has too little time for the loop: cycles that take long to compute, SYNC that is held up, queues of
 //! interfaces that do not drain.
 
+use takt::VirtualRun;
 use takt::config::Config;
-use takt::controller::VirtualRun;
+use takt::internals::RunInside;
 
 use crate::concern::Concerns;
 use crate::dice::Dice;
@@ -131,7 +132,7 @@ impl Overload {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt::controller::Outcome;
+    use takt::Outcome;
 
     use crate::machine::load;
     use crate::run::World;

@@ -1,7 +1,7 @@
 //! What storms have found, one case each.
 
+use takt::Interrupt;
 use takt::config::{ProgramMove, ProgramTarget};
-use takt::controller::Interrupt;
 
 use crate::case::{Case, Hardship, scenario};
 use crate::dice::Dice;

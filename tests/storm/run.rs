@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use takt::channels::LogSide;
+use takt::Port;
 use takt::config::{Axis, Config};
-use takt::controller::port::Port;
-use takt::controller::{Outcome, VirtualRun};
 use takt::faults::{FaultInjector, Scenario, ScenarioFault};
+use takt::internals::RunInside;
+use takt::internals::channels::LogSide;
 use takt::sim::{Observation, SimulatedBus};
+use takt::{Outcome, VirtualRun};
 use takt_rt::{
     Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId,
     RequestTarget, Rule, Snapshot, StreamState,

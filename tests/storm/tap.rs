@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use takt::controller::port::Port;
+use takt::Port;
 use takt::sim::Observation;
 use takt_rt::{BusHealth, BusPort, Frame, ReceiveBatch};
 

@@ -1,6 +1,7 @@
 use std::fs;
 
-use takt::telemetry::{Logger, LoggerThread, Notice, RecordingDestination};
+use takt::internals::telemetry::LoggerThread;
+use takt::telemetry::{Logger, Notice, RecordingDestination};
 use takt_rt::{EventKind, HostInterface, RequestId};
 
 use crate::reader::messages;

@@ -219,7 +219,7 @@ impl Axis {
 
     /// What is wrong with the node, by its error control messages.
     #[inline]
-    pub fn node_fault(&self) -> Option<NodeFault> {
+    pub(crate) fn node_fault(&self) -> Option<NodeFault> {
         self.node_monitor.fault(self.parameters.heartbeat_timeout_cycles)
     }
 

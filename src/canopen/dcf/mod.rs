@@ -30,7 +30,7 @@ pub struct Download {
 
 impl Download {
     /// Whether the value read back matches the written one. Devices may force bit 30 (no RTR) of a PDO's COB-ID.
-    pub fn is_held_by(&self, received: &Uploaded) -> bool {
+    pub(crate) fn is_held_by(&self, received: &Uploaded) -> bool {
         const NO_RTR: u32 = 1 << 30;
         let Self { object, data } = self;
         let counted = if received.is_size_known { received.bytes.len() } else { data.len() };
@@ -58,6 +58,7 @@ pub struct DeviceConfiguration {
 
 /// Why a configured value is not written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Omission {
     /// A command: it stores or restores parameters, or loads a program (1010, 1011, 1F50 to 1F57).
     Command,

@@ -6,6 +6,7 @@ pub struct DataTypeCode(pub u16);
 
 /// The kind of a type's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ValueKind {
     /// Unsigned integers with this number of bits.
     Unsigned(u8),
@@ -65,7 +66,7 @@ impl DataTypeCode {
     pub const DOMAIN: Self = Self(0x0F);
 
     /// The type with this name in the standard, in any case.
-    pub fn from_name(name: &str) -> Option<Self> {
+    pub(crate) fn from_name(name: &str) -> Option<Self> {
         NAMES.iter().find(|(_, known, _)| known.eq_ignore_ascii_case(name)).map(|(code, ..)| Self(*code))
     }
 

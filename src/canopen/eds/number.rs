@@ -36,6 +36,7 @@ pub(super) struct ParsedNumber {
 
 /// An anomaly in the spelling of a number, which is repaired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Anomaly {
     /// A leading zero makes it octal, which differs from its decimal parsed.
     Octal,

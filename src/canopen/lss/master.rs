@@ -8,6 +8,7 @@ use super::wire::{BitTiming, Inquiry, LssMode, LssRequest, LssResponse, LssResul
 
 /// A task of the LSS master.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(dead_code, reason = "all services of the protocol")]
 pub enum LssTask {
     /// Switches every device to this state. No reply.
     SwitchGlobal(LssMode),

@@ -14,7 +14,8 @@ macro_rules! abort_codes {
 
         impl AbortCode {
             /// Every code in the standard.
-            pub const LISTED: &[Self] = &[$(Self::$name),*];
+            #[cfg(test)]
+            pub(crate) const LISTED: &[Self] = &[$(Self::$name),*];
 
             /// The code with this number. A standard number never becomes [`AbortCode::Other`].
             pub const fn from_number(number: u32) -> Self {

@@ -1,7 +1,7 @@
 //! Service data objects (CiA 301, 7.2.4): read and write objects of one node, expedited, segmented and in blocks.
 //!
-//! [`SdoRequest`] and [`SdoResponse`] are the messages; only valid ones can be built, and both sides can be written
-//! with them. [`SdoClient`] is the SDO client.
+//! A [`Transfer`] is what is asked for, and [`Completed`] what came of it. `SdoRequest` and `SdoResponse` are the messages; only
+//! valid ones can be built, and both sides can be written with them. `SdoClient` is the SDO client.
 //!
 //! ```text
 //! client ── sending, repeating, timeouts
@@ -15,17 +15,17 @@
 mod abort;
 mod block_download;
 mod block_upload;
-mod client;
+pub(crate) mod client;
 mod crc;
 mod exchange;
-mod request;
-mod response;
-mod transfer;
-mod wire;
+pub(crate) mod request;
+pub(crate) mod response;
+pub(crate) mod transfer;
+pub(crate) mod wire;
 
 pub use abort::AbortCode;
-pub use client::{SdoBusy, SdoClient, SdoTiming};
-pub use request::SdoRequest;
-pub use response::SdoResponse;
-pub use transfer::{Completed, MAX_UPLOAD_BYTES, SdoError, Transfer, Uploaded};
-pub use wire::{BlockSegment, BlockSize, Expedited, Segment};
+pub(crate) use client::SdoClient;
+pub use client::SdoTiming;
+pub(crate) use request::SdoRequest;
+pub(crate) use response::SdoResponse;
+pub use transfer::{Completed, SdoError, Transfer, Uploaded};

@@ -96,6 +96,7 @@ pub enum SdoResponse {
 
 impl SdoResponse {
     /// The frame of this response from a node ID (1 to 127).
+    #[cfg(feature = "internals")]
     pub fn frame(self, node: u8) -> Frame {
         let bytes = match self {
             Self::UploadExpedited { object, data } => data.encode(UPLOAD, object),

@@ -68,7 +68,7 @@ impl Uploaded {
     }
 
     /// As [`Uploaded::number`], where the device decides the length, and the type the sign.
-    pub fn number_of_any_length(&self, data_type: DataType) -> Option<i64> {
+    pub(crate) fn number_of_any_length(&self, data_type: DataType) -> Option<i64> {
         self.number(data_type).or_else(|| self.number(data_type.of_length(self.bytes.len())?))
     }
 
@@ -115,7 +115,7 @@ pub enum SdoError {
         /// The received size so far.
         received: u32,
     },
-    /// More than [`MAX_UPLOAD_BYTES`].
+    /// More than is kept.
     #[error("the object is longer than {limit} bytes")]
     TooLong {
         /// The limit in bytes.

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
-use takt::config::{Bus, Config};
-use takt::printable::printable_path;
-use takt::schedule::text::{message_name, microseconds, narrow, remedy, reserve, shortfall, sums};
-use takt::schedule::{BusSchedule, MessageSchedule};
+use crate::config::{Bus, Config};
+use crate::printable::printable_path;
+use crate::schedule::text::{message_name, microseconds, narrow, remedy, reserve, shortfall, sums};
+use crate::schedule::{BusSchedule, MessageSchedule};
 
 use super::{AxisCheck, Check, ComplianceCheck, GroupCheck};
 use crate::cli::table::Table;

@@ -1,7 +1,7 @@
 //! What an axis does when the controller is gone, by `kill -9` or by a broken cable, until its drive acts.
 
+use crate::config::{Axis, Config, Control};
 use serde::Serialize;
-use takt::config::{Axis, Config, Control};
 
 /// What an axis does without the controller.
 #[derive(Clone, PartialEq, Serialize)]

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
-use takt::canopen::object::{DataType, Object};
-use takt::commission::dictionary::{self, SelectedObject};
-use takt::commission::{Failure, ReadObject, TargetDrive, Task};
+use crate::canopen::object::{DataType, Object};
+use crate::commission::dictionary::{self, SelectedObject};
+use crate::commission::{Failure, ReadObject, TargetDrive, Task};
 
 use super::super::configuration;
 

@@ -9,7 +9,7 @@ mod upkeep;
 
 use clap::{Args, Subcommand};
 
-use takt::commission::{Failure, TargetDrive, Task};
+use crate::commission::{Failure, TargetDrive, Task};
 
 use super::exit::Exit;
 use super::ownership::if_owned;

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use takt::commission::command_value::{self, CommandValueError};
-use takt::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
-use takt::config::Quantity;
+use crate::commission::command_value::{self, CommandValueError};
+use crate::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
+use crate::config::Quantity;
 
 use super::super::configuration;
 

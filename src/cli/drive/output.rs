@@ -6,8 +6,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde_json::json;
 
-use takt::commission::bus_session::SessionEvent;
-use takt::commission::{AxisReading, Failure, ProcedureError, ProcedureEvent, Report, TargetDrive, meaning};
+use crate::commission::bus_session::SessionEvent;
+use crate::commission::{AxisReading, Failure, ProcedureError, ProcedureEvent, Report, TargetDrive, meaning};
 use takt_rt::{Frame, Nanoseconds};
 
 use super::super::exit::Exit;

@@ -3,12 +3,12 @@
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
-use takt::commission::{Failure, TargetDrive, Task, bus_session, procedure};
-use takt::controller::VirtualClock;
-use takt::controller::port::{Port, open_configured};
-use takt::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
-use takt::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
-use takt::sim::SimulatedBus;
+use crate::commission::{Failure, TargetDrive, Task, bus_session, procedure};
+use crate::controller::VirtualClock;
+use crate::controller::port::{Port, open_configured};
+use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
+use crate::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
+use crate::sim::SimulatedBus;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, BusState};
 

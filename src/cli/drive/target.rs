@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use takt::commission::TargetDrive;
-use takt::config::{Config, DriveFamily, Interface, Quantity};
-use takt::family;
+use crate::commission::TargetDrive;
+use crate::config::{Config, DriveFamily, Interface, Quantity};
+use crate::family;
 
 use super::super::configuration;
 use super::super::usage_error::UsageError;

@@ -2,8 +2,8 @@
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use takt::commission::{Failure, Task};
-use takt::config::Quantity;
+use crate::commission::{Failure, Task};
+use crate::config::Quantity;
 
 /// Setting a drive up.
 #[derive(Subcommand, Debug)]

@@ -1,10 +1,10 @@
 //! What is printed of a dictionary: every value resolved for one node.
 
+use crate::canopen::eds::{DictionaryEntry, DictionaryObject, Number, ObjectDictionary, ObjectList, Value};
+use crate::canopen::object::ObjectAddress;
+use crate::canopen::objects::PdoDirection;
+use crate::canopen::pdo_configuration::PdoConfiguration;
 use serde::Serialize;
-use takt::canopen::eds::{DictionaryEntry, DictionaryObject, Number, ObjectDictionary, ObjectList, Value};
-use takt::canopen::object::ObjectAddress;
-use takt::canopen::objects::PdoDirection;
-use takt::canopen::pdo_configuration::PdoConfiguration;
 
 use super::PrintedProblem;
 

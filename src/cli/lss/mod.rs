@@ -7,13 +7,13 @@ use std::sync::atomic::Ordering;
 
 use clap::{Args, Subcommand};
 
-use takt::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
-use takt::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings, NO_NODE};
-use takt::config::{Interface, Quantity};
-use takt::controller::VirtualClock;
-use takt::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
-use takt::link::{InterfaceSettings, SocketCanOptions, open_socketcan};
-use takt::sim::lss::{LssBus, LssDevice};
+use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
+use crate::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings, NO_NODE};
+use crate::config::{Interface, Quantity};
+use crate::controller::VirtualClock;
+use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
+use crate::link::{InterfaceSettings, SocketCanOptions, open_socketcan};
+use crate::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds};
 

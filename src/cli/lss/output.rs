@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use takt::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
-use takt::commission::bus_session::SessionEvent;
-use takt::commission::layer_settings::LayerSettingFailure;
+use crate::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
+use crate::commission::bus_session::SessionEvent;
+use crate::commission::layer_settings::LayerSettingFailure;
 use takt_rt::Nanoseconds;
 
 use super::super::exit::Exit;

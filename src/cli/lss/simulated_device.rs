@@ -2,9 +2,9 @@
 
 use std::str::FromStr;
 
-use takt::canopen::lss::LssAddress;
-use takt::commission::layer_settings::NO_NODE;
-use takt::sim::lss::{LssDevice, LssStack};
+use crate::canopen::lss::LssAddress;
+use crate::commission::layer_settings::NO_NODE;
+use crate::sim::lss::{LssDevice, LssStack};
 
 /// A device as it is written on the command line: IDENTITY[@NODE][,BEHAVIOUR…].
 #[derive(Clone, Copy, Debug)]

@@ -5,8 +5,8 @@ mod svg;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::telemetry::{Recorded, RecordedError, RecordingReport};
 use clap::Args;
-use takt::telemetry::{Recorded, RecordedError, RecordingReport};
 
 use super::exit::Exit;
 use super::print;

@@ -1,6 +1,6 @@
 //! The cycles before and after a stop as SVG.
 
-use takt::telemetry::{Recorded, RecordedCycle, RecordedError};
+use crate::telemetry::{Recorded, RecordedCycle, RecordedError};
 use takt_rt::{AxisRecord, CycleTiming, NANOSECONDS_PER_SECOND};
 
 use crate::cli::chart::{COLOURS, Chart, Curve, Panel};

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use takt::canopen::eds;
-use takt::config::quirks::{self, Quirks};
-use takt::link::ownership::{InterfaceLock, lock_for_simulator};
-use takt::link::{InterfaceSettings, SocketCanOptions, open_interface};
-use takt::sim::LiveDrives;
-use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters, counts_per_turn};
-use takt::sim::homing_switches::{ReferenceSwitches, Switch};
-use takt::sim::plant::{Encoder, JointParameters};
+use crate::canopen::eds;
+use crate::config::quirks::{self, Quirks};
+use crate::link::ownership::{InterfaceLock, lock_for_simulator};
+use crate::link::{InterfaceSettings, SocketCanOptions, open_interface};
+use crate::sim::LiveDrives;
+use crate::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters, counts_per_turn};
+use crate::sim::homing_switches::{ReferenceSwitches, Switch};
+use crate::sim::plant::{Encoder, JointParameters};
 
 use crate::cli::usage_error::UsageError;
 

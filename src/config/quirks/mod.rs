@@ -12,6 +12,7 @@ pub use read::{load, parse};
 
 /// Whether anybody has tried what a quirk file says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Confirmation {
     /// It comes from documents alone.
     #[default]
@@ -49,6 +50,7 @@ pub struct QuirkyDrive {
 
 /// An object, or all sub-indices of an index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ObjectPattern {
     /// Every sub-index of this index.
     Index(u16),
@@ -68,6 +70,7 @@ impl ObjectPattern {
 
 /// What one unit of a velocity or acceleration object is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum MotionUnit {
     /// Position units per second (per second²), times this factor.
     PositionUnits(f64),
@@ -119,12 +122,12 @@ pub struct Quirks {
 
 impl Quirks {
     /// Whether the drive lacks an object that its data sheet may list.
-    pub fn is_missing(&self, address: ObjectAddress) -> bool {
+    pub(crate) fn is_missing(&self, address: ObjectAddress) -> bool {
         self.missing.iter().any(|pattern| pattern.matches(address))
     }
 
     /// Whether the drive refuses to write an object that its data sheet may call writable.
-    pub fn is_constant(&self, address: ObjectAddress) -> bool {
+    pub(crate) fn is_constant(&self, address: ObjectAddress) -> bool {
         self.constant.iter().any(|pattern| pattern.matches(address))
     }
 

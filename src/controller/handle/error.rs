@@ -11,6 +11,7 @@ use crate::trajectory::{RateError, TrajectoryError};
 
 /// Why a controller could not be started.
 #[derive(thiserror::Error)]
+#[non_exhaustive]
 pub enum StartFailure {
     /// The session could not be started: nothing was sent to the drives.
     #[error(transparent)]

@@ -21,7 +21,7 @@ pub struct Events {
 
 impl Events {
     pub(super) fn new(handle: &Handle) -> Self {
-        Self { handle: handle.clone(), reader: handle.0.events.from_now_on() }
+        Self { handle: handle.clone(), reader: handle.0.events.begin_now() }
     }
 
     /// Waits for the next event, for no longer than `at_most`.

@@ -335,6 +335,7 @@ impl GroupHandle {
 
 /// How far a trajectory is.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TrajectoryProgress {
     /// The time on the path, in seconds: that of the point that is passed now.
     pub path_s: f64,

@@ -6,6 +6,7 @@ use crate::canopen::object::Object;
 
 /// The condition that a number must meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Check {
     /// Any number.
     Any,

@@ -34,6 +34,7 @@ impl std::error::Error for BringUpError {}
 
 /// Why one axis failed.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct AxisFailure {
     /// The axis, an index into the configuration.
     pub axis: usize,
@@ -268,7 +269,7 @@ impl fmt::Display for FailureCause {
 
 impl FailureCause {
     /// Whether the drive did not answer.
-    pub fn is_silence(&self) -> bool {
+    pub(crate) fn is_silence(&self) -> bool {
         matches!(
             self,
             Self::Transfer { error: SdoError::NoReply { .. }, .. }

@@ -2,15 +2,15 @@
 //!
 //! Bring-up and shutdown of a [family](crate::family) are plain async functions over an [`AxisSession`], which read like the
 //! manual's own list. What CiA 402 drives have in common is in functions that any family may call: [`identity`],
-//! [`configuration_file`], [`pdo_mapping`], [`heartbeat`], [`actual_position`]. [`BringUp`] and [`Shutdown`] run them for all
-//! axes in parallel, with the engine of [`procedure`](crate::procedure).
+//! [`configuration_file`], [`pdo_mapping`], [`heartbeat`], [`actual_position`]. `BringUp` and `Shutdown` run them for all
+//! axes in parallel, with the engine of procedures.
 //!
 //! [`AxisFacts`] has what the drive has reported, [`BringUpError`] what failed. [`ProcessData`] says which objects each PDO
 //! carries: as written to the drive, or as the drive reports it (`reported_mapping`).
 
 pub mod actual_position;
 mod axis_session;
-pub mod axis_units;
+pub(crate) mod axis_units;
 mod check;
 pub mod configuration_file;
 mod facts;
@@ -22,8 +22,9 @@ mod network_state;
 pub mod pdo_mapping;
 mod process_data;
 mod reported_mapping;
-mod stages;
+pub(crate) mod stages;
 
+pub use crate::canopen::pdo_reader::PdoReadError;
 pub use crate::procedure::Access;
 pub use axis_session::{AxisSession, StepResult};
 pub use check::Check;
@@ -32,4 +33,5 @@ pub use failure::{AxisFailure, BringUpError, Content, FailureCause, ProbeResult}
 pub use network_state::RESTART_STEP;
 pub use process_data::{PdoPlan, ProcessData, Reply};
 pub use reported_mapping::MappingProblem;
-pub use stages::{BringUp, BringUpProgress, BringUpTiming, NotConfigured, Shutdown, Stage, overwritten};
+pub use stages::BringUpTiming;
+pub(crate) use stages::{BringUp, Shutdown, overwritten};

@@ -62,7 +62,7 @@ impl AxisSession<'_> {
 
     /// Repeats an NMT command and an SDO upload of object 1000 until the node answers. The node may have been absent,
     /// and a node in NMT stopped has no SDO server before the command.
-    pub async fn wake_up(&self, command: NmtCommand) -> StepResult {
+    pub(crate) async fn wake_up(&self, command: NmtCommand) -> StepResult {
         let woken = if self.is_dry_run() {
             Ok(())
         } else {

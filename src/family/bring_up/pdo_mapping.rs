@@ -54,7 +54,7 @@ fn unused_id(direction: PdoDirection, number: u8, node: u8) -> u32 {
 }
 
 /// Reads the drive's PDO configuration, and takes the process data from it.
-pub async fn take_reported(c: &AxisSession<'_>) -> StepResult {
+pub(crate) async fn take_reported(c: &AxisSession<'_>) -> StepResult {
     c.step("PDO mapping", "the drive's own mapping does not suit this axis");
     let taken = if c.is_dry_run() { Ok(()) } else { read_reported(c).await };
     c.settled(taken)

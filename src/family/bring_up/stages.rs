@@ -130,6 +130,7 @@ impl BringUp {
     }
 
     /// The current or last stage.
+    #[cfg(feature = "internals")]
     pub const fn stage(&self) -> Stage {
         self.stage
     }
@@ -189,6 +190,7 @@ impl Shutdown {
     }
 
     /// The progress.
+    #[cfg(feature = "internals")]
     pub fn progress(&self) -> BringUpProgress {
         self.group.progress()
     }

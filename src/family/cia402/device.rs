@@ -105,7 +105,7 @@ impl Device {
     }
 
     /// How many PDOs of a direction the drive has, of the first four.
-    pub fn pdo_slots(&self, direction: PdoDirection) -> u8 {
+    pub(crate) fn pdo_slots(&self, direction: PdoDirection) -> u8 {
         let (parameters, mapping) = match direction {
             PdoDirection::Receive => (0x1400, 0x1600),
             PdoDirection::Transmit => (0x1800, 0x1A00),

@@ -10,7 +10,7 @@ mod simulated;
 mod starting;
 
 pub use device::Device;
-pub use remarks::remarks;
+use remarks::remarks;
 pub use starting::starting_configuration;
 
 use std::path::PathBuf;

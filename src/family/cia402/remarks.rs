@@ -29,7 +29,7 @@ const LOSSES: [(u16, u8, &str); 9] = [
 ];
 
 /// What is lost by what the drive lacks, one sentence each.
-pub fn remarks(device: &Device) -> Vec<&'static str> {
+pub(crate) fn remarks(device: &Device) -> Vec<&'static str> {
     let is_absent = |(index, subindex, _): &&(u16, u8, &str)| {
         device.entry(ObjectAddress::new(*index, *subindex)).is_none()
     };

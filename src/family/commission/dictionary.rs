@@ -18,6 +18,7 @@ pub enum Permission {
 
 /// The unit of an object's value.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ObjectUnit {
     /// No unit: a plain number, bits, or a choice.
     None,

@@ -10,6 +10,7 @@ use crate::procedure::Access;
 
 /// Why a procedure failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Failure {
     /// It was interrupted; the axis was stopped and disabled.
     #[error("interrupted")]
@@ -198,7 +199,7 @@ fn advice_words(advice: &Option<&'static str>) -> String {
 
 impl Failure {
     /// Whether the drive reports that the object does not exist.
-    pub fn means_absent(&self) -> bool {
+    pub(crate) fn means_absent(&self) -> bool {
         match self {
             Self::Transfer { error: SdoError::Aborted(code), .. } => code.means_absent(),
             _ => false,

@@ -10,47 +10,33 @@
 //!     target, motion_profile ── units and limits of the axis
 //! ```
 //!
-//! [`meaning`] describes the frames of a procedure.
+//! `meaning` describes the frames of a procedure.
 
-pub mod command_value;
+pub(crate) mod command_value;
 pub(super) mod contact;
-pub mod dictionary;
+pub(crate) mod dictionary;
 pub(super) mod failure;
 pub(super) mod guarded;
-pub mod meaning;
+#[cfg(feature = "cli")]
+pub(crate) mod meaning;
 pub(super) mod motion_profile;
+#[cfg(feature = "cli")]
 pub(super) mod objects;
 pub(super) mod polling;
 pub(super) mod report;
+#[cfg(feature = "cli")]
+pub(crate) mod running;
 pub(super) mod scan;
 pub(super) mod sdo_session;
 pub(super) mod target;
 pub(super) mod task;
 
-use crate::procedure::{self, CanopenClient, CanopenSession};
-
+pub use dictionary::{ObjectEntry, ObjectUnit, Permission};
 pub use failure::Failure;
 pub use motion_profile::{DEFAULT_SHARE, DriveProfile, MotionProfile};
 pub use report::{Report, ReportItem};
+#[cfg(feature = "cli")]
+pub(crate) use running::{Procedure, ProcedureError, procedure};
 pub use sdo_session::SdoSession;
 pub use target::{CommandValue, TargetDrive};
 pub use task::{MoveKind, ReadObject, Task};
-
-/// A running procedure of commissioning.
-pub type Procedure = procedure::Procedure<CanopenClient, Report, Failure>;
-
-/// Why a procedure failed, and in which step.
-pub type ProcedureError = procedure::ProcedureError<Failure>;
-
-/// The procedure that carries out a task with this drive.
-pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
-    let session = CanopenSession::new(CanopenClient::new(target.node, target.family().sdo_quirks()));
-    let c = SdoSession::new(session.clone());
-    Procedure::new(session, async move {
-        match task {
-            Task::Read { objects } => objects::read(&c, &target, &objects).await,
-            Task::Write { object, value, entry } => objects::write(&c, &target, object, value, entry).await,
-            task => target.family().carry_out(&c, &target, task).await,
-        }
-    })
-}

@@ -9,6 +9,7 @@ use crate::canopen::object::{DataType, Object, ObjectAddress};
 
 /// A task with one drive.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Task {
     /// Read identity, ratings and condition.
     Info,
@@ -140,6 +141,7 @@ pub struct ReadObject {
 
 /// The kind of a move.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum MoveKind {
     /// To a position.
     Absolute {

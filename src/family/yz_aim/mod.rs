@@ -10,7 +10,7 @@ mod facts;
 mod process_data;
 
 pub use alarm::{Alarm, Clearing};
-pub use facts::{CODEC, FACTS, HIGHEST_SPEED_RPM, INTERPOLATION_PERIOD_NS, NO_RAMP, STANDSTILL};
+pub use facts::{FACTS, HIGHEST_SPEED_RPM, NO_RAMP, STANDSTILL};
 pub(crate) use process_data::answers_sync;
 
 use takt_rt::Frame;

@@ -22,6 +22,7 @@ const FAULTS_AT_MOST: usize = 64;
 /// Why a scenario cannot be used.
 #[derive(thiserror::Error)]
 #[cfg_attr(feature = "miette", derive(miette::Diagnostic))]
+#[non_exhaustive]
 pub enum ScenarioError {
     /// The file cannot be read.
     #[error("the scenario {path} cannot be read: {reason}")]

@@ -116,6 +116,7 @@ fn is_sdo_download(frame: &Frame) -> bool {
 
 /// What only a master sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum MasterActivity {
     /// SYNC.
     Sync,
@@ -142,6 +143,7 @@ pub enum MasterActivity {
 
 /// A frame that another master has sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct HeardMaster {
     /// The identifier of the frame.
     pub id: Id,

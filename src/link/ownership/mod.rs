@@ -107,7 +107,7 @@ pub enum ClaimError {
 
 impl ClaimError {
     /// Whether [`IfOwned::TakeOver`] may help.
-    pub const fn can_be_taken_over(&self) -> bool {
+    pub(crate) const fn can_be_taken_over(&self) -> bool {
         matches!(self, Self::Held { role: Role::Master, .. })
     }
 }

@@ -97,6 +97,7 @@ pub struct Cia402Parameters {
 
 /// Why no drive can be simulated from a data sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NotADrive {
     /// It lacks an object without which nothing can be enabled.
     #[error("the data sheet has no object {0}, which axis {1} of a CiA 402 drive needs")]

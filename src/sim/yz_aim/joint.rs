@@ -144,6 +144,7 @@ impl YzAimJoint {
     }
 
     /// The bit rate in use: bit/s. At another bit rate than its bus, it neither receives nor sends.
+    #[cfg(feature = "internals")]
     pub fn bit_rate(&self) -> u32 {
         self.bit_rate
     }

@@ -15,6 +15,7 @@ pub(super) const COUNTS_PER_SECOND_PER_RPM: f64 = COUNTS_PER_TURN / 60.0;
 
 /// The models of the manual's table (chapter II) that differ for a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(dead_code, reason = "the whole table of the manual")]
 pub enum Model {
     /// 42AIM10C: 0.33 N·m, single-turn.
     Aim42x10C,
@@ -129,6 +130,7 @@ impl Default for Quirks {
 
 impl Quirks {
     /// The behaviour in the manual's examples.
+    #[cfg(feature = "internals")]
     pub fn none() -> Self {
         Self {
             is_silent_on_unknown_objects: false,

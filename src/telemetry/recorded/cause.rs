@@ -10,6 +10,7 @@ use crate::telemetry::words;
 
 /// Why the group stopped.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Cause {
     /// The reason as a sentence.
     pub reason: String,

@@ -66,6 +66,7 @@ pub enum RecordedError {
 
 /// An event with its text.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RecordedEvent {
     /// The slot in which it was seen.
     pub slot: u64,
@@ -102,6 +103,7 @@ impl RecordedCycle {
 
 /// A recording without its cycles.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Recorded {
     /// The file.
     pub path: PathBuf,

@@ -17,6 +17,7 @@ const EVENTS: (usize, usize) = (24, 12);
 
 /// A recording in numbers and words.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct RecordingReport {
     /// The file.
     pub recording: PathBuf,
@@ -66,6 +67,7 @@ pub struct RecordingReport {
 
 /// One group of several over the whole recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct GroupSummary {
     /// Its name.
     pub name: String,
@@ -80,6 +82,7 @@ pub struct GroupSummary {
 
 /// The cycles of one axis before the cause.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct AxisCycles {
     /// Its name.
     pub name: String,
@@ -91,6 +94,7 @@ pub struct AxisCycles {
 
 /// One axis in one cycle; rad for a rotary axis, m for a linear one.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct AxisCycle {
     /// The slot.
     pub slot: u64,
@@ -120,6 +124,7 @@ pub struct AxisCycle {
 
 /// One axis over the whole recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct AxisSummary {
     /// Its name.
     pub name: String,
@@ -135,6 +140,7 @@ pub struct AxisSummary {
 
 /// An event.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct ReportedEvent {
     /// The slot in which it was seen.
     pub slot: u64,
@@ -146,6 +152,7 @@ pub struct ReportedEvent {
 
 /// A change of a bus.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct BusChange {
     /// Its name.
     pub name: String,

@@ -7,12 +7,12 @@ use takt::canopen::{
     eds,
     nmt::{NmtCommand, NmtState},
 };
-use takt::commission::{Failure, SdoSession, TargetDrive, Task};
 use takt::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use takt::family::bring_up::{
     AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat, identity,
     pdo_mapping,
 };
+use takt::family::commission::{Failure, SdoSession, TargetDrive, Task};
 use takt::family::{CarryingOut, Family, SettingUp};
 use takt::rt::controlword;
 use takt::sim::Drive;

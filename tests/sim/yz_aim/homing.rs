@@ -1,8 +1,8 @@
 //! Homing on the switches at the inputs DIR and PU.
 
+use takt::internals::sim::yz_aim::HomingBehaviour;
 use takt::sim::homing_switches::{HomingSwitches, Switch};
 use takt::sim::plant::EndStops;
-use takt::sim::yz_aim::HomingBehaviour;
 
 use super::{Bench, NODE, YzAimParameters, bench, parameters};
 

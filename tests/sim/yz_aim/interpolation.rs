@@ -1,7 +1,7 @@
 //! The 2 ms mode: RPDO4 to every axis, then SYNC.
 
+use takt::internals::sim::yz_aim::YzAimJoint;
 use takt::sim::Drive;
-use takt::sim::yz_aim::YzAimJoint;
 
 use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters};
 

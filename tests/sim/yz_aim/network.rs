@@ -1,6 +1,6 @@
 //! NMT, heartbeat producer and consumer, PDO timing.
 
-use takt::sim::yz_aim::YzAimJoint;
+use takt::internals::sim::yz_aim::YzAimJoint;
 use takt::sim::{Drive, Mailbox, NodeState, QueueOrder};
 use takt_rt::{Frame, Id};
 

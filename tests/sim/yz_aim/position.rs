@@ -1,7 +1,7 @@
 //! Profile position and velocity.
 
+use takt::internals::sim::yz_aim::{Gearing, Model};
 use takt::sim::plant::JointParameters;
-use takt::sim::yz_aim::{Gearing, Model};
 
 use super::{Bench, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
 

@@ -1,6 +1,6 @@
 //! Stored parameters, parameters that need a power cycle, and the drive's own move after power-up.
 
-use takt::sim::yz_aim::{Model, YzAimJoint};
+use takt::internals::sim::yz_aim::{Model, YzAimJoint};
 use takt::sim::{Drive, Mailbox, QueueOrder};
 use takt_rt::{Frame, Id};
 

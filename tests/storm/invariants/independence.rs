@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use takt::config::Config;
-use takt::controller::assemble::slot_plan;
+use takt::internals::controller::assemble::slot_plan;
 use takt_rt::{EventKind, GroupSnapshot, Origin, Phase, StopCategory, StopReason};
 
 use super::Seen;

@@ -1,0 +1,140 @@
+//! What takt's own tests, benchmarks and fuzzers need beyond the public face. Nothing here is stable; the feature `internals` shows it.
+
+use takt_rt::BusPort;
+
+use crate::channels::{HostSide, LogSide};
+use crate::config::Config;
+use crate::controller::{Supervisor, VirtualRun};
+use crate::error::AssembleError;
+
+pub mod canopen {
+    #[cfg(feature = "cli")]
+    pub mod lss {
+        pub use crate::canopen::lss::*;
+    }
+    pub mod pdo_reader {
+        pub use crate::canopen::pdo_reader::*;
+    }
+    pub mod sdo {
+        pub use crate::canopen::sdo::client::*;
+        pub use crate::canopen::sdo::request::*;
+        pub use crate::canopen::sdo::response::*;
+        pub use crate::canopen::sdo::transfer::*;
+        pub use crate::canopen::sdo::wire::*;
+    }
+    pub mod time {
+        pub use crate::canopen::time::*;
+    }
+}
+
+pub mod channels {
+    pub use crate::channels::*;
+}
+
+#[cfg(feature = "cli")]
+pub mod commission {
+    pub mod bus_session {
+        pub use crate::commission::bus_session::*;
+    }
+    pub mod layer_settings {
+        pub use crate::commission::layer_settings::*;
+    }
+    pub mod dictionary {
+        pub use crate::family::commission::dictionary::*;
+    }
+    pub use crate::family::commission::running::*;
+    pub use crate::procedure::ProcedureEvent;
+}
+
+pub mod controller {
+    pub use crate::controller::*;
+    pub mod assemble {
+        pub use crate::controller::assemble::*;
+    }
+    pub mod port {
+        pub use crate::controller::port::*;
+    }
+    pub mod realtime_thread {
+        pub use crate::controller::realtime_thread::*;
+    }
+    pub mod session {
+        pub use crate::controller::session::*;
+    }
+}
+
+#[cfg(feature = "cli")]
+pub mod doctor {
+    pub use crate::doctor::*;
+}
+
+pub mod family {
+    pub mod bring_up {
+        pub use crate::family::bring_up::stages::*;
+    }
+}
+
+pub mod link {
+    pub use crate::link::interface::*;
+    pub use crate::link::socketcan::*;
+    pub mod ownership {
+        pub use crate::link::ownership::*;
+    }
+    pub mod trace {
+        pub use crate::link::trace::*;
+    }
+}
+
+pub mod schedule {
+    pub use crate::frame_time::*;
+    pub use crate::schedule::response_time::*;
+}
+
+pub mod sim {
+    pub use crate::sim::mailbox::*;
+    pub use crate::sim::medium::*;
+    pub use crate::sim::wire_length::*;
+    pub mod erob {
+        pub use crate::sim::erob::*;
+    }
+    #[cfg(feature = "cli")]
+    pub mod lss {
+        pub use crate::sim::lss::*;
+    }
+    pub mod yz_aim {
+        pub use crate::sim::yz_aim::*;
+    }
+}
+
+pub mod telemetry {
+    pub use crate::telemetry::thread::LoggerThread;
+}
+
+/// What is inside of a controller in virtual time.
+pub trait RunInside<P>: Sized {
+    /// A controller of this configuration on these ports, without a program: after bring-up the group executes the requests of
+    /// the host, until it is interrupted.
+    ///
+    /// # Errors
+    /// See [`AssembleError`].
+    fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError>;
+
+    /// The life cycle.
+    fn supervisor(&self) -> &Supervisor;
+
+    /// The host's side of the host interface, to command the group directly.
+    fn host(&mut self) -> &mut HostSide;
+}
+
+impl<P: BusPort> RunInside<P> for VirtualRun<P> {
+    fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
+        Self::serving(config, ports)
+    }
+
+    fn supervisor(&self) -> &Supervisor {
+        self.supervisor()
+    }
+
+    fn host(&mut self) -> &mut HostSide {
+        self.host()
+    }
+}
