@@ -68,6 +68,101 @@ fn the_examples_and_the_documentation_use_the_public_face_alone() {
     assert!(files.is_empty(), "they use `takt::internals`: {files:?}");
 }
 
+/// How families and makers are called, in small letters.
+const NAMES: [&str; 21] = [
+    "erob",
+    "zeroerr",
+    "yz_aim",
+    "yz-aim",
+    "yzaim",
+    "maxon",
+    "epos",
+    "nanotec",
+    "elmo",
+    "technosoft",
+    "copley",
+    "schneider",
+    "lexium",
+    "delta asda",
+    "leadshine",
+    "eyou",
+    "schunk",
+    "faulhaber",
+    "trinamic",
+    "kollmorgen",
+    "beckhoff",
+];
+
+/// The files that may name a family, and why.
+const MAY_NAME: [(&str, &str); 4] = [
+    ("src/family/registry.rs", "it is the list of the families"),
+    ("src/family/mod.rs", "it declares their folders, and their names for configurations in code"),
+    ("src/internals.rs", "it shows the simulated drives to the tests"),
+    ("src/config/in_code.rs", "its documentation has an example, which needs some drive"),
+];
+
+#[test]
+fn only_its_own_folder_and_the_simulation_name_a_family() {
+    let mut files = rust_files("src");
+    files.extend(rust_files("rt/src"));
+    let shown = |path: &Path| path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string();
+    let is_of_family = |name: &str| {
+        let folders = ["erob_canopen", "yz_aim", "cia402"].map(|family| format!("src/family/{family}/"));
+        name.starts_with("src/sim/") || folders.iter().any(|folder| name.starts_with(folder))
+    };
+    let (mut found, mut needless) = (vec![], vec![]);
+    for path in files {
+        let name = shown(&path);
+        let text = fs::read_to_string(&path).unwrap();
+        let named: Vec<String> = lines_without_tests(&path, &text)
+            .filter(|(_, line)| NAMES.iter().any(|family| names(line, family)))
+            .map(|(number, line)| format!("{name}:{number}: {}", line.trim()))
+            .collect();
+        match MAY_NAME.iter().find(|(file, _)| *file == name) {
+            Some(_) if named.is_empty() => needless.push(name),
+            Some(_) => {}
+            None if is_of_family(&name) => {}
+            None => found.extend(named),
+        }
+    }
+    assert!(found.is_empty(), "families are named outside of their folders:\n{}", found.join("\n"));
+    assert!(needless.is_empty(), "they name no family, and need no exception: {needless:?}");
+}
+
+#[test]
+fn a_name_of_a_family_is_found_in_any_case_and_as_a_part_of_a_name_and_not_within_another_word() {
+    for line in [
+        "an eRob has it",
+        "drive = \"erob-canopen\"",
+        "family::EROB_CANOPEN",
+        "use sim::ErobJoint;",
+        "YzAimJoint",
+    ] {
+        assert!(NAMES.iter().any(|family| names(line, family)), "{line}");
+    }
+    for line in ["ControlLaw::ProfilePosition", "SourcePosition", "let other_objects = 1;", "probe"] {
+        assert!(!NAMES.iter().any(|family| names(line, family)), "{line}");
+    }
+}
+
+/// Whether a line has this name, not as a part of a longer word: it begins a word, or a part of a name in capitals.
+fn names(line: &str, family: &str) -> bool {
+    let lower = line.to_lowercase();
+    lower.match_indices(family).any(|(at, _)| {
+        let before = line[..at].chars().next_back();
+        let first = line[at..].chars().next();
+        let begins_word = before.is_none_or(|letter| !letter.is_alphanumeric());
+        begins_word || (first.is_some_and(char::is_uppercase) && before.is_some_and(char::is_lowercase))
+    })
+}
+
+/// The lines of a file with their numbers, without the module of its unit tests, which is its end.
+fn lines_without_tests<'a>(path: &Path, text: &'a str) -> impl Iterator<Item = (usize, &'a str)> {
+    let is_of_tests = path.file_name().is_some_and(|name| name == "tests.rs");
+    let end = if is_of_tests { Some(0) } else { text.find("#[cfg(test)]\nmod tests") };
+    text[..end.unwrap_or(text.len())].lines().enumerate().map(|(index, line)| (index + 1, line))
+}
+
 #[test]
 fn the_folders_of_src_are_those_of_the_order() {
     let there: BTreeSet<String> = sources().iter().map(|path| module_path(path)[0].clone()).collect();
@@ -147,6 +242,11 @@ fn source_root() -> PathBuf {
 }
 
 fn sources() -> Vec<PathBuf> {
+    rust_files("src")
+}
+
+/// The Rust files below a folder of the repository.
+fn rust_files(folder: &str) -> Vec<PathBuf> {
     fn add(directory: &Path, to: &mut Vec<PathBuf>) {
         for entry in fs::read_dir(directory).unwrap() {
             let path = entry.unwrap().path();
@@ -158,9 +258,9 @@ fn sources() -> Vec<PathBuf> {
         }
     }
     let mut all = vec![];
-    add(&source_root(), &mut all);
+    add(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut all);
     all.sort();
-    assert!(all.len() > 100, "src/ was not found");
+    assert!(all.len() > 60, "{folder}/ was not found");
     all
 }
 

@@ -118,12 +118,6 @@ pub struct ClientRequests {
 }
 
 impl ClientRequests {
-    /// Submits a request for all groups. `None` if too many requests wait already.
-    #[cfg(feature = "internals")]
-    pub fn submit(&self, request: Request) -> Option<RequestId> {
-        self.submit_to(RequestTarget::All, request)
-    }
-
     /// Submits a request. `None` if too many requests wait already.
     pub fn submit_to(&self, target: RequestTarget, request: Request) -> Option<RequestId> {
         let (bit, slot) = self.claim()?;
@@ -309,7 +303,8 @@ mod tests {
     fn requests_are_taken_in_the_order_of_their_numbers() {
         let (client, mut rt) = channel();
         for round in 0..3 {
-            let ids: Vec<u64> = (0..5).map(|n| client.submit(position(n)).unwrap().0).collect();
+            let ids: Vec<u64> =
+                (0..5).map(|n| client.submit_to(RequestTarget::All, position(n)).unwrap().0).collect();
             let expected: Vec<_> = ids.into_iter().zip((0..5).map(position)).collect();
             assert_eq!(taken(&mut rt), expected, "round {round}");
         }
@@ -318,7 +313,8 @@ mod tests {
     #[test]
     fn a_flood_is_bounded_and_a_stop_discards_it() {
         let (client, mut rt) = channel();
-        let flood: Vec<RequestId> = (0..1_000).filter_map(|n| client.submit(position(n))).collect();
+        let flood: Vec<RequestId> =
+            (0..1_000).filter_map(|n| client.submit_to(RequestTarget::All, position(n))).collect();
         assert_eq!(flood.len(), WAITING_AT_MOST);
         let stop = client.stop(MotionEnd::Stop(StopCategory::Two));
         assert_eq!(client.newest_stop(RequestTarget::All), RequestId(0), "it has not been taken yet");
@@ -328,18 +324,21 @@ mod tests {
             "nothing that came before it is taken"
         );
         assert_eq!(client.newest_stop(RequestTarget::All), stop);
-        let after = client.submit(Request::Enable).unwrap();
+        let after = client.submit_to(RequestTarget::All, Request::Enable).unwrap();
         assert!(flood.iter().all(|id| *id < stop) && after > stop);
         assert_eq!(taken(&mut rt), [(after.0, Request::Enable)]);
-        assert_eq!((0..1_000).filter_map(|n| client.submit(position(n))).count(), WAITING_AT_MOST);
+        assert_eq!(
+            (0..1_000).filter_map(|n| client.submit_to(RequestTarget::All, position(n))).count(),
+            WAITING_AT_MOST
+        );
     }
 
     #[test]
     fn requests_after_a_stop_come_after_it() {
         let (client, mut rt) = channel();
-        let before = client.submit(position(1)).unwrap();
+        let before = client.submit_to(RequestTarget::All, position(1)).unwrap();
         let stop = client.stop(MotionEnd::Disable);
-        let after = client.submit(position(2)).unwrap();
+        let after = client.submit_to(RequestTarget::All, position(2)).unwrap();
         assert!(before < stop && stop < after);
         assert_eq!(taken(&mut rt), [(stop.0, Request::Disable), (after.0, position(2))]);
     }
@@ -366,7 +365,7 @@ mod tests {
         let (arm, gripper) = (RequestTarget::Group(0), RequestTarget::Group(1));
         let of_arm = client.submit_to(arm, position(1)).unwrap();
         let of_gripper = client.submit_to(gripper, position(2)).unwrap();
-        let of_all = client.submit(Request::Enable).unwrap();
+        let of_all = client.submit_to(RequestTarget::All, Request::Enable).unwrap();
         let end = MotionEnd::Stop(StopCategory::One);
         let stop = client.stop_of(gripper, end);
         let after = client.submit_to(gripper, position(3)).unwrap();
@@ -383,9 +382,9 @@ mod tests {
     fn a_client_that_is_paused_while_it_writes_delays_no_one_else() {
         let (client, mut rt) = channel();
         let claimed = client.claim().unwrap();
-        let other = client.submit(position(1)).unwrap();
+        let other = client.submit_to(RequestTarget::All, position(1)).unwrap();
         let stop = client.stop(MotionEnd::Stop(StopCategory::One));
-        let last = client.submit(position(2)).unwrap();
+        let last = client.submit_to(RequestTarget::All, position(2)).unwrap();
         assert!(other < stop);
         assert_eq!(taken(&mut rt), [(stop.0, Request::Stop(StopCategory::One)), (last.0, position(2))]);
         client.shared.free.fetch_or(claimed.0, Ordering::Release);
@@ -403,7 +402,10 @@ mod tests {
                     let client = client.clone();
                     scope.spawn(move || {
                         for number in 0..EACH {
-                            while client.submit(position(own * EACH + number)).is_none() {
+                            while client
+                                .submit_to(RequestTarget::All, position(own * EACH + number))
+                                .is_none()
+                            {
                                 thread::yield_now();
                             }
                         }

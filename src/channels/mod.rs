@@ -483,7 +483,8 @@ mod tests {
         let (mut rt, mut host, _log) = channels(&sizes());
         let client = host.clients();
         let own: Vec<_> = (0..2).map(|_| host.request(Request::Enable).unwrap()).collect();
-        let theirs: Vec<_> = (0..4).map(|_| client.submit(Request::ResetFaults).unwrap()).collect();
+        let theirs: Vec<_> =
+            (0..4).map(|_| client.submit_to(RequestTarget::All, Request::ResetFaults).unwrap()).collect();
         let taken: Vec<_> = std::iter::from_fn(|| rt.request()).map(|envelope| envelope.id).collect();
         assert_eq!(taken, [theirs[0], own[0], theirs[1], own[1], theirs[2], theirs[3]]);
     }

@@ -98,9 +98,9 @@ pub const INERTIA: f64 = 1.0;
 pub const VISCOUS_FRICTION: f64 = 1.0;
 /// `[axis.joint] coulomb_friction` in N·m (N).
 pub const COULOMB_FRICTION: f64 = 0.5;
-/// `[axis.simulated] peak_torque` in rated torques, as object 60B2 of the eRob allows (±3000 per mille).
+/// `[axis.simulated] peak_torque` in rated torques: ±3000 per mille in object 60B2.
 pub const PEAK_TO_RATED_TORQUE: f64 = 3.0;
-/// `[[axis]] power_up`. A real eRob asks for 8 s.
+/// `[[axis]] power_up`. A real drive may ask for 8 s.
 pub const POWER_UP_NS: u64 = 200_000_000;
 
 /// `[program] repeat`

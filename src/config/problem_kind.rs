@@ -1,5 +1,7 @@
 //! The kinds of problems that a configuration can have, and what to do about each.
 
+use std::borrow::Cow;
+
 use thiserror::Error;
 
 use crate::canopen::dcf::DcfError;
@@ -60,7 +62,7 @@ pub enum ProblemKind {
         /// The key.
         key: String,
         /// What it says and how it may be written.
-        says: &'static str,
+        says: Cow<'static, str>,
     },
     /// A value of another type.
     #[error("`{key}` must be {expected}, not {found}")]
@@ -309,7 +311,7 @@ impl ProblemKind {
             }
             Self::Ignored { belongs, .. } => (*belongs).into(),
             Self::Replaced { by, .. } => format!("write {by}"),
-            Self::MissingKey { says, .. } => (*says).into(),
+            Self::MissingKey { says, .. } => says.clone().into_owned(),
             Self::WrongType { expected, .. } => format!("write {expected}"),
             Self::NotAQuantity { quantity, .. } | Self::WrongUnit { quantity, .. } => {
                 show_quantity(*quantity)

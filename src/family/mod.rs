@@ -91,6 +91,11 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
+    /// How its node ID and bit rate are set, where its drives have no LSS (CiA 305): a sentence for people.
+    fn instead_of_lss(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Timing and quirks of the SDO server.
     fn sdo_quirks(&self) -> SdoQuirks {
         SdoQuirks::standard()

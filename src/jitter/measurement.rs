@@ -9,6 +9,7 @@ use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
 use crate::controller::port::Port;
 use crate::controller::realtime_thread::{self, Begun, LoopParts, StartError};
+use crate::family;
 use crate::link::OpenError;
 use crate::link::interface_status;
 use crate::link::ownership::{ClaimError, IfOwned, Ownership};
@@ -18,10 +19,14 @@ use crate::telemetry::Statistics;
 /// The pause between two polls of the loop; the ring of cycle records holds many times as much.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// One axis, because a loop needs at least one. It is never activated.
-const PASSIVE: &str = r#"
+/// One axis, because a loop needs at least one, of any family that needs no more than its name. It is never activated.
+fn passive() -> String {
+    let any = family::all().into_iter().find(|family| family.unconfigured().is_some());
+    let word = any.map_or("", |family| family.word());
+    format!(
+        r#"
 name = "jitter"
-master = { heartbeat = "off" }
+master = {{ heartbeat = "off" }}
 
 [[bus]]
 name = "bus"
@@ -30,9 +35,11 @@ name = "bus"
 name = "passive"
 bus = "bus"
 node = 1
-drive = "erob-canopen"
-limits = { position = [-1, 1], velocity = 1, acceleration = 1, torque = 1 }
-"#;
+drive = "{word}"
+limits = {{ position = [-1, 1], velocity = 1, acceleration = 1, torque = 1 }}
+"#
+    )
+}
 
 /// What to measure.
 #[derive(Clone, Debug, PartialEq)]
@@ -187,7 +194,7 @@ fn collect(log: &mut LogSide, statistics: &mut Statistics, cycles: u64) {
 /// The passive machine with the period and the interface of the options.
 fn config(options: &JitterOptions) -> Result<Config, ConfigError> {
     let period_us = options.period_ns / 1_000;
-    let text = format!("{PASSIVE}\n[cycle]\nperiod = \"{period_us} us\"\n");
+    let text = format!("{}\n[cycle]\nperiod = \"{period_us} us\"\n", passive());
     let mut config = Config::parse("takt jitter", &text)?;
     if let (Some(bus), Some(interface)) = (config.buses.first_mut(), &options.interface) {
         bus.interface = interface.clone();
@@ -223,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_defaults_are_those_of_a_configuration_that_says_nothing() {
-        let config = Config::parse("test", PASSIVE).unwrap();
+        let config = Config::parse("test", &passive()).unwrap();
         let options = JitterOptions::default();
         assert_eq!((options.period_ns, options.realtime), (config.cycle.period_ns, config.realtime));
     }

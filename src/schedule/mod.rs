@@ -8,7 +8,7 @@
 //! Emergency messages are not part of the sums. A drive that sends one has stopped obeying or is about to, the group
 //! stops, and one such frame does no harm: feedback that misses the command phase is one missed cycle of the several
 //! that `missed_feedback_cycles` allows, and set-points that are pushed beyond the slot are sent before the SYNC that
-//! then leaves late. To demand room for an emergency in every slot would cost every third eRob its place on a bus at
+//! then leaves late. To demand room for an emergency in every slot would cost every third drive its place on a bus at
 //! 1 ms. What one does to a slot is shown beside the regular case ([`EmergencyEffect`]).
 //!
 //! The sums are those of a punctual controller, and what they leave is shown as its reserve; a fit with less than

@@ -2,7 +2,7 @@
 //!
 //! Feedback in every second SYNC (`transmission_type = 2`) is not among these changes. A drive counts the SYNCs from when
 //! its PDO became valid. Only the counter in SYNC (object 1019) with a start value in each drive (1800:6) would keep
-//! half of the drives to the odd slots and half to the even ones, and an eRob has neither. So all of them may answer
+//! half of the drives to the odd slots and half to the even ones, and few drives have both. So all of them may answer
 //! the same SYNC, and the worst slot stays as it is; only the load becomes less.
 
 use serde::Serialize;

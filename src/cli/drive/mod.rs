@@ -17,7 +17,7 @@ use super::ownership::if_owned;
 /// Commission one drive: inspect it, move it, set it up
 ///
 /// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
-/// one), or a node on an interface (`takt drive --bus can0 --node 1 --family erob-canopen …`), of which no limits are
+/// one), or a node on an interface (`takt drive --bus can0 --node 1 --family FAMILY …`), of which no limits are
 /// known. Values have a unit and are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the
 /// drive's own. Every motion ends at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
 #[derive(Args, Debug)]

@@ -51,7 +51,7 @@ enum MoveKindArguments {
         /// "90 deg", "0.2 m"; --raw: counts
         #[arg(allow_hyphen_values = true)]
         position: String,
-        /// Have the drive adopt the target at once (controlword bit 5; a YZ-AIM always does)
+        /// Have the drive adopt the target at once (controlword bit 5; some drives always do)
         #[arg(long)]
         immediate: bool,
         #[command(flatten)]

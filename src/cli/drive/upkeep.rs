@@ -8,7 +8,7 @@ use crate::config::Quantity;
 /// Setting a drive up.
 #[derive(Subcommand, Debug)]
 pub enum Action {
-    /// Make the present position the encoder's zero (eRob: clear the count of turns)
+    /// Make the present position the encoder's zero, or clear its count of turns
     Zero(Agreement),
     /// Store the parameters in the drive
     Save,
@@ -26,22 +26,22 @@ pub enum Action {
     },
     /// Clear the fault or alarm that the drive is in
     ClearFault(Agreement),
-    /// Read the gains of the loops, or change some (YZ-AIM)
+    /// Read the gains of the loops, or change some (some drives)
     Gains(Gains),
-    /// Read the electronic gear of the pulse input, or change it (YZ-AIM)
+    /// Read the electronic gear of the pulse input, or change it (some drives)
     Gear {
         /// Numerator:denominator, reduced: "4:1"
         #[arg(value_parser = ratio)]
         ratio: Option<(u16, u16)>,
     },
-    /// Whether the drive moves to its multi-turn zero by itself at power-up (YZ-AIM)
+    /// Whether the drive moves to its multi-turn zero by itself at power-up (some drives)
     AutoHome {
         /// On or off
         switch: Switch,
         #[command(flatten)]
         agreement: Agreement,
     },
-    /// Set the drive up for interpolated position over the bus, and store it (YZ-AIM)
+    /// Set the drive up for interpolated position over the bus, and store it (some drives)
     Interpolation,
 }
 

@@ -11,6 +11,7 @@ use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 use crate::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings, NO_NODE};
 use crate::config::{Interface, Quantity};
 use crate::controller::VirtualClock;
+use crate::family;
 use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
 use crate::link::{InterfaceSettings, SocketCanOptions, open_socketcan};
 use crate::sim::lss::{LssBus, LssDevice};
@@ -24,6 +25,13 @@ use output::{Device, Output, Report};
 pub use simulated_device::SimulatedDevice;
 use simulated_device::{address, node};
 
+/// For the help: what those families have instead whose drives have no LSS.
+fn families_without_lss() -> String {
+    let instead = family::all().into_iter().filter_map(|family| family.instead_of_lss());
+    let lines: Vec<String> = instead.map(|words| format!("  {words}")).collect();
+    format!("Drives without LSS:\n{}", lines.join("\n"))
+}
+
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
 /// A bus cannot have more devices than there are node IDs.
@@ -32,11 +40,9 @@ const MOST_DEVICES: usize = 127;
 /// Give devices their node ID and bit rate by their identity (LSS, CiA 305)
 ///
 /// The device is the one with the identity after --device, or the only one on the bus (--only), or else one without a
-/// node ID, which a scan finds. What is set is forgotten at power-down unless --store is given. Neither eRob nor
-/// YZ-AIM has LSS: a YZ-AIM has `takt drive … set-id` and `set-bitrate`; the node ID of an eRob is set with the vendor's
-/// tool or its own CAN protocol, and its bit rate is always 1 Mbit/s.
+/// node ID, which a scan finds. What is set is forgotten at power-down unless --store is given.
 #[derive(Args, Debug)]
-#[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
+#[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions", after_help = families_without_lss())]
 pub struct Arguments {
     /// The interface: can0, vcan0 …; or sim, with the devices of --simulate
     #[arg(long, value_name = "INTERFACE")]

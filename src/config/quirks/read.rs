@@ -109,8 +109,8 @@ fn each<'a, T>(entry: &Entry<'a>, read: impl Fn(&Entry<'a>) -> Option<T>) -> Opt
 
 fn drive(mut section: Section<'_>) -> Option<QuirkyDrive> {
     let text = |entry: Entry<'_>| entry.text().map(str::to_owned);
-    let vendor = section.require("vendor", "the vendor: vendor = \"Maxon\"").and_then(text);
-    let product = section.require("product", "the product: product = \"EPOS4\"").and_then(text);
+    let vendor = section.require("vendor", "the vendor: vendor = \"Acme\"").and_then(text);
+    let product = section.require("product", "the product: product = \"Servo 1\"").and_then(text);
     let number = |entry: &Entry<'_>| u32::try_from(entry.integer(0..1 << 32)?).ok();
     let vendor_number = optional(section.get("vendor_number"), |entry| number(&entry));
     let product_numbers = optional(section.get("product_numbers"), |entry| each(&entry, number));

@@ -106,8 +106,9 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         Some(node)
     });
     let families: Vec<_> = machine.families.iter().map(|family| (family.word(), *family)).collect();
+    let example = families.first().map_or("", |(word, _)| word);
     let family = section
-        .require("drive", "the family of the drive: drive = \"erob-canopen\"")
+        .require("drive", format!("the family of the drive: drive = \"{example}\""))
         .and_then(|entry| entry.choice(&families));
     let family_drive = family.and_then(|family| family.read(&mut FamilyKeys::of(&mut section)));
     let drive = family_drive.as_deref();

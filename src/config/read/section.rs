@@ -1,5 +1,6 @@
 //! A table of the file, with the table of its defaults.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use toml::Spanned;
@@ -38,7 +39,7 @@ pub struct Section<'a> {
     defaults: Option<&'a DeTable<'a>>,
     known: Vec<&'static str>,
     known_in_defaults: Vec<&'static str>,
-    missing: Vec<(&'static str, &'static str)>,
+    missing: Vec<(&'static str, Cow<'static, str>)>,
     /// Whether the file has something other than a table here. Its missing keys are not reported then.
     is_no_table: bool,
     problems: &'a Problems,
@@ -96,9 +97,9 @@ impl<'a> Section<'a> {
     }
 
     /// As [`Self::get`]; an absent key is a problem, explained by what the key `says`.
-    pub fn require(&mut self, key: &'static str, says: &'static str) -> Option<Entry<'a>> {
+    pub fn require(&mut self, key: &'static str, says: impl Into<Cow<'static, str>>) -> Option<Entry<'a>> {
         self.get(key).or_else(|| {
-            self.missing.push((key, says));
+            self.missing.push((key, says.into()));
             None
         })
     }
@@ -106,7 +107,7 @@ impl<'a> Section<'a> {
     /// As [`Self::own`]; an absent key is a problem.
     pub fn require_own(&mut self, key: &'static str, says: &'static str) -> Option<Entry<'a>> {
         self.own(key).or_else(|| {
-            self.missing.push((key, says));
+            self.missing.push((key, says.into()));
             None
         })
     }
@@ -180,7 +181,7 @@ impl<'a> Section<'a> {
         }
         for (key, says) in &self.missing {
             if !meant.contains(key) && !self.is_no_table {
-                let kind = ProblemKind::MissingKey { key: self.path_of(key), says };
+                let kind = ProblemKind::MissingKey { key: self.path_of(key), says: says.clone() };
                 self.problems.report(kind, self.header());
             }
         }

@@ -21,7 +21,7 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
     let axes = &config.axes;
     if axes.is_empty() {
         let says = "at least one [[axis]]";
-        whole.at("axis").report(ProblemKind::MissingKey { key: "axis".to_owned(), says });
+        whole.at("axis").report(ProblemKind::MissingKey { key: "axis".to_owned(), says: says.into() });
     }
     if axes.len() > MAX_AXES {
         whole.at("axis").report(too_many(axes.len()));
@@ -187,7 +187,7 @@ pub fn joint<'a>(
     for (key, value, says) in needed {
         if value.is_none() {
             let spot = at(key);
-            spot.report(ProblemKind::MissingKey { key: spot.key.clone(), says });
+            spot.report(ProblemKind::MissingKey { key: spot.key.clone(), says: says.into() });
         }
     }
 }

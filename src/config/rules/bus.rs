@@ -14,7 +14,7 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
     let buses = &config.buses;
     if buses.is_empty() {
         let says = "at least one [[bus]]";
-        whole.at("bus").report(ProblemKind::MissingKey { key: "bus".to_owned(), says });
+        whole.at("bus").report(ProblemKind::MissingKey { key: "bus".to_owned(), says: says.into() });
     }
     if buses.len() > MAX_BUSES {
         whole.at("bus").report(too_many(buses.len()));

@@ -89,7 +89,7 @@ impl Handle {
 
     /// Changes the mode of operation of every axis, as far as `modes` of the configuration allow. An axis that is in it already stays.
     ///
-    /// The axes keep their places. A drive that takes another mode only while it is disabled, as an eRob, must be disabled before
+    /// The axes keep their places. A drive that takes another mode only while it is disabled must be disabled before
     /// ([`Handle::disable`]), and enabled again after that. [`Handle::wait`] returns when the drives show the new mode. Until then
     /// nothing else is possible but to stop and to disable, which ends the change. Of a stop of category 2, which leaves the change
     /// under way, the wait tells as well. A drive that does not show the mode in time is a fault, which must be reset, and is told its

@@ -6,7 +6,7 @@
 //! use takt::{Config, Controller, SessionOptions};
 //!
 //! fn main() -> takt::Result {
-//!     let config = Config::load("configs/arm6-erob.toml".as_ref())?;
+//!     let config = Config::load("arm.toml".as_ref())?;
 //!     let arm = Controller::start(config, SessionOptions::default())?;
 //!     let motion = arm.move_to(&[0.3, -0.2, 0.1, -0.5, 0.0, 0.4])?;
 //!     arm.wait(motion, Duration::from_secs(10))?;

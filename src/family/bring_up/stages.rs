@@ -31,7 +31,7 @@ const MAX_RESTARTS: u8 = 3;
 /// The timeouts of bring-up and shutdown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BringUpTiming {
-    /// Timeout of a node's boot-up after a reset. It includes the boot time after power-up (eRob: 8 s).
+    /// Timeout of a node's boot-up after a reset. It includes the boot time after power-up (8 s for some drives).
     pub boot_up_timeout_ns: Nanoseconds,
     /// Interval between two resets of a node that does not boot.
     pub reset_repeat_ns: Nanoseconds,

@@ -112,19 +112,19 @@ pub enum Task {
         /// Integration time of the velocity loop.
         velocity_integration: Option<i64>,
     },
-    /// Read or set the electronic gear of the pulse input (YZ-AIM).
+    /// Read or set the electronic gear of the pulse input.
     Gear {
         /// Numerator and denominator.
         ratio: Option<(u16, u16)>,
     },
-    /// Set whether the drive moves to its multi-turn zero at power-up (YZ-AIM).
+    /// Set whether the drive moves to its multi-turn zero at power-up.
     AutoHome {
         /// Whether it does so.
         is_on: bool,
         /// Whether the user confirmed it.
         is_confirmed: bool,
     },
-    /// Set the drive up for interpolation over the bus (YZ-AIM).
+    /// Set the drive up for interpolation over the bus.
     Interpolation,
 }
 
@@ -147,7 +147,7 @@ pub enum MoveKind {
     Absolute {
         /// The position.
         to: CommandValue,
-        /// Take over the new target at once, also during a motion. A YZ-AIM always does so.
+        /// Take over the new target at once, also during a motion. Some drives always do so.
         is_immediate: bool,
     },
     /// By a distance.

@@ -72,6 +72,12 @@ impl Family for ErobCanopen {
         errors::error_advice(ErrorCode(code))
     }
 
+    fn instead_of_lss(&self) -> Option<&'static str> {
+        Some(
+            "the node ID of an eRob is set with the vendor's tool or its own CAN protocol, and its bit rate is always 1 Mbit/s",
+        )
+    }
+
     fn objects(&self) -> &'static [ObjectEntry] {
         commission::OBJECTS
     }

@@ -72,6 +72,10 @@ impl Family for YzAim {
         Some(Alarm::of(code).advice().unwrap_or(super::error_words::UNKNOWN))
     }
 
+    fn instead_of_lss(&self) -> Option<&'static str> {
+        Some("a YZ-AIM has `takt drive … set-id` and `takt drive … set-bitrate`")
+    }
+
     /// A YZ-AIM drops requests that overlap or follow too soon, shortens its replies, and does not answer for objects that
     /// it does not have. The manual gives 606C two lengths (A27), so the length of the reply counts.
     fn sdo_quirks(&self) -> SdoQuirks {

@@ -94,7 +94,9 @@ fn fault(mut section: Section<'_>, text: &str, config: &Config) -> Option<Scenar
     let line = 1 + text.get(..section.header().start).map_or(0, |before| before.matches('\n').count());
     let Some(entry) = section.get("kind") else {
         let says = "what goes wrong: kind = \"drop\"";
-        section.header_spot().report(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says });
+        section
+            .header_spot()
+            .report(ProblemKind::MissingKey { key: "fault.kind".to_owned(), says: says.into() });
         return None;
     };
     // Without a valid kind it is unknown which other keys are valid.

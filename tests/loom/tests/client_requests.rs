@@ -35,7 +35,7 @@ fn the_requests_of_two_clients_are_taken_whole_and_once() {
         let (first, mut rt) = channel(2);
         let second = first.clone();
         let submitting = [(first, 1), (second, 2)].map(|(client, counts)| {
-            thread::spawn(move || assert!(client.submit(request(counts)).is_some(), "there is room"))
+            thread::spawn(move || assert!(client.submit_to(RequestTarget::All, request(counts)).is_some(), "there is room"))
         });
         let mut taken = take(&mut rt, 2);
         submitting.into_iter().for_each(|client| client.join().unwrap());
@@ -50,8 +50,8 @@ fn a_slot_is_used_again_only_after_its_request_was_taken() {
     loom::model(|| {
         let (client, mut rt) = channel(1);
         let submitting = thread::spawn(move || {
-            assert!(client.submit(request(1)).is_some());
-            client.submit(request(2)).is_some()
+            assert!(client.submit_to(RequestTarget::All, request(1)).is_some());
+            client.submit_to(RequestTarget::All, request(2)).is_some()
         });
         let mut taken = take(&mut rt, 2);
         let has_both = submitting.join().unwrap();
@@ -66,7 +66,7 @@ fn a_request_after_a_stop_is_never_taken_before_it() {
         let (client, mut rt) = channel(1);
         let submitting = thread::spawn(move || {
             client.stop(STOP);
-            client.submit(request(1));
+            client.submit_to(RequestTarget::All, request(1));
         });
         let mut taken = take(&mut rt, 2);
         submitting.join().unwrap();
@@ -80,7 +80,7 @@ fn a_request_before_a_stop_is_taken_before_it_or_discarded() {
     loom::model(|| {
         let (client, mut rt) = channel(1);
         let submitting = thread::spawn(move || {
-            client.submit(request(1));
+            client.submit_to(RequestTarget::All, request(1));
             client.stop(STOP);
         });
         let mut taken = take(&mut rt, 2);
@@ -113,7 +113,7 @@ fn with_every_access_relaxed_the_slots_fail() {
     loom::model(|| {
         let requests = all_relaxed::client_requests::client_requests(RequestNumbers::default(), 1, 1);
         let (client, mut rt) = requests;
-        let submitting = thread::spawn(move || client.submit(request(1)));
+        let submitting = thread::spawn(move || client.submit_to(RequestTarget::All, request(1)));
         let _ = rt.take();
         submitting.join().unwrap();
     });
