@@ -45,6 +45,18 @@
 //! [`Controller`], and commands and observes it through [`Handle`]s, from any thread. `examples/` has a short program for
 //! each way to move. Every error is readable when `main` returns it: see [`Error`].
 //!
+//! # What happens
+//! takt tells what happens through the crate `tracing`, from the threads beside the real-time thread. Each thing has its words and its
+//! fields:
+//!
+//! | target | what | fields |
+//! | --- | --- | --- |
+//! | `takt::bring_up` | each step, the end and the failure of bring-up and shutdown | `axis`, `bus`, `node`, `stage`, `step`, `reason`, `cure` |
+//! | `takt::run` | stages and phases, stops, states and emergencies of drives, missed slots, rejected requests | `slot`, `group`, `axis`, `rule`, `category`, `reason`, … |
+//! | `takt::bus` | a bus is opened; its state changes | `bus`, `interface`, `state` |
+//! | `takt::recording` | files are opened and closed, or cannot be written | `kind`, `file`, `reason` |
+//! | `takt::realtime` | what the operating system has refused to the real-time thread | `step` |
+//!
 //! # To read takt
 //! Each folder uses only what stands below it in this picture (`tests/arrows.rs` proves it):
 //!

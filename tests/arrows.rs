@@ -68,6 +68,24 @@ fn the_examples_and_the_documentation_use_the_public_face_alone() {
     assert!(files.is_empty(), "they use `takt::internals`: {files:?}");
 }
 
+/// The files that use the crate `tracing`: none of them is called in the real-time thread.
+const TELL: [&str; 5] = [
+    "src/cli/log.rs",
+    "src/controller/session.rs",
+    "src/controller/supervisor.rs",
+    "src/family/bring_up/stages.rs",
+    "src/telemetry/announce.rs",
+];
+
+#[test]
+fn only_what_runs_beside_the_real_time_thread_tells_tracing() {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("rt/Cargo.toml");
+    assert!(!fs::read_to_string(manifest).unwrap().contains("tracing"));
+    let uses_it = |path: &PathBuf| fs::read_to_string(path).unwrap().contains("tracing::");
+    let found: Vec<String> = sources().iter().filter(|path| uses_it(path)).map(|path| shown(path)).collect();
+    assert_eq!(found, TELL);
+}
+
 /// How families and makers are called, in small letters.
 const NAMES: [&str; 21] = [
     "erob",
@@ -105,7 +123,6 @@ const MAY_NAME: [(&str, &str); 4] = [
 fn only_its_own_folder_and_the_simulation_name_a_family() {
     let mut files = rust_files("src");
     files.extend(rust_files("rt/src"));
-    let shown = |path: &Path| path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string();
     let is_of_family = |name: &str| {
         let folders = ["erob_canopen", "yz_aim", "cia402"].map(|family| format!("src/family/{family}/"));
         name.starts_with("src/sim/") || folders.iter().any(|folder| name.starts_with(folder))
@@ -231,10 +248,14 @@ fn arrows() -> Vec<Arrow> {
     let mut all = vec![];
     for path in sources() {
         let text = fs::read_to_string(&path).unwrap();
-        let shown = path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string();
-        all.extend(arrows_in(&text, &module_path(&path), &shown));
+        all.extend(arrows_in(&text, &module_path(&path), &shown(&path)));
     }
     all
+}
+
+/// A file of the repository as messages name it.
+fn shown(path: &Path) -> String {
+    path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string()
 }
 
 fn source_root() -> PathBuf {

@@ -13,6 +13,7 @@ mod exit;
 mod full_queue;
 mod interruption;
 mod jitter;
+mod log;
 mod lss;
 mod ownership;
 mod plan;
@@ -29,6 +30,7 @@ use std::process::{ExitCode, Termination};
 use clap::{Parser, Subcommand};
 
 use exit::Exit;
+use log::LogLevel;
 
 /// The program `takt`: does what the command line says.
 pub fn main() -> ExitCode {
@@ -41,6 +43,9 @@ pub fn main() -> ExitCode {
 #[derive(Parser, Debug)]
 #[command(version, arg_required_else_help = true)]
 struct CommandLine {
+    /// Tell on standard error what happens, from this level on
+    #[arg(long, global = true, value_name = "LEVEL", value_enum, env = "TAKT_LOG", hide_env_values = true)]
+    log: Option<LogLevel>,
     #[command(subcommand)]
     command: Command,
 }
@@ -63,6 +68,7 @@ enum Command {
 impl CommandLine {
     /// Does what the command line says.
     fn execute(self) -> Exit {
+        self.log.unwrap_or(LogLevel::Off).begin();
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Report(arguments) => report::run(&arguments),

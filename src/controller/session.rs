@@ -8,6 +8,8 @@ use std::time::Duration;
 use takt_rt::linux::{MonotonicClock, ThreadReport};
 use takt_rt::{Clock, Request, SlotPlan, Snapshot, StopCategory};
 
+use tracing::{info, warn};
+
 use super::assemble::{self, AssembleError};
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::port::Port;
@@ -225,6 +227,10 @@ fn lead_as_owner(
         }
     };
     let begun = running.begun();
+    for refused in begun.report.refused() {
+        let step = refused.step;
+        warn!(target: "takt::realtime", ?step, "the real-time thread was refused {step:?}");
+    }
     if let (Some(remote), Some(handles)) =
         (remote, RemoteHandles::of(&mut host, assemble::slot_plan(config), &begun))
     {
@@ -285,6 +291,8 @@ fn lead_as_owner(
             (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
             (outcome, ..) => outcome,
         };
+    let words = outcome.words(&Machine::of(config));
+    info!(target: "takt::run", outcome = words.as_str(), "the run has ended: {words}");
     let is_done = matches!(
         outcome,
         Outcome::Finished | Outcome::OffTarget { .. } | Outcome::PositionNotReported { .. }
@@ -312,6 +320,8 @@ fn open_ports(
     let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = Port::open(config, index)?;
+        let (name, interface, bit_rate) = (bus.name.as_str(), bus.interface.to_string(), bus.bit_rate);
+        info!(target: "takt::bus", bus = name, interface, bit_rate, "{name}: opened on {interface}");
         let port = match fault_injector {
             Some(fault_injector) => fault_injector.wrap(index, port),
             None => port,

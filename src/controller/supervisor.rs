@@ -11,9 +11,11 @@
 use std::collections::VecDeque;
 
 use takt_rt::{
-    AxisSnapshot, Frame, Phase, Request, RequestEnvelope, RequestTarget, Rule, Snapshot, StopCategory,
-    StopReason,
+    AxisSnapshot, BusState, Frame, Phase, Request, RequestEnvelope, RequestTarget, Rule, Snapshot,
+    StopCategory, StopReason,
 };
+
+use tracing::{info, warn};
 
 use super::arrival::{ARRIVAL_NS, Arrival};
 use super::outcome::{Interrupt, Outcome, Progress};
@@ -21,6 +23,7 @@ use super::program::{ProgramRunner, ProgramStep};
 use crate::channels::{HostSide, RequestNumbers};
 use crate::config::Config;
 use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
+use crate::telemetry::BusReport;
 
 /// A stage must be completed within this time. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
@@ -43,6 +46,24 @@ enum Stage {
     /// The power is being removed, without a shut-down of the drives.
     RemovePower,
     Done,
+}
+
+impl Stage {
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Configure => "configure",
+            Self::Start => "start",
+            Self::Activate => "activate",
+            Self::ResetFaults => "reset faults",
+            Self::Enable => "enable",
+            Self::Run => "run",
+            Self::Settle { .. } => "settle",
+            Self::Disable => "disable",
+            Self::ShutDown => "shut down",
+            Self::RemovePower => "remove power",
+            Self::Done => "done",
+        }
+    }
 }
 
 /// Takes a controller through its life cycle.
@@ -68,6 +89,8 @@ pub struct Supervisor {
     duration_ns: Option<u64>,
     /// Whether a client commands the group, in place of the program.
     is_serving: bool,
+    /// The buses, and their states as `tracing` knows them.
+    buses: Vec<(String, BusState)>,
 }
 
 impl Supervisor {
@@ -96,6 +119,7 @@ impl Supervisor {
             deadline_ns: None,
             duration_ns,
             is_serving: false,
+            buses: config.buses.iter().map(|bus| (bus.name.clone(), BusState::default())).collect(),
         }
     }
 
@@ -151,6 +175,7 @@ impl Supervisor {
             self.shutdown.receive(bus, &received.frame);
         }
         let snapshot = host.snapshot();
+        self.tell_of_buses(&snapshot);
         self.numbers = host.numbers();
         self.handle_interrupt(now_ns);
         let since_ns = *self.stage_since_ns.get_or_insert(now_ns);
@@ -419,7 +444,25 @@ impl Supervisor {
         });
     }
 
+    /// Tells `tracing` of buses whose state has changed.
+    fn tell_of_buses(&mut self, snapshot: &Snapshot) {
+        for ((bus, known), health) in self.buses.iter_mut().zip(snapshot.buses()) {
+            if *known != health.state {
+                *known = health.state;
+                let (bus, state) = (bus.as_str(), BusReport::state_words(health.state));
+                match health.state {
+                    BusState::ErrorActive => info!(target: "takt::bus", bus, state, "{bus}: {state}"),
+                    _ => warn!(target: "takt::bus", bus, state, "{bus}: {state}"),
+                }
+            }
+        }
+    }
+
     fn enter(&mut self, stage: Stage, now_ns: u64) {
+        // A stage that goes on is entered again.
+        if std::mem::discriminant(&self.stage) != std::mem::discriminant(&stage) {
+            info!(target: "takt::run", stage = stage.name(), "{}", stage.name());
+        }
         self.stage = stage;
         self.stage_since_ns = Some(now_ns);
     }

@@ -15,6 +15,7 @@ use takt_rt::{
     StopReason,
 };
 
+use super::announce;
 use super::destination::RecordingDestination;
 use super::history::{Entry, History, OnBus};
 use super::machine::Machine;
@@ -262,6 +263,7 @@ impl BlackBox {
         });
         match begun {
             Ok(recording) => {
+                announce::opened("black box", &label);
                 self.open = Some(OpenFile {
                     recording,
                     until_ns: at_ns + AFTER_NS,
@@ -278,8 +280,11 @@ impl BlackBox {
     pub fn close(&mut self) {
         let Some(OpenFile { recording, .. }) = self.open.take() else { return };
         let label = recording.label.clone();
-        if let Err(error) = recording.finish() {
-            self.fail(format!("the black box is incomplete: cannot write {label}: {}", reason(&error)));
+        match recording.finish() {
+            Ok(()) => announce::closed("black box", &label),
+            Err(error) => {
+                self.fail(format!("the black box is incomplete: cannot write {label}: {}", reason(&error)))
+            }
         }
     }
 

@@ -8,6 +8,7 @@ use std::sync::{Arc, OnceLock};
 use mcap::McapError;
 use takt_rt::{CycleRecord, Event, Nanoseconds};
 
+use super::announce;
 use super::black_box::{BlackBox, BlackBoxOptions, Incident, reason};
 use super::candump::CandumpLog;
 use super::destination::RecordingDestination;
@@ -133,6 +134,7 @@ impl Logger {
             match destination.open(&stem, "log") {
                 Ok(opened) => {
                     logger.paths[1].clone_from(&opened.path);
+                    announce::opened("candump log", &opened.label);
                     logger.candump = Some(CandumpLog::new(opened, wall_clock));
                 }
                 Err(error) => logger.report_failure(format!("no candump log: cannot write {error}")),
@@ -155,7 +157,10 @@ impl Logger {
         self.paths[0].clone_from(&opened.path);
         let label = opened.label.clone();
         match Recording::begin(opened, &self.machine, wall_clock) {
-            Ok(recording) => self.recording = Some(recording),
+            Ok(recording) => {
+                announce::opened("recording", &label);
+                self.recording = Some(recording);
+            }
             Err(error) => {
                 self.report_failure(format!("no recording: cannot write {label}: {}", reason(&error)));
             }
@@ -210,6 +215,7 @@ impl Logger {
         while let Some(event) = self.source.take_event() {
             taken += 1;
             let text = words::event(&event, &self.machine);
+            announce::event(&event, &text, &self.machine);
             let written = self.recording.as_mut().map(|recording| recording.event(&event, &text));
             if let Some(Err(error)) = written {
                 let failure = self.recording.take().map(|recording| (recording.label, error));
@@ -274,17 +280,20 @@ impl Logger {
         self.drain();
         if let Some(recording) = self.recording.take() {
             let label = recording.label.clone();
-            if let Err(error) = recording.finish() {
-                self.report_failure(format!(
+            match recording.finish() {
+                Ok(()) => announce::closed("recording", &label),
+                Err(error) => self.report_failure(format!(
                     "the recording is incomplete: cannot write {label}: {}",
                     reason(&error)
-                ));
+                )),
             }
         }
         if let Some(log) = self.candump.take() {
             let label = log.label.clone();
-            if let Err(error) = log.finish(&self.traces) {
-                self.report_failure(format!("the candump log is incomplete: cannot write {label}: {error}"));
+            match log.finish(&self.traces) {
+                Ok(()) => announce::closed("candump log", &label),
+                Err(error) => self
+                    .report_failure(format!("the candump log is incomplete: cannot write {label}: {error}")),
             }
         }
         let mut black_boxes = BlackBoxes::default();
@@ -299,13 +308,16 @@ impl Logger {
         let [recording, candump] = [recording, candump].map(|path| self.verified(path));
         black_boxes.files =
             black_boxes.files.into_iter().filter_map(|path| self.verified(Some(path))).collect();
+        let (records_dropped, events_dropped) = (self.source.records_dropped(), self.source.events_dropped());
+        let frames_dropped = self.traces.iter().map(Trace::dropped).sum();
+        announce::dropped(records_dropped, events_dropped, frames_dropped);
         LogSummary {
             machine: self.machine,
             statistics: self.statistics,
             records: self.source.records_written(),
-            records_dropped: self.source.records_dropped(),
-            events_dropped: self.source.events_dropped(),
-            frames_dropped: self.traces.iter().map(Trace::dropped).sum(),
+            records_dropped,
+            events_dropped,
+            frames_dropped,
             recording,
             candump,
             black_boxes,
@@ -331,6 +343,7 @@ impl Logger {
     }
 
     fn report_failure(&mut self, message: String) {
+        announce::not_written(&message);
         self.not_written.push(message.clone());
         if self.listener.notify(&Notice::NotWritten(message)).is_err()
             && let Some(incident) = self.listener.incident()

@@ -9,6 +9,7 @@
 //! The black box ([`BlackBoxOptions`]) keeps the last seconds in memory, frames included. It writes them to a file of
 //! their own at every [`Incident`]. [`Recorded`] reads such files and recordings, and [`RecordingReport`] summarises them.
 
+mod announce;
 mod black_box;
 mod candump;
 mod cdr;

@@ -378,7 +378,7 @@ impl AxisReport {
 
 impl BusReport {
     /// The name of a fault confinement state.
-    pub(super) const fn state_words(state: BusState) -> &'static str {
+    pub(crate) const fn state_words(state: BusState) -> &'static str {
         match state {
             BusState::ErrorActive => "error active",
             BusState::ErrorPassive => "error passive",

@@ -14,6 +14,7 @@ use std::rc::Rc;
 use std::task::{Context, Waker};
 
 use takt_rt::{Frame, Nanoseconds};
+use tracing::{debug, error, info};
 
 use super::axis_session::{AxisSession, OnFailure, StepFailure, StepResult};
 use super::facts::AxisFacts;
@@ -23,7 +24,10 @@ use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config};
 use crate::family::{self, SettingUp};
-use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, SdoQuirks};
+use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, ProcedureError, SdoQuirks};
+
+/// The target of what is told of bring-up and shutdown.
+const BRING_UP: &str = "takt::bring_up";
 
 /// Number of restarts of a drive after which its configuration gives up.
 const MAX_RESTARTS: u8 = 3;
@@ -217,6 +221,16 @@ struct Member {
     session: CanopenSession,
     /// The number of accesses without restarts and repetitions, for the progress.
     accesses: usize,
+    told: Told,
+}
+
+/// What `tracing` knows of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Told {
+    /// The part that is under way, and its last step; empty before the first one.
+    Step(Part, &'static str),
+    /// That the part is over.
+    End,
 }
 
 impl Group {
@@ -228,6 +242,7 @@ impl Group {
             node: axis.node,
             session: session(axis, timing),
             accesses: 0,
+            told: Told::End,
         });
         Self { members: members.collect(), procedures: Parallel::new([]) }
     }
@@ -240,6 +255,7 @@ impl Group {
             let facts = facts.next().unwrap_or_else(unknown);
             member.accesses = dry_run(part, config, axis).accesses;
             member.session.begin_again();
+            member.told = Told::Step(part, "");
             // The progress shows it before the first poll.
             member.session.resume_step(RESTART_STEP);
             let (session, config, axis) = (member.session.clone(), Rc::clone(config), axis.clone());
@@ -255,6 +271,11 @@ impl Group {
 
     fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(usize, Frame)) {
         self.procedures.poll(now_ns, send);
+        for (axis, (member, procedure)) in
+            self.members.iter_mut().zip(self.procedures.procedures()).enumerate()
+        {
+            member.tell(axis, procedure.outcome());
+        }
     }
 
     fn receive(&mut self, bus: usize, frame: &Frame) {
@@ -291,6 +312,31 @@ impl Member {
         if self.accesses == 0 { 1.0 } else { (self.session.done() as f64 / self.accesses as f64).min(1.0) }
     }
 
+    /// Tells `tracing` of a new step, and how the part has ended.
+    fn tell(&mut self, number: usize, outcome: Option<&Result<AxisFacts, ProcedureError<StepFailure>>>) {
+        let Told::Step(part, last) = self.told else { return };
+        let (axis, bus, node, stage) = (self.name.as_str(), self.bus_name.as_str(), self.node, part.name());
+        match outcome {
+            None => {
+                let step = self.session.step_name();
+                if step != last {
+                    debug!(target: BRING_UP, axis, bus, node, stage, step, "{axis}: {stage}: {step}");
+                    self.told = Told::Step(part, step);
+                }
+            }
+            Some(Ok(_)) => {
+                info!(target: BRING_UP, axis, bus, node, stage, "{axis}: {stage}: done");
+                self.told = Told::End;
+            }
+            Some(Err(error)) => {
+                let failure = self.failure(number, error.step, error.failure);
+                let (step, reason, cure) = (failure.step, failure.cause.to_string(), failure.advice());
+                error!(target: BRING_UP, axis, bus, node, stage, step, reason, cure, "{axis}: {stage}: {step}: {reason}");
+                self.told = Told::End;
+            }
+        }
+    }
+
     fn failure(&self, axis: usize, step: &'static str, failure: StepFailure) -> AxisFailure {
         AxisFailure {
             axis,
@@ -321,6 +367,14 @@ impl Part {
             Self::Configure => family.configure(c),
             Self::Start => family.start(c),
             Self::ShutDown => family.shut_down(c),
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Configure => "configure",
+            Self::Start => "start",
+            Self::ShutDown => "shut down",
         }
     }
 
