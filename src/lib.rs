@@ -36,7 +36,7 @@
 //! faults link sim                     faults on purpose; sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
-//! canopen                             the protocols of CiA 301, 305 and 306, without I/O
+//! canopen erob_can                    CiA 301, 305 and 306; eRob's own protocol; both without I/O
 //! channels                            the lock-free door to the real-time thread
 //! trajectory frame_time sleep_alignment source_text printable text_file
 //! ```
@@ -68,6 +68,7 @@ pub mod commission;
 pub mod config;
 pub mod controller;
 pub mod doctor;
+pub mod erob_can;
 mod error;
 pub mod family;
 pub mod faults;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 23] = [
+const ORDER: [&str; 24] = [
     "cli",
     "doctor",
     "jitter",
@@ -22,6 +22,7 @@ const ORDER: [&str; 23] = [
     "config",
     "procedure",
     "canopen",
+    "erob_can",
     "channels",
     "trajectory",
     "frame_time",

@@ -7,6 +7,7 @@
 pub mod bring_up;
 pub mod cia402;
 pub mod commission;
+pub mod erob_can;
 pub mod erob_canopen;
 mod error_words;
 mod registry;

@@ -8,7 +8,7 @@
 //!     arbitration           │
 //!     who sends, when       │
 //!     mailbox  wire        cia402 ── any CiA 402 drive, made from its electronic data sheet
-//!                          erob, yz_aim ── drives of their own, by their manuals and field experience
+//!                          erob, erob_can, yz_aim ── drives of their own, by their manuals and field experience
 //!     frames   bits,        │
 //!     waiting  stuffing   servo ── position, velocity and torque loops
 //!                           │
@@ -49,6 +49,7 @@ pub mod cia402;
 mod defect;
 mod drive;
 pub mod erob;
+pub mod erob_can;
 pub mod homing_switches;
 mod live;
 pub mod lss;
