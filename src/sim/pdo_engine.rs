@@ -7,7 +7,7 @@ use takt_rt::{Frame, Id, MappedObject, Nanoseconds};
 
 use super::object_dictionary::SimulatedDictionary;
 
-pub use parameters::check_parameter;
+pub use parameters::{check_parameter, is_parameter};
 
 /// The most objects in a PDO.
 const MAX_OBJECTS: usize = 64;
@@ -34,6 +34,11 @@ struct Field {
 impl Field {
     fn mask(self) -> u64 {
         if self.bits >= 64 { u64::MAX } else { (1 << self.bits) - 1 }
+    }
+
+    fn pack(self, dictionary: &SimulatedDictionary) -> u64 {
+        let number = dictionary.number_at(self.place).unwrap_or(0);
+        (number.cast_unsigned() & self.mask()) << self.shift
     }
 }
 
@@ -105,14 +110,12 @@ impl Pdo {
     }
 
     fn pack(&self, dictionary: &SimulatedDictionary) -> u64 {
-        let value = |field: &Field| field.place.map_or(0, |place| dictionary.bits(place) & field.mask());
-        self.fields.iter().fold(0, |word, field| word | value(field) << field.shift)
+        self.fields.iter().fold(0, |word, field| word | field.pack(dictionary))
     }
 
     fn pack_events(&self, dictionary: &SimulatedDictionary) -> u64 {
-        let value = |field: &Field| field.place.map_or(0, |place| dictionary.bits(place) & field.mask());
         let events = self.fields.iter().filter(|field| field.is_event);
-        events.fold(0, |word, field| word | value(field) << field.shift)
+        events.fold(0, |word, field| word | field.pack(dictionary))
     }
 
     fn frame(&self, word: u64) -> Option<Frame> {
@@ -191,13 +194,21 @@ impl Outbound {
 pub struct PdoEngine {
     inbound: Vec<Inbound>,
     outbound: Vec<Outbound>,
+    features: PdoFeatures,
+}
+
+/// What a device does with its PDOs.
+#[derive(Clone, Copy, Debug)]
+pub struct PdoFeatures {
     /// Whether an object is a measured value, which changes all the time.
-    is_measured: fn(u16) -> bool,
+    pub is_measured: fn(u16) -> bool,
+    /// Whether it watches the event timers of its RPDOs.
+    pub watches_rpdos: bool,
 }
 
 impl PdoEngine {
     /// The PDOs that the dictionary has.
-    pub fn new(dictionary: &SimulatedDictionary, is_measured: fn(u16) -> bool) -> Self {
+    pub fn new(dictionary: &SimulatedDictionary, features: PdoFeatures) -> Self {
         let places = |first: u16| {
             let numbers = (0..0x200u16).filter(move |number| dictionary.place(first + number, 1).is_some());
             numbers
@@ -216,7 +227,7 @@ impl PdoEngine {
             last_ns: 0,
             is_sent: false,
         });
-        let mut engine = Self { inbound: inbound.collect(), outbound: outbound.collect(), is_measured };
+        let mut engine = Self { inbound: inbound.collect(), outbound: outbound.collect(), features };
         engine.compile(dictionary);
         engine
     }
@@ -224,10 +235,10 @@ impl PdoEngine {
     /// Compiles the parameters of the dictionary. Latched and sampled data is discarded.
     pub fn compile(&mut self, dictionary: &SimulatedDictionary) {
         for inbound in &mut self.inbound {
-            inbound.pdo.compile(dictionary, self.is_measured);
+            inbound.pdo.compile(dictionary, self.features.is_measured);
         }
         for outbound in &mut self.outbound {
-            outbound.pdo.compile(dictionary, self.is_measured);
+            outbound.pdo.compile(dictionary, self.features.is_measured);
         }
         self.stop();
     }
@@ -246,7 +257,9 @@ impl PdoEngine {
         if frame.payload().len() < inbound.pdo.bytes {
             return RpdoReception::TooShort;
         }
-        inbound.deadline_ns = if inbound.pdo.event_ns == 0 { NEVER } else { now_ns + inbound.pdo.event_ns };
+        if self.features.watches_rpdos && inbound.pdo.event_ns > 0 {
+            inbound.deadline_ns = now_ns + inbound.pdo.event_ns;
+        }
         if inbound.pdo.is_synchronous() {
             inbound.latched = Some(frame.first_word());
             return RpdoReception::Latched;

@@ -3,13 +3,14 @@
 use takt_rt::{DriveState, NANOSECONDS_PER_SECOND, Nanoseconds, OperationMode};
 
 use crate::config::quirks::Quirks;
+use crate::sim::errors::DeviceError;
+use crate::sim::feedback_defects::JointDefects;
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::plant::Joint;
 use crate::sim::servo::Servo;
 
 use super::Cia402AxisParameters;
 use super::device::{Change, Device, FaultReaction};
-use super::errors::Cia402Error;
 use super::homing::HomingStep;
 use super::motion::{Actual, Demand, Motion};
 use super::places::Places;
@@ -26,22 +27,13 @@ struct ComingMode {
     due_ns: Nanoseconds,
 }
 
-/// Defects of the joint.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct JointDefects {
-    /// The joint cannot move.
-    pub is_blocked: bool,
-    /// The brake does not release.
-    pub is_brake_stuck: bool,
-}
-
 /// What an axis asks of the drive after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisEvent {
     /// A fault was reset: the error is over.
     FaultReset,
     /// The axis is to fail.
-    Failed(Cia402Error),
+    Failed(DeviceError),
 }
 
 /// One axis.
@@ -278,7 +270,7 @@ impl Axis {
     }
 
     /// Enters a fault: error code and fault reaction.
-    pub fn fail(&mut self, error: Cia402Error, dictionary: &mut SimulatedDictionary) {
+    pub fn fail(&mut self, error: DeviceError, dictionary: &mut SimulatedDictionary) {
         dictionary.set_at(self.places.error_code, error.code().into());
         let reaction = if error.cuts_power() { FaultReaction::CutPower } else { FaultReaction::ByOption };
         self.device.fault(reaction, &self.places, dictionary);
@@ -325,7 +317,7 @@ impl Axis {
             let is_beyond = motion.exceeds_window(self.actual(), &self.profile(dictionary), duration_s);
             self.motion = motion;
             if is_beyond && self.device.stop().is_none() {
-                event = Some(AxisEvent::Failed(Cia402Error::FollowingError));
+                event = Some(AxisEvent::Failed(DeviceError::FollowingError));
             }
         } else {
             self.motion.follow(self.actual());

@@ -6,17 +6,17 @@ mod frames;
 use takt_rt::Nanoseconds;
 
 use super::axis::{Axis, AxisEvent};
-use super::defects::FeedbackDefects;
-use super::errors::{Cia402Error, Errors};
-use super::network::Network;
 use super::places::is_measured;
 use super::{Cia402Parameters, NotADrive, dictionary_of};
 use crate::config::quirks::Quirks;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
+use crate::sim::errors::{DeviceError, Errors};
+use crate::sim::feedback_defects::{FeedbackDefects, ShownObjects};
 use crate::sim::mailbox::Mailbox;
+use crate::sim::network::Network;
 use crate::sim::object_dictionary::SimulatedDictionary;
-use crate::sim::pdo_engine::PdoEngine;
+use crate::sim::pdo_engine::{PdoEngine, PdoFeatures};
 use crate::sim::plant::Gravity;
 use crate::sim::random::Random;
 use crate::sim::sdo_server::{SdoFeatures, SdoServer};
@@ -70,7 +70,11 @@ impl Cia402Drive {
         let axes = (0u16..).zip(axes).map(|(number, axis)| Axis::new(number, axis, &mut dictionary, &quirks));
         let axes = axes.collect();
         let longest_ns = quirks.delays.sdo_reply_ns.unwrap_or(LONGEST_REPLY_NS);
-        let features = SdoFeatures { is_upload_segmented: false, has_blocks: !quirks.refuses_blocks };
+        let features = if quirks.refuses_blocks {
+            SdoFeatures::Segmented { is_upload_segmented: false }
+        } else {
+            SdoFeatures::Blocks
+        };
         let latency_ns = SHORTEST_REPLY_NS.min(longest_ns)..longest_ns + 1;
         Ok(Self {
             node,
@@ -78,7 +82,7 @@ impl Cia402Drive {
             feedback_delay_ns,
             network: Network::starting(&dictionary, power_up_ns, quirks.power_up),
             sdo: SdoServer::new(Random::new(seed, node), latency_ns, features),
-            pdos: PdoEngine::new(&dictionary, is_measured),
+            pdos: PdoEngine::new(&dictionary, PdoFeatures { is_measured, watches_rpdos: true }),
             errors: Errors::new(&dictionary),
             axes,
             quirks,
@@ -145,7 +149,7 @@ impl Cia402Drive {
     }
 
     /// Has an axis fail: error code, emergency message, fault reaction.
-    fn fail(&mut self, index: usize, error: Cia402Error) {
+    fn fail(&mut self, index: usize, error: DeviceError) {
         self.axes[index].fail(error, &mut self.dictionary);
         self.errors.raise(error, &mut self.dictionary);
     }
@@ -179,12 +183,12 @@ impl Cia402Drive {
         let mut is_fault = false;
         for axis in &mut self.axes {
             if axis.lose_master(&self.dictionary) {
-                axis.fail(Cia402Error::MasterLost, &mut self.dictionary);
+                axis.fail(DeviceError::MasterLost, &mut self.dictionary);
                 is_fault = true;
             }
         }
         // The node reports the error even when its axes go on.
-        self.errors.raise(Cia402Error::MasterLost, &mut self.dictionary);
+        self.errors.raise(DeviceError::MasterLost, &mut self.dictionary);
         if !is_fault {
             self.errors.clear(&mut self.dictionary);
         }
@@ -200,8 +204,14 @@ impl Cia402Drive {
     /// objects.
     fn report<T>(&mut self, take: impl FnOnce(&mut PdoEngine, &SimulatedDictionary) -> T) -> T {
         self.measure();
-        let places = self.axes[0].places;
-        let truth = self.defects.falsify(&places, &mut self.dictionary);
+        let places = &self.axes[0].places;
+        let shown = ShownObjects {
+            statusword: places.statusword,
+            mode_display: places.mode_display,
+            position: places.position,
+            instead_of_position: places.torque,
+        };
+        let truth = self.defects.falsify(shown, &mut self.dictionary);
         let taken = take(&mut self.pdos, &self.dictionary);
         truth.restore(&mut self.dictionary);
         taken
@@ -251,13 +261,14 @@ impl Drive for Cia402Drive {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
-            self.fail(0, Cia402Error::Fault(fault));
+            self.fail(0, DeviceError::Fault(fault));
         }
-        if self.network.check_master(now_ns, &self.dictionary) {
+        if self.network.has_lost_master(now_ns) {
+            self.network.follow_error_behaviour(&self.dictionary);
             self.lose_master();
         }
         if self.pdos.has_lost_rpdo(now_ns) {
-            self.errors.raise(Cia402Error::RpdoTimeout, &mut self.dictionary);
+            self.errors.raise(DeviceError::RpdoTimeout, &mut self.dictionary);
         }
         if now_ns >= self.save_ns {
             self.save_ns = NEVER;
@@ -314,14 +325,13 @@ impl Drive for Cia402Drive {
         self.run_loops(now_ns);
         self.defects.set(defect, is_present);
         let first = &mut self.axes[0];
+        first.defects.set(defect, is_present);
         match defect {
-            Defect::BlockedJoint => first.defects.is_blocked = is_present,
-            Defect::StuckBrake => first.defects.is_brake_stuck = is_present,
             Defect::EncoderJump { distance } if is_present => first.jump(distance),
             Defect::TorqueOff if is_present => first.lose_torque(),
-            Defect::Alarm { code } if is_present => self.fail(0, Cia402Error::Alarm(code)),
+            Defect::Alarm { code } if is_present => self.fail(0, DeviceError::Alarm(code)),
             Defect::Emergency { code } if is_present => {
-                self.errors.raise(Cia402Error::Alarm(code), &mut self.dictionary);
+                self.errors.raise(DeviceError::Alarm(code), &mut self.dictionary);
             }
             _ => {}
         }

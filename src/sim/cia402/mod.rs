@@ -25,13 +25,10 @@
 //! - The velocity mode (2), 607B, 60C4, 1007 and 1012 have no effect.
 
 mod axis;
-mod defects;
 mod device;
 mod drive;
-mod errors;
 mod homing;
 mod motion;
-mod network;
 mod places;
 mod profile;
 mod units;

@@ -7,19 +7,21 @@ mod loops;
 use takt_rt::{DriveState, Frame, Nanoseconds, OperationMode};
 
 use super::ErobParameters;
-use super::defects::ErobDefects;
 use super::device::{Change, ErobDevice};
-use super::dictionary::{ErobDictionary, at};
-use super::errors::{ErobError, ErobErrors};
 use super::motion::{ErobActual, ErobMotion};
-use super::network::ErobNetwork;
-use super::process_data::ErobProcessData;
-use super::sdo::ErobSdoServer;
+use super::objects::{OBJECTS, at, is_measured};
+use crate::config::PowerUpState;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
+use crate::sim::errors::{DeviceError, Errors};
+use crate::sim::feedback_defects::{FeedbackDefects, JointDefects, ShownObjects};
 use crate::sim::mailbox::Mailbox;
+use crate::sim::network::Network;
+use crate::sim::object_dictionary::SimulatedDictionary;
+use crate::sim::pdo_engine::{PdoEngine, PdoFeatures};
 use crate::sim::plant::{Gravity, Joint};
 use crate::sim::random::Random;
+use crate::sim::sdo_server::{SdoFeatures, SdoServer};
 use crate::sim::servo::Servo;
 
 /// Longest time between two advances.
@@ -31,6 +33,17 @@ const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
 /// From a new value of 6060 until the drive is in that mode and 6061 shows it: two steps of its loops, and less than an SDO exchange. In
 /// the manual's sequences the next SDO reads the new mode.
 const MODE_CHANGE_NS: Nanoseconds = 250_000;
+/// From an SDO request to its reply, as measured on real units.
+const SDO_LATENCY_NS: std::ops::Range<Nanoseconds> = 300_000..1_000_000;
+/// It ignores the event timers of its RPDOs.
+const PDO_FEATURES: PdoFeatures = PdoFeatures { is_measured, watches_rpdos: false };
+/// The objects that a defect can change: the motor encoder takes the place of the position.
+const SHOWN: ShownObjects = ShownObjects {
+    statusword: Some(at::STATUSWORD),
+    mode_display: Some(at::OPERATION_MODE_DISPLAY),
+    position: Some(at::POSITION),
+    instead_of_position: Some(at::MOTOR_ENCODER),
+};
 const NEVER: Nanoseconds = Nanoseconds::MAX;
 
 /// A mode that the drive is about to be in.
@@ -44,11 +57,11 @@ struct ComingMode {
 #[derive(Clone, Debug)]
 pub struct ErobJoint {
     parameters: ErobParameters,
-    dictionary: ErobDictionary,
-    network: ErobNetwork,
-    sdo: ErobSdoServer,
-    process_data: ErobProcessData,
-    errors: ErobErrors,
+    dictionary: SimulatedDictionary,
+    network: Network,
+    sdo: SdoServer,
+    pdos: PdoEngine,
+    errors: Errors,
     device: ErobDevice,
     motion: ErobMotion,
     servo: Servo,
@@ -60,7 +73,8 @@ pub struct ErobJoint {
     has_pdo_error: bool,
     /// A fault injected since the last advance.
     injected: Option<DriveFault>,
-    defects: ErobDefects,
+    defects: FeedbackDefects,
+    joint_defects: JointDefects,
     coming_mode: Option<ComingMode>,
     save_ns: Nanoseconds,
     /// The time up to which the loops have run.
@@ -72,22 +86,23 @@ pub struct ErobJoint {
 impl ErobJoint {
     /// A module whose supply is switched on at time 0.
     pub fn new(parameters: ErobParameters) -> Self {
-        let mut dictionary = ErobDictionary::new(parameters.node);
-        dictionary.set_factory(at::RATED_TORQUE, (1000.0 * parameters.rated_torque).round() as u32);
+        let mut dictionary = SimulatedDictionary::of_table(&OBJECTS, parameters.node);
+        dictionary.set_factory(at::RATED_TORQUE, (1000.0 * parameters.rated_torque).round() as i64);
         let rated_current_ma = 1000.0 * parameters.rated_torque / TORQUE_PER_AMPERE;
-        dictionary.set_factory(at::RATED_CURRENT, rated_current_ma.round() as u32);
+        dictionary.set_factory(at::RATED_CURRENT, rated_current_ma.round() as i64);
         dictionary.set_factory(at::TEMPERATURE, 35);
         let mut random = Random::new(parameters.seed, parameters.node);
         let has_warning = random.next() & 1 == 1;
         let velocity_limit = parameters.highest_velocity;
         let counts_per_second = parameters.encoder.counts_per_second(velocity_limit).abs();
+        let sdo_features = SdoFeatures::Segmented { is_upload_segmented: parameters.is_upload_segmented };
         let mut module = Self {
             parameters,
+            network: Network::starting(&dictionary, parameters.power_up_ns, PowerUpState::PreOperational),
+            sdo: SdoServer::new(random, SDO_LATENCY_NS, sdo_features),
+            pdos: PdoEngine::new(&dictionary, PDO_FEATURES),
+            errors: Errors::new(&dictionary),
             dictionary,
-            network: ErobNetwork::starting(parameters.node, parameters.power_up_ns),
-            sdo: ErobSdoServer::new(random, parameters.is_upload_segmented),
-            process_data: ErobProcessData::default(),
-            errors: ErobErrors::default(),
             device: ErobDevice::starting(has_warning),
             motion: ErobMotion::new(counts_per_second),
             servo: Servo::new(parameters.joint.inertia, parameters.peak_torque, velocity_limit),
@@ -97,14 +112,14 @@ impl ErobJoint {
             has_battery_fault: false,
             has_pdo_error: false,
             injected: None,
-            defects: ErobDefects::default(),
+            defects: FeedbackDefects::default(),
+            joint_defects: JointDefects::default(),
             coming_mode: None,
             save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
             wake_ns: 0,
         };
-        module.process_data.compile(&module.dictionary);
         if !parameters.has_battery {
             module.lose_turns();
         }
@@ -112,7 +127,7 @@ impl ErobJoint {
     }
 
     fn is_braked(&self) -> bool {
-        !self.device.state().has_torque() || self.defects.is_brake_stuck
+        !self.device.state().has_torque() || self.joint_defects.is_brake_stuck
     }
 
     fn direction(&self) -> f64 {
@@ -130,7 +145,7 @@ impl ErobJoint {
 
     /// The current mode of operation, as in 6061.
     fn mode(&self) -> Option<OperationMode> {
-        OperationMode::from_number(self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8)
+        OperationMode::from_number(self.dictionary.number(at::OPERATION_MODE_DISPLAY) as i8)
     }
 
     /// Evaluates the controlword in the state machine and in the profile position handshake.
@@ -160,13 +175,13 @@ impl ErobJoint {
     /// 6061 follows 6060 while the drive has no torque, if the unit has the mode. The manual asks to disable before every change, and does
     /// not say what becomes of a change before that: here it waits until the torque is gone. An SDO is refused, a PDO cannot be.
     fn follow_mode(&mut self) {
-        let number = self.dictionary.signed(at::OPERATION_MODE) as i8;
-        let supported = self.dictionary.get(at::SUPPORTED_MODES);
+        let number = self.dictionary.number(at::OPERATION_MODE) as i8;
+        let supported = self.dictionary.number(at::SUPPORTED_MODES) as u32;
         let is_supported = OperationMode::from_number(number).is_some_and(|mode| {
             supported & mode.supported_bit() != 0
                 || mode == OperationMode::InterpolatedPosition && self.parameters.has_interpolated_position
         });
-        let is_shown = self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8 == number;
+        let is_shown = self.dictionary.number(at::OPERATION_MODE_DISPLAY) as i8 == number;
         self.coming_mode = match self.coming_mode {
             _ if !is_supported || is_shown || self.device.state().has_torque() => None,
             Some(coming) if coming.number == number => Some(coming),
@@ -181,12 +196,12 @@ impl ErobJoint {
             self.coming_mode = None;
         } else if due_ns <= self.stepped_ns {
             self.coming_mode = None;
-            self.dictionary.set(at::OPERATION_MODE_DISPLAY, number as u8 as u32);
+            self.dictionary.set(at::OPERATION_MODE_DISPLAY, number.into());
         }
     }
 
     /// Enters a fault: error code, emergency message, fault reaction.
-    fn fail(&mut self, error: ErobError) {
+    fn fail(&mut self, error: DeviceError) {
         self.dictionary.set(at::ERROR_CODE, error.code().into());
         self.errors.raise(error, &mut self.dictionary);
         self.device.fault(error.cuts_power(), &self.dictionary);
@@ -207,12 +222,12 @@ impl ErobJoint {
         let counts = self.counts();
         let statusword = self.statusword();
         let dictionary = &mut self.dictionary;
-        dictionary.set(at::POSITION, counts as u32);
+        dictionary.set(at::POSITION, counts.into());
         dictionary.set_real(at::VELOCITY, actual.velocity);
         dictionary.set_real(at::TORQUE, per_mille);
         dictionary.set_real(at::CURRENT, per_mille);
         dictionary.set_real(at::TORQUE_ESTIMATE, 1000.0 * self.torque);
-        dictionary.set(at::MOTOR_ENCODER, motor as i64 as u32);
+        dictionary.set(at::MOTOR_ENCODER, motor as i64);
         dictionary.set_real(at::POSITION_DEMAND, self.motion.position());
         dictionary.set_real(at::VELOCITY_DEMAND, self.motion.velocity());
         dictionary.set_real(at::TORQUE_DEMAND, per_mille);
@@ -222,17 +237,17 @@ impl ErobJoint {
 
     /// Writes the measured values to the dictionary with the effect of the defects, and lets the PDOs take their
     /// objects.
-    fn report<T>(&mut self, take: impl FnOnce(&mut ErobProcessData, &ErobDictionary) -> T) -> T {
+    fn report<T>(&mut self, take: impl FnOnce(&mut PdoEngine, &SimulatedDictionary) -> T) -> T {
         self.measure();
-        let truth = self.defects.falsify(&mut self.dictionary);
-        let taken = take(&mut self.process_data, &self.dictionary);
+        let truth = self.defects.falsify(SHOWN, &mut self.dictionary);
+        let taken = take(&mut self.pdos, &self.dictionary);
         truth.restore(&mut self.dictionary);
         taken
     }
 
     fn statusword(&self) -> u16 {
         // Bits 10 to 13 are those of the last step; the state may have changed since.
-        let bits = self.dictionary.get(at::STATUSWORD) as u16 & 0x3C00;
+        let bits = self.dictionary.number(at::STATUSWORD) as u16 & 0x3C00;
         self.device.statusword(bits)
     }
 
@@ -242,11 +257,10 @@ impl ErobJoint {
         if !self.parameters.has_battery {
             self.lose_turns();
         }
-        let Self { parameters, dictionary, .. } = self;
-        self.network = ErobNetwork::starting(parameters.node, now_ns + parameters.power_up_ns);
+        self.network.restart(now_ns + self.parameters.power_up_ns);
         self.sdo.reset();
         self.errors.reset();
-        self.process_data.compile(dictionary);
+        self.pdos.compile(&self.dictionary);
         self.device = self.device.restarted();
         self.servo.reset();
         self.torque = 0.0;
@@ -268,7 +282,7 @@ impl ErobJoint {
             now_ns + IDLE_NS,
             self.network.due_ns(),
             self.sdo.due_ns().unwrap_or(NEVER),
-            self.process_data.due_ns(),
+            self.pdos.due_ns(),
             self.save_ns,
             if has_message { now_ns } else { NEVER },
         ];
@@ -293,10 +307,11 @@ impl Drive for ErobJoint {
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
             self.has_battery_fault |= fault == DriveFault::MultiTurnBattery;
-            self.fail(ErobError::Fault(fault));
+            self.fail(DeviceError::Fault(fault));
         }
-        if self.network.check_master(now_ns, &self.dictionary) {
-            self.fail(ErobError::MasterLost);
+        if self.network.has_lost_master(now_ns) {
+            self.network.follow_error_behaviour(&self.dictionary);
+            self.fail(DeviceError::MasterLost);
             self.stop_services();
         }
         if now_ns >= self.save_ns {
@@ -320,8 +335,8 @@ impl Drive for ErobJoint {
             position_counts: self.counts(),
             state: self.device.state(),
             statusword: self.statusword(),
-            error_code: self.dictionary.get(at::ERROR_CODE) as u16,
-            operation_mode: self.dictionary.signed(at::OPERATION_MODE_DISPLAY) as i8,
+            error_code: self.dictionary.number(at::ERROR_CODE) as u16,
+            operation_mode: self.dictionary.number(at::OPERATION_MODE_DISPLAY) as i8,
             nmt: self.network.state(),
             is_braked: self.is_braked(),
         }
@@ -355,14 +370,15 @@ impl Drive for ErobJoint {
     ) -> Result<(), Unsupported> {
         self.run_loops(now_ns);
         self.defects.set(defect, is_present);
+        self.joint_defects.set(defect, is_present);
         match defect {
             Defect::EncoderJump { distance } if is_present => {
                 let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;
                 self.counts_offset = self.counts_offset.wrapping_add(counts);
             }
-            Defect::Alarm { code } if is_present => self.fail(ErobError::Alarm(code)),
+            Defect::Alarm { code } if is_present => self.fail(DeviceError::Alarm(code)),
             Defect::Emergency { code } if is_present => {
-                self.errors.raise(ErobError::Alarm(code), &mut self.dictionary);
+                self.errors.raise(DeviceError::Alarm(code), &mut self.dictionary);
             }
             Defect::TorqueOff if is_present => {
                 self.device.lose_torque();

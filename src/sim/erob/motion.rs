@@ -4,7 +4,8 @@ mod status;
 
 use takt_rt::{OperationMode, controlword};
 
-use super::dictionary::{ErobDictionary, at};
+use super::objects::at;
+use crate::sim::object_dictionary::SimulatedDictionary;
 
 /// The set-point of the loops for one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,7 +109,12 @@ impl ErobMotion {
 
     /// Starts at the actual position, when torque comes on. The CSP target is the value of object 607A, so an old one
     /// makes the axis jump.
-    pub fn engage(&mut self, mode: Option<OperationMode>, actual: ErobActual, dictionary: &ErobDictionary) {
+    pub fn engage(
+        &mut self,
+        mode: Option<OperationMode>,
+        actual: ErobActual,
+        dictionary: &SimulatedDictionary,
+    ) {
         *self = Self {
             mode,
             position: actual.position,
@@ -130,15 +136,14 @@ impl ErobMotion {
     /// Latches the target of CSP, or of interpolated position mode while controlword bit 4 is set: at SYNC, or after a
     /// write in between. It is reached at the end of the interpolation period, at the next SYNC. The same target again
     /// changes nothing while the interpolation runs.
-    pub fn latch(&mut self, dictionary: &ErobDictionary) {
+    pub fn latch(&mut self, dictionary: &SimulatedDictionary) {
         let is_interpolating = self.mode == Some(OperationMode::InterpolatedPosition)
-            && dictionary.get(at::CONTROLWORD) as u16 & controlword::BIT_4 != 0;
+            && dictionary.number(at::CONTROLWORD) as u16 & controlword::BIT_4 != 0;
         if self.mode != Some(OperationMode::CyclicSynchronousPosition) && !is_interpolating {
             return;
         }
         let period_s = interpolation_period_s(dictionary);
-        let wanted =
-            dictionary.signed_real(at::TARGET_POSITION) + dictionary.signed_real(at::POSITION_OFFSET);
+        let wanted = dictionary.real(at::TARGET_POSITION) + dictionary.real(at::POSITION_OFFSET);
         let target = self.within_software_limits(wanted, dictionary);
         if target == self.interpolation.target && self.interpolation.left_s > 0.0 {
             return;
@@ -162,13 +167,13 @@ impl ErobMotion {
     }
 
     /// Evaluates the controlword bits of profile position mode in an enabled drive.
-    pub fn evaluate(&mut self, word: u16, previous: u16, dictionary: &ErobDictionary) {
+    pub fn evaluate(&mut self, word: u16, previous: u16, dictionary: &SimulatedDictionary) {
         if !self.is_profile_position() {
             return;
         }
         if word & !previous & controlword::BIT_4 != 0 && !self.set_points.is_acknowledged {
             let base = if word & controlword::RELATIVE != 0 { self.set_points.last } else { 0.0 };
-            let wanted = base + dictionary.signed_real(at::TARGET_POSITION);
+            let wanted = base + dictionary.real(at::TARGET_POSITION);
             let target = self.within_software_limits(wanted, dictionary);
             if word & controlword::BIT_5 != 0 || self.set_points.active.is_none() {
                 self.set_points.active = Some(target);
@@ -191,11 +196,11 @@ impl ErobMotion {
         &mut self,
         word: u16,
         actual: ErobActual,
-        dictionary: &ErobDictionary,
+        dictionary: &SimulatedDictionary,
         duration_s: f64,
     ) -> ErobDemand {
         let is_halted = word & controlword::HALT != 0;
-        let torque = dictionary.signed_real(at::TORQUE_OFFSET);
+        let torque = dictionary.real(at::TORQUE_OFFSET);
         let position = self.position;
         match self.mode {
             Some(OperationMode::InterpolatedPosition) if self.is_streamed && !is_halted => {
@@ -211,14 +216,14 @@ impl ErobMotion {
                 ErobDemand::Position { position, velocity: self.velocity, torque: 0.0 }
             }
             Some(OperationMode::ProfileVelocity) => {
-                let wanted = if is_halted { 0.0 } else { dictionary.signed_real(at::TARGET_VELOCITY) };
+                let wanted = if is_halted { 0.0 } else { dictionary.real(at::TARGET_VELOCITY) };
                 self.position = actual.position;
                 let wanted = self.velocity_within_limits(wanted, dictionary);
                 self.ramp_velocity(wanted, dictionary, duration_s);
                 ErobDemand::Velocity { velocity: self.velocity, torque: 0.0 }
             }
             Some(OperationMode::ProfileTorque) => {
-                let wanted = if is_halted { 0.0 } else { dictionary.signed_real(at::TARGET_TORQUE) };
+                let wanted = if is_halted { 0.0 } else { dictionary.real(at::TARGET_TORQUE) };
                 let slope = dictionary.real(at::TORQUE_SLOPE);
                 // A slope of 0 means no slope: the torque steps.
                 let most = if slope > 0.0 { slope * duration_s } else { f64::INFINITY };
@@ -227,18 +232,17 @@ impl ErobMotion {
             }
             Some(OperationMode::CyclicSynchronousPosition) => {
                 self.step_interpolation(dictionary, duration_s);
-                let velocity = self.forward + dictionary.signed_real(at::VELOCITY_OFFSET);
+                let velocity = self.forward + dictionary.real(at::VELOCITY_OFFSET);
                 ErobDemand::Position { position, velocity, torque }
             }
             Some(OperationMode::CyclicSynchronousVelocity) => {
-                let wanted =
-                    dictionary.signed_real(at::TARGET_VELOCITY) + dictionary.signed_real(at::VELOCITY_OFFSET);
+                let wanted = dictionary.real(at::TARGET_VELOCITY) + dictionary.real(at::VELOCITY_OFFSET);
                 self.position = actual.position;
                 self.velocity = self.velocity_within_limits(wanted, dictionary);
                 ErobDemand::Velocity { velocity: self.velocity, torque }
             }
             Some(OperationMode::CyclicSynchronousTorque) => {
-                self.torque = dictionary.signed_real(at::TARGET_TORQUE) + torque;
+                self.torque = dictionary.real(at::TARGET_TORQUE) + torque;
                 ErobDemand::Torque(self.torque)
             }
             _ => ErobDemand::Position { position, velocity: 0.0, torque: 0.0 },
@@ -284,28 +288,28 @@ impl ErobMotion {
         self.mode.is_some_and(|mode| mode as i8 >= OperationMode::CyclicSynchronousPosition as i8)
     }
 
-    fn velocity_limit(&self, dictionary: &ErobDictionary) -> f64 {
+    fn velocity_limit(&self, dictionary: &SimulatedDictionary) -> f64 {
         dictionary.real(at::MAX_PROFILE_VELOCITY).min(self.velocity_limit)
     }
 
-    fn within_software_limits(&mut self, position: f64, dictionary: &ErobDictionary) -> f64 {
-        let lowest = dictionary.signed_real(at::POSITION_MIN);
-        let highest = dictionary.signed_real(at::POSITION_MAX);
+    fn within_software_limits(&mut self, position: f64, dictionary: &SimulatedDictionary) -> f64 {
+        let lowest = dictionary.real(at::POSITION_MIN);
+        let highest = dictionary.real(at::POSITION_MAX);
         let limited = position.min(highest).max(lowest);
         self.is_limited = limited != position;
         limited
     }
 
     /// Limits a velocity so that it does not go beyond the software limits.
-    fn velocity_within_limits(&mut self, velocity: f64, dictionary: &ErobDictionary) -> f64 {
+    fn velocity_within_limits(&mut self, velocity: f64, dictionary: &SimulatedDictionary) -> f64 {
         let limit = self.velocity_limit(dictionary);
-        let is_beyond = velocity > 0.0 && self.position >= dictionary.signed_real(at::POSITION_MAX)
-            || velocity < 0.0 && self.position <= dictionary.signed_real(at::POSITION_MIN);
+        let is_beyond = velocity > 0.0 && self.position >= dictionary.real(at::POSITION_MAX)
+            || velocity < 0.0 && self.position <= dictionary.real(at::POSITION_MIN);
         self.is_limited = is_beyond || velocity.abs() > limit;
         if is_beyond { 0.0 } else { velocity.clamp(-limit, limit) }
     }
 
-    fn step_interpolation(&mut self, dictionary: &ErobDictionary, duration_s: f64) {
+    fn step_interpolation(&mut self, dictionary: &SimulatedDictionary, duration_s: f64) {
         let Interpolation { target, left_s, velocity, forward_s } = self.interpolation;
         let most = self.velocity_limit(dictionary) * duration_s;
         let distance = target - self.position;
@@ -321,7 +325,7 @@ impl ErobMotion {
     }
 
     /// One step of a trapezoidal profile to the active set-point.
-    fn step_profile(&mut self, dictionary: &ErobDictionary, duration_s: f64) {
+    fn step_profile(&mut self, dictionary: &SimulatedDictionary, duration_s: f64) {
         let Some(target) = self.set_points.active else {
             self.ramp_velocity(0.0, dictionary, duration_s);
             return;
@@ -341,7 +345,7 @@ impl ErobMotion {
     }
 
     /// Ramps the demanded velocity towards `wanted` by the profile, and moves.
-    fn ramp_velocity(&mut self, wanted: f64, dictionary: &ErobDictionary, duration_s: f64) {
+    fn ramp_velocity(&mut self, wanted: f64, dictionary: &SimulatedDictionary, duration_s: f64) {
         let is_faster = wanted * self.velocity >= 0.0 && wanted.abs() > self.velocity.abs();
         let rate = if is_faster { acceleration(dictionary) } else { deceleration(dictionary) };
         let most = rate * duration_s;
@@ -350,22 +354,22 @@ impl ErobMotion {
     }
 }
 
-fn acceleration(dictionary: &ErobDictionary) -> f64 {
+fn acceleration(dictionary: &SimulatedDictionary) -> f64 {
     dictionary.real(at::PROFILE_ACCELERATION).min(dictionary.real(at::MAX_ACCELERATION))
 }
 
 /// At least 1 count/s², because a profile without deceleration would never end.
-fn deceleration(dictionary: &ErobDictionary) -> f64 {
+fn deceleration(dictionary: &SimulatedDictionary) -> f64 {
     dictionary.real(at::PROFILE_DECELERATION).min(dictionary.real(at::MAX_DECELERATION)).max(1.0)
 }
 
 /// The period over which CSP interpolates: the SYNC period 1006, otherwise 60C2, otherwise 1 ms.
-fn interpolation_period_s(dictionary: &ErobDictionary) -> f64 {
+fn interpolation_period_s(dictionary: &SimulatedDictionary) -> f64 {
     let cycle_us = dictionary.real(at::CYCLE_PERIOD);
     if cycle_us > 0.0 {
         return cycle_us * 1e-6;
     }
-    let exponent = dictionary.signed(at::INTERPOLATION_EXPONENT).clamp(-6, 0);
+    let exponent = dictionary.number(at::INTERPOLATION_EXPONENT).clamp(-6, 0) as i32;
     let period_s = dictionary.real(at::INTERPOLATION_PERIOD) * 10f64.powi(exponent);
     if period_s > 0.0 { period_s } else { 1e-3 }
 }

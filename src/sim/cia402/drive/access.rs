@@ -16,8 +16,10 @@ const LOAD_SIGNATURE: i64 = u32::from_le_bytes(*b"load") as i64;
 
 /// Writes an object from an RPDO; a value out of range is ignored.
 pub(super) fn write_field(dictionary: &mut SimulatedDictionary, place: usize, bits: u64) {
-    if dictionary.entry(place).is_writable && dictionary.accepts(place, bits) {
-        dictionary.set(place, bits.cast_signed());
+    if dictionary.entry(place).is_writable
+        && let Some(number) = dictionary.accepted(place, bits)
+    {
+        dictionary.set(place, number);
     }
 }
 

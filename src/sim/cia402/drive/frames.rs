@@ -4,10 +4,10 @@ use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::Cia402Drive;
 use super::access::{Objects, write_field};
-use crate::sim::cia402::errors::Cia402Error;
-use crate::sim::cia402::network::NmtReset;
 use crate::sim::drive::NodeState;
+use crate::sim::errors::DeviceError;
 use crate::sim::mailbox::Mailbox;
+use crate::sim::network::NmtReset;
 use crate::sim::pdo_engine::RpdoReception;
 use crate::sim::sdo_server::SdoServer;
 
@@ -23,7 +23,9 @@ impl Cia402Drive {
         let id = frame.id().value();
         match id {
             0x000 => self.take_nmt(now_ns, frame.payload()),
-            0x701..=0x77F => self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary),
+            0x701..=0x77F => {
+                self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary);
+            }
             _ if id == 0x600 + node => {
                 if self.network.has_services()
                     && !self.defects.is_sdo_silent
@@ -37,7 +39,7 @@ impl Cia402Drive {
                 if frame.payload().len() == self.network.sync_length(&self.dictionary) {
                     self.take_sync(now_ns, frame.payload().first().copied());
                 } else {
-                    self.errors.raise(Cia402Error::SyncLength, &mut self.dictionary);
+                    self.errors.raise(DeviceError::SyncLength, &mut self.dictionary);
                 }
             }
             _ => self.take_pdo(now_ns, frame),
@@ -105,7 +107,7 @@ impl Cia402Drive {
                 // A series of short PDOs leads to one message.
                 if !self.has_pdo_error {
                     self.has_pdo_error = true;
-                    self.errors.raise(Cia402Error::PdoLength, &mut self.dictionary);
+                    self.errors.raise(DeviceError::PdoLength, &mut self.dictionary);
                 }
             }
             RpdoReception::Latched => self.clear_pdo_error(),

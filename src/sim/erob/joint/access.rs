@@ -3,37 +3,41 @@
 use takt_rt::{DriveState, Nanoseconds};
 
 use super::ErobJoint;
-use crate::sim::erob::dictionary::{ErobDictionary, at};
-use crate::sim::erob::objects::OBJECTS;
-use crate::sim::erob::{process_data, sdo};
+use crate::canopen::object::ObjectAddress;
+use crate::sim::erob::objects::at;
+use crate::sim::object_dictionary::SimulatedDictionary;
+use crate::sim::pdo_engine::{check_parameter, is_parameter};
 use crate::sim::sdo_reply::AbortCode;
+use crate::sim::sdo_server::ObjectAccess;
 
 /// The signature for object 1010:1.
-const SAVE_SIGNATURE: u32 = u32::from_le_bytes(*b"save");
+const SAVE_SIGNATURE: i64 = u32::from_le_bytes(*b"save") as i64;
 /// Time from "save" until it takes effect: the manual requires a wait of 3 s before the supply is cut.
 const SAVE_NS: Nanoseconds = 3_000_000_000;
 
 /// Writes an entry from an RPDO. An enabled drive keeps its mode; a value out of range is ignored.
-pub(super) fn write_field(dictionary: &mut ErobDictionary, at: usize, value: u32) {
-    let is_enabled = DriveState::decode(dictionary.get(at::STATUSWORD) as u16).has_torque();
-    if at == at::OPERATION_MODE && is_enabled {
+pub(super) fn write_field(dictionary: &mut SimulatedDictionary, place: usize, bits: u64) {
+    let is_enabled = DriveState::decode(dictionary.number(at::STATUSWORD) as u16).has_torque();
+    if place == at::OPERATION_MODE && is_enabled {
         return;
     }
-    if check_range(at, value).is_ok() {
-        dictionary.set(at, value);
+    if let Some(number) = dictionary.accepted(place, bits)
+        && check_range(place, number).is_ok()
+    {
+        dictionary.set(place, number);
     }
 }
 
-/// Checks the range of an entry.
-fn check_range(at: usize, value: u32) -> Result<(), AbortCode> {
-    let is_in_range = match at {
-        at::ERROR_HISTORY => value == 0,
+/// Checks the range of an entry. The module has one abort code for every wrong value.
+fn check_range(place: usize, number: i64) -> Result<(), AbortCode> {
+    let is_in_range = match place {
+        at::ERROR_HISTORY => number == 0,
         // Bit 29: it has no 29-bit identifiers.
-        at::SYNC_ID => value & 0x2000_0000 == 0 && value & 0x7FF != 0,
-        at::CONSUMER_HEARTBEAT => value >> 16 <= 127,
-        at::ERROR_BEHAVIOUR => value <= 2,
-        at::OPERATION_MODE => value <= 10,
-        at::TORQUE_OFFSET => (-3000..=3000).contains(&i32::from(value as u16 as i16)),
+        at::SYNC_ID => number & 0x2000_0000 == 0 && number & 0x7FF != 0,
+        at::CONSUMER_HEARTBEAT => number >> 16 <= 127,
+        at::ERROR_BEHAVIOUR => number <= 2,
+        at::OPERATION_MODE => (0..=10).contains(&number),
+        at::TORQUE_OFFSET => (-3000..=3000).contains(&number),
         _ => true,
     };
     if is_in_range { Ok(()) } else { Err(AbortCode::Value) }
@@ -45,65 +49,72 @@ pub(super) struct Objects<'a> {
     pub(super) now_ns: Nanoseconds,
 }
 
-impl sdo::ErobObjectAccess for Objects<'_> {
-    fn read(&mut self, index: u16, subindex: u8) -> Result<([u8; 4], usize), AbortCode> {
-        let at = ErobDictionary::for_reading(index, subindex)?;
-        let history = self.module.dictionary.get(at::ERROR_HISTORY);
-        if OBJECTS[at].index == 0x1003 && u32::from(subindex) > history {
+impl ObjectAccess for Objects<'_> {
+    fn read(&mut self, address: ObjectAddress, value: &mut Vec<u8>) -> Result<(), AbortCode> {
+        let module = &mut self.module;
+        let place = module.dictionary.find(address)?;
+        if !module.dictionary.entry(place).is_readable {
+            return Err(AbortCode::WriteOnly);
+        }
+        let history = module.dictionary.number(at::ERROR_HISTORY);
+        if address.index == 0x1003 && i64::from(address.subindex) > history {
             return Err(AbortCode::NoData);
         }
-        self.module.measure();
-        Ok((self.module.dictionary.get(at).to_le_bytes(), OBJECTS[at].data_type.bytes()))
+        module.measure();
+        module.dictionary.append(place, value);
+        Ok(())
     }
 
-    fn check_write(&self, index: u16, subindex: u8) -> Result<usize, AbortCode> {
-        let at = ErobDictionary::for_writing(index, subindex)?;
-        if at == at::OPERATION_MODE && self.module.device.state().has_torque() {
+    fn check_write(&self, address: ObjectAddress) -> Result<Option<usize>, AbortCode> {
+        let place = self.module.dictionary.find(address)?;
+        let entry = self.module.dictionary.entry(place);
+        if !entry.is_writable {
+            return Err(AbortCode::ReadOnly);
+        }
+        if place == at::OPERATION_MODE && self.module.device.state().has_torque() {
             return Err(AbortCode::DeviceState);
         }
-        Ok(OBJECTS[at].data_type.bytes())
+        Ok(Some(entry.length))
     }
 
-    fn write(&mut self, index: u16, subindex: u8, value: [u8; 4]) -> Result<(), AbortCode> {
-        let at = ErobDictionary::for_writing(index, subindex)?;
-        let size = OBJECTS[at].data_type.bytes();
-        let value = u32::from_le_bytes(value) & (u32::MAX >> (32 - 8 * size));
-        check_range(at, value)?;
+    fn write(&mut self, address: ObjectAddress, value: &[u8]) -> Result<(), AbortCode> {
         let Self { module, now_ns } = self;
-        match index {
-            0x1010 => {
-                if value != SAVE_SIGNATURE {
+        let place = module.dictionary.find(address)?;
+        let number = module.dictionary.decode(place, value)?;
+        check_range(place, number)?;
+        match (address.index, address.subindex) {
+            (0x1010, _) => {
+                if number != SAVE_SIGNATURE {
                     return Err(AbortCode::CannotStore);
                 }
                 module.save_ns = *now_ns + SAVE_NS;
                 return Ok(());
             }
-            0x1400..=0x1403 | 0x1600..=0x1603 | 0x1800..=0x1803 | 0x1A00..=0x1A03 => {
-                process_data::check_parameter(&module.dictionary, at, value)?;
-            }
-            _ => {}
+            // It has no PDOs on remote request only.
+            (0x1800..=0x1803, 2) if matches!(number, 252 | 253) => return Err(AbortCode::Value),
+            _ => check_parameter(&module.dictionary, address, number)?,
         }
-        module.dictionary.set(at, value);
-        module.written(at, *now_ns);
+        module.dictionary.set(place, number);
+        module.written(address, *now_ns);
         Ok(())
     }
 }
 
 impl ErobJoint {
     /// Applies the effects of a new value.
-    fn written(&mut self, at: usize, now_ns: Nanoseconds) {
-        match at {
-            at::CONTROLWORD => self.evaluate(now_ns),
-            at::TARGET_POSITION => self.motion.latch(&self.dictionary),
-            at::OPERATION_MODE => self.follow_mode(),
-            at::PRODUCER_HEARTBEAT => self.network.schedule_heartbeat(now_ns, &self.dictionary),
-            at::SYNC_ID | at::CYCLE_PERIOD => self.network.schedule_sync(now_ns, &self.dictionary),
-            at::CONSUMER_HEARTBEAT => self.network.stop_master_monitor(),
-            at::BATTERY_RESET if self.dictionary.get(at) == 1 => {
+    fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+        match address.index {
+            0x1005 | 0x1006 => self.network.schedule_sync(now_ns, &self.dictionary),
+            0x1016 => self.network.stop_master_monitor(),
+            0x1017 => self.network.schedule_heartbeat(now_ns, &self.dictionary),
+            0x2242 if self.dictionary.number(at::BATTERY_RESET) == 1 => {
                 self.has_battery_fault = false;
                 self.lose_turns();
             }
-            _ if matches!(OBJECTS[at].index, 0x1400..=0x1A03) => self.process_data.compile(&self.dictionary),
+            0x6040 => self.evaluate(now_ns),
+            0x6060 => self.follow_mode(),
+            0x607A => self.motion.latch(&self.dictionary),
+            index if is_parameter(index) => self.pdos.compile(&self.dictionary),
             _ => {}
         }
     }

@@ -5,11 +5,12 @@ use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 use super::ErobJoint;
 use super::access::{Objects, write_field};
 use crate::sim::drive::{DriveFault, NodeState};
-use crate::sim::erob::dictionary::at;
-use crate::sim::erob::errors::ErobError;
-use crate::sim::erob::network::ErobReset;
-use crate::sim::erob::process_data::RpdoReception;
+use crate::sim::erob::objects::at;
+use crate::sim::errors::DeviceError;
 use crate::sim::mailbox::Mailbox;
+use crate::sim::network::NmtReset;
+use crate::sim::pdo_engine::RpdoReception;
+use crate::sim::sdo_server::SdoServer;
 
 impl ErobJoint {
     pub(super) fn receive_frame(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
@@ -23,7 +24,9 @@ impl ErobJoint {
         let id = frame.id().value();
         match id {
             0x000 => self.take_nmt(now_ns, frame.payload()),
-            0x701..=0x77F => self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary),
+            0x701..=0x77F => {
+                self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary);
+            }
             _ if id == 0x600 + node => {
                 if self.network.has_services()
                     && !self.defects.is_sdo_silent
@@ -33,7 +36,7 @@ impl ErobJoint {
                 }
             }
             _ if self.network.state() != NodeState::Operational => {}
-            _ if id == self.dictionary.get(at::SYNC_ID) & 0x7FF => self.take_sync(now_ns),
+            _ if id == self.network.sync_id(&self.dictionary) => self.take_sync(now_ns),
             _ => self.take_pdo(now_ns, frame),
         }
     }
@@ -44,7 +47,7 @@ impl ErobJoint {
                 mailbox.push(Frame::of(frame.id(), [byte]));
             }
         } else if self.network.state() == NodeState::Operational {
-            let answer = self.report(|data, dictionary| data.requested(frame.id(), dictionary));
+            let answer = self.report(|pdos, dictionary| pdos.requested(frame.id(), dictionary));
             if let Some(answer) = answer {
                 mailbox.put(self.defects.sent(answer));
             }
@@ -57,11 +60,11 @@ impl ErobJoint {
             return;
         }
         match self.network.command(now_ns, command) {
-            Some(ErobReset::Node) => self.start(now_ns),
-            Some(ErobReset::Communication) => {
+            Some(NmtReset::Node) => self.start(now_ns),
+            Some(NmtReset::Communication) => {
                 // The error register and history are not communication parameters, so they stay.
                 self.dictionary.restore(0x1005..=0x1FFF);
-                self.process_data.compile(&self.dictionary);
+                self.pdos.compile(&self.dictionary);
             }
             None => {}
         }
@@ -71,7 +74,7 @@ impl ErobJoint {
     /// Stops the services that the NMT state does not allow.
     pub(super) fn stop_services(&mut self) {
         if self.network.state() != NodeState::Operational {
-            self.process_data.stop();
+            self.pdos.stop();
         }
         if !self.network.has_services() {
             self.sdo.reset();
@@ -80,23 +83,23 @@ impl ErobJoint {
 
     fn take_sync(&mut self, now_ns: Nanoseconds) {
         self.lock_loops(now_ns);
-        self.process_data.apply_latched(&mut self.dictionary, write_field);
+        self.pdos.apply_latched(&mut self.dictionary, &mut write_field);
         self.follow_mode();
         self.evaluate(now_ns);
         self.motion.latch(&self.dictionary);
         let delay_ns = self.parameters.feedback_delay_ns;
-        self.report(|data, dictionary| data.sample(now_ns, delay_ns, dictionary));
+        self.report(|pdos, dictionary| pdos.sample(now_ns, delay_ns, None, dictionary));
     }
 
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
-        let target = self.dictionary.get(at::TARGET_POSITION);
-        match self.process_data.receive(frame, &mut self.dictionary, write_field) {
+        let target = self.dictionary.number(at::TARGET_POSITION);
+        match self.pdos.receive(now_ns, frame, &mut self.dictionary, &mut write_field) {
             RpdoReception::NotMine => {}
             RpdoReception::TooShort => {
                 // A series of short PDOs leads to one message.
                 if !self.has_pdo_error {
                     self.has_pdo_error = true;
-                    self.errors.raise(ErobError::PdoLength, &mut self.dictionary);
+                    self.errors.raise(DeviceError::PdoLength, &mut self.dictionary);
                 }
             }
             RpdoReception::Latched => self.clear_pdo_error(),
@@ -104,7 +107,7 @@ impl ErobJoint {
                 self.clear_pdo_error();
                 self.follow_mode();
                 self.evaluate(now_ns);
-                if self.dictionary.get(at::TARGET_POSITION) != target {
+                if self.dictionary.number(at::TARGET_POSITION) != target {
                     self.motion.latch(&self.dictionary);
                 }
             }
@@ -119,8 +122,8 @@ impl ErobJoint {
     }
 
     fn take_request(&mut self, now_ns: Nanoseconds, request: [u8; 8]) {
-        // The server is copied for the call, because it accesses the rest of the drive.
-        let mut server = self.sdo.clone();
+        // The server is taken out for the call, because it accesses the rest of the drive.
+        let mut server = std::mem::replace(&mut self.sdo, SdoServer::taken());
         server.request(now_ns, request, &mut Objects { module: self, now_ns });
         self.sdo = server;
     }
@@ -131,15 +134,15 @@ impl ErobJoint {
         if self.network.boot_if_due(now_ns, &self.dictionary) {
             self.device.started();
             if self.has_battery_fault {
-                self.fail(ErobError::Fault(DriveFault::MultiTurnBattery));
+                self.fail(DeviceError::Fault(DriveFault::MultiTurnBattery));
             }
             mailbox.push(Frame::of(Id::canopen(0x700, node), [0]));
         }
         if let Some(byte) = self.network.heartbeat(now_ns, &self.dictionary) {
             mailbox.push(Frame::of(Id::canopen(0x700, node), [byte]));
         }
-        if self.network.produces_sync(now_ns, &self.dictionary) {
-            if let Ok(id) = Id::base(self.dictionary.get(at::SYNC_ID) & 0x7FF) {
+        if self.network.produced_sync(now_ns, &self.dictionary).is_some() {
+            if let Ok(id) = Id::base(self.network.sync_id(&self.dictionary)) {
                 mailbox.push(Frame::of(id, []));
             }
             // The producer acts on its own SYNC.
@@ -148,7 +151,7 @@ impl ErobJoint {
             }
         }
         if self.network.has_services() {
-            if let Some(answer) = self.sdo.answer(now_ns) {
+            while let Some(answer) = self.sdo.answer(now_ns) {
                 mailbox.push(Frame::of(Id::canopen(0x580, node), answer));
             }
             while let Some(message) = self.errors.next() {
@@ -156,8 +159,8 @@ impl ErobJoint {
             }
         }
         if self.network.state() == NodeState::Operational {
-            self.report(|data, dictionary| data.sample_events(now_ns, dictionary));
-            while let Some(frame) = self.process_data.next(now_ns) {
+            self.report(|pdos, dictionary| pdos.sample_events(now_ns, dictionary));
+            while let Some(frame) = self.pdos.next(now_ns) {
                 mailbox.put(self.defects.sent(frame));
             }
         }

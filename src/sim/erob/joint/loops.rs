@@ -3,9 +3,9 @@
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::ErobJoint;
-use crate::sim::erob::dictionary::at;
-use crate::sim::erob::errors::ErobError;
 use crate::sim::erob::motion::{ErobActual, ErobDemand};
+use crate::sim::erob::objects::at;
+use crate::sim::errors::DeviceError;
 
 /// The control loops and the plant run at 8 kHz.
 const STEP_NS: Nanoseconds = 125_000;
@@ -37,7 +37,7 @@ impl ErobJoint {
         } else {
             self.torque = 0.0;
         }
-        if self.defects.is_joint_blocked {
+        if self.joint_defects.is_blocked {
             self.joint.halt();
         } else {
             let is_braked = self.is_braked();
@@ -86,11 +86,11 @@ impl ErobJoint {
     }
 
     fn check_following_error(&mut self, actual: ErobActual) {
-        let window = self.dictionary.signed_real(at::FOLLOWING_ERROR_WINDOW);
+        let window = self.dictionary.real(at::FOLLOWING_ERROR_WINDOW);
         let error = self.motion.position() - actual.position;
         let is_watched = window >= 0.0 && self.motion.follows_position() && self.device.stop().is_none();
         if is_watched && error.abs() > window {
-            self.fail(ErobError::PositionLost);
+            self.fail(DeviceError::FollowingError);
         }
     }
 }
