@@ -48,36 +48,57 @@ pub struct ObjectEntry {
     default: i64,
     saved: i64,
     bytes: Vec<u8>,
+    /// Bits of 64 that its type does not use, and the range of its type.
+    unused_bits: u32,
+    type_range: (i64, i64),
 }
 
 impl ObjectEntry {
+    /// An entry of this type that can be read, with the value 0.
+    fn new(address: ObjectAddress, data_type: DataTypeCode) -> Self {
+        let (kind, bits) = match data_type.kind() {
+            ValueKind::Unsigned(bits) | ValueKind::Real(bits) => (ObjectKind::Unsigned, bits),
+            ValueKind::Signed(bits) => (ObjectKind::Signed, bits),
+            ValueKind::Text | ValueKind::Bytes | ValueKind::Other => (ObjectKind::Bytes, 0),
+        };
+        let length = usize::from(bits).div_ceil(8);
+        let unused_bits = 64 - 8 * length.clamp(1, 8) as u32;
+        let type_range = match kind {
+            ObjectKind::Signed => (i64::MIN >> unused_bits, i64::MAX >> unused_bits),
+            _ => (0, i64::try_from(u64::MAX >> unused_bits).unwrap_or(i64::MAX)),
+        };
+        Self {
+            address,
+            kind,
+            length,
+            is_readable: true,
+            is_writable: false,
+            maps_to_rpdo: false,
+            maps_to_tpdo: false,
+            is_saved: false,
+            low: i128::MIN,
+            high: i128::MAX,
+            default: 0,
+            saved: 0,
+            bytes: vec![],
+            unused_bits,
+            type_range,
+        }
+    }
+
     /// The number in these bits, of which those beyond its length are cut off.
     fn fit(&self, bits: i64) -> i64 {
-        let unused = 64 - 8 * self.length.clamp(1, 8) as u32;
+        let aligned = bits << self.unused_bits;
         match self.kind {
-            ObjectKind::Signed => bits << unused >> unused,
-            _ => (bits.cast_unsigned() << unused >> unused).cast_signed(),
+            ObjectKind::Signed => aligned >> self.unused_bits,
+            _ => (aligned.cast_unsigned() >> self.unused_bits).cast_signed(),
         }
     }
 
     /// The nearest whole number that its type has.
     fn nearest(&self, value: f64) -> i64 {
-        let value = value.round_ties_even();
-        match (self.kind, self.length) {
-            (ObjectKind::Signed, 1) => (value as i8).into(),
-            (ObjectKind::Signed, 2) => (value as i16).into(),
-            (ObjectKind::Signed, 4) => (value as i32).into(),
-            (ObjectKind::Signed, 8) => value as i64,
-            (ObjectKind::Signed, length) => {
-                let highest = (1 << (8 * length - 1)) - 1;
-                (value as i64).clamp(-highest - 1, highest)
-            }
-            (_, 1) => (value as u8).into(),
-            (_, 2) => (value as u16).into(),
-            (_, 4) => (value as u32).into(),
-            (_, 8) => (value as u64).cast_signed(),
-            (_, length) => (value as i64).clamp(0, (1 << (8 * length)) - 1),
-        }
+        let (lowest, highest) = self.type_range;
+        (value.round_ties_even() as i64).clamp(lowest, highest)
     }
 
     fn check_range(&self, number: i64) -> Result<(), AbortCode> {
@@ -320,24 +341,12 @@ impl SimulatedDictionary {
     }
 }
 
-/// How the values of a type are stored, and their length in bytes.
-fn storage_of(data_type: DataTypeCode) -> (ObjectKind, usize) {
-    let (kind, bits) = match data_type.kind() {
-        ValueKind::Unsigned(bits) | ValueKind::Real(bits) => (ObjectKind::Unsigned, bits),
-        ValueKind::Signed(bits) => (ObjectKind::Signed, bits),
-        ValueKind::Text | ValueKind::Bytes | ValueKind::Other => (ObjectKind::Bytes, 0),
-    };
-    (kind, usize::from(bits).div_ceil(8))
-}
-
 /// Reads a row of a table.
 fn read_row(row: &ObjectRow, node: u8) -> ObjectEntry {
-    let (kind, length) = storage_of(row.data_type);
     let is_writable = row.access.is_writable();
-    let mut entry = ObjectEntry {
-        address: ObjectAddress::new(row.index, row.subindex),
-        kind,
-        length,
+    let entry = ObjectEntry::new(ObjectAddress::new(row.index, row.subindex), row.data_type);
+    let default = entry.fit(row.default_of(node));
+    ObjectEntry {
         is_readable: row.access != AccessType::WriteOnly,
         is_writable,
         maps_to_rpdo: row.is_mappable && is_writable,
@@ -345,35 +354,30 @@ fn read_row(row: &ObjectRow, node: u8) -> ObjectEntry {
         is_saved: row.is_saved,
         low: row.lowest.into(),
         high: row.highest.into(),
-        default: 0,
-        saved: 0,
-        bytes: vec![],
-    };
-    entry.default = entry.fit(row.default_of(node));
-    entry.saved = entry.default;
-    entry
+        default,
+        saved: default,
+        ..entry
+    }
 }
 
 /// Reads an entry. `count` is the highest sub-index, which sub-index 0 shows when the sheet gives it no value.
 fn read_entry(entry: &eds::DictionaryEntry, node: u8, count: Option<u8>, is_constant: bool) -> ObjectEntry {
     let data_type = entry.data_type.unwrap_or(DataTypeCode::DOMAIN);
-    let (kind, length) = storage_of(data_type);
     let encoded = entry.value().and_then(|value| value.encode(data_type, Some(node)));
     let encoded = encoded.unwrap_or_else(|| count.map_or_else(Vec::new, |count| vec![count]));
+    let own = ObjectEntry::new(entry.address, data_type);
     let mut value = [0; 8];
     let mut bytes = Vec::new();
-    if kind == ObjectKind::Bytes {
+    if own.kind == ObjectKind::Bytes {
         bytes.reserve_exact(TEXT_CAPACITY.max(encoded.len()));
         bytes.extend_from_slice(&encoded);
     } else {
         value.iter_mut().zip(&encoded).for_each(|(to, from)| *to = *from);
     }
+    let default = own.fit(i64::from_le_bytes(value));
     let (low, high) = limits(entry, data_type, node);
     let is_writable = entry.access.is_writable() && !is_constant;
-    let mut entry = ObjectEntry {
-        address: entry.address,
-        kind,
-        length,
+    ObjectEntry {
         is_readable: entry.access != AccessType::WriteOnly,
         is_writable,
         maps_to_rpdo: entry.is_mappable && is_writable && entry.access != AccessType::ReadWriteRead,
@@ -382,13 +386,11 @@ fn read_entry(entry: &eds::DictionaryEntry, node: u8, count: Option<u8>, is_cons
         is_saved: is_writable && !is_command(entry.address.index),
         low,
         high,
-        default: 0,
-        saved: 0,
+        default,
+        saved: default,
         bytes,
-    };
-    entry.default = entry.fit(i64::from_le_bytes(value));
-    entry.saved = entry.default;
-    entry
+        ..own
+    }
 }
 
 /// The range that the sheet gives, within that of the type. A real number has none here.

@@ -109,6 +109,11 @@ impl Pdo {
         self.transmission_type <= 240
     }
 
+    /// Whether an event sends it: transmission types 254 and 255. An empty one is not sent.
+    fn is_event_driven(&self) -> bool {
+        self.id.is_some() && self.transmission_type >= 254 && self.bytes > 0
+    }
+
     fn pack(&self, dictionary: &SimulatedDictionary) -> u64 {
         self.fields.iter().fold(0, |word, field| word | field.pack(dictionary))
     }
@@ -318,12 +323,17 @@ impl PdoEngine {
         }
     }
 
+    /// Whether an event can send a TPDO.
+    pub fn has_events(&self) -> bool {
+        self.outbound.iter().any(|outbound| outbound.pdo.is_event_driven())
+    }
+
     /// Checks the event-driven TPDOs (types 254 and 255). Events: the first time, the event timer, and a change of a
     /// mapped object other than measured values.
     pub fn sample_events(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) {
         for outbound in &mut self.outbound {
             let pdo = &outbound.pdo;
-            if pdo.id.is_none() || pdo.transmission_type < 254 || pdo.bytes == 0 || outbound.due_ns != NEVER {
+            if !pdo.is_event_driven() || outbound.due_ns != NEVER {
                 continue;
             }
             let since_ns = now_ns.saturating_sub(outbound.last_ns);

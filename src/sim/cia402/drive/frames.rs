@@ -165,7 +165,9 @@ impl Cia402Drive {
             }
         }
         if self.network.state() == NodeState::Operational && now_ns >= self.pdos_ready_ns {
-            self.report(|pdos, dictionary| pdos.sample_events(now_ns, dictionary));
+            if self.pdos.has_events() {
+                self.report(|pdos, dictionary| pdos.sample_events(now_ns, dictionary));
+            }
             while let Some(frame) = self.pdos.next(now_ns) {
                 mailbox.put(self.defects.sent(frame));
             }

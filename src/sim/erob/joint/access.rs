@@ -1,6 +1,6 @@
 //! Access of the master to the object dictionary by SDO and RPDO, with the effects of each write.
 
-use takt_rt::{DriveState, Nanoseconds};
+use takt_rt::Nanoseconds;
 
 use super::ErobJoint;
 use crate::canopen::object::ObjectAddress;
@@ -16,15 +16,14 @@ const SAVE_SIGNATURE: i64 = u32::from_le_bytes(*b"save") as i64;
 const SAVE_NS: Nanoseconds = 3_000_000_000;
 
 /// Writes an entry from an RPDO. An enabled drive keeps its mode; a value out of range is ignored.
-pub(super) fn write_field(dictionary: &mut SimulatedDictionary, place: usize, bits: u64) {
-    let is_enabled = DriveState::decode(dictionary.number(at::STATUSWORD) as u16).has_torque();
-    if place == at::OPERATION_MODE && is_enabled {
-        return;
-    }
-    if let Some(number) = dictionary.accepted(place, bits)
-        && check_range(place, number).is_ok()
-    {
-        dictionary.set(place, number);
+pub(super) fn write_field(is_enabled: bool) -> impl FnMut(&mut SimulatedDictionary, usize, u64) {
+    move |dictionary, place, bits| {
+        if let Some(number) = dictionary.accepted(place, bits)
+            && check_range(place, number).is_ok()
+            && !(is_enabled && place == at::OPERATION_MODE)
+        {
+            dictionary.set(place, number);
+        }
     }
 }
 

@@ -83,7 +83,8 @@ impl ErobJoint {
 
     fn take_sync(&mut self, now_ns: Nanoseconds) {
         self.lock_loops(now_ns);
-        self.pdos.apply_latched(&mut self.dictionary, &mut write_field);
+        let is_enabled = self.device.state().has_torque();
+        self.pdos.apply_latched(&mut self.dictionary, &mut write_field(is_enabled));
         self.follow_mode();
         self.evaluate(now_ns);
         self.motion.latch(&self.dictionary);
@@ -93,7 +94,8 @@ impl ErobJoint {
 
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
         let target = self.dictionary.number(at::TARGET_POSITION);
-        match self.pdos.receive(now_ns, frame, &mut self.dictionary, &mut write_field) {
+        let is_enabled = self.device.state().has_torque();
+        match self.pdos.receive(now_ns, frame, &mut self.dictionary, &mut write_field(is_enabled)) {
             RpdoReception::NotMine => {}
             RpdoReception::TooShort => {
                 // A series of short PDOs leads to one message.
@@ -159,7 +161,9 @@ impl ErobJoint {
             }
         }
         if self.network.state() == NodeState::Operational {
-            self.report(|pdos, dictionary| pdos.sample_events(now_ns, dictionary));
+            if self.pdos.has_events() {
+                self.report(|pdos, dictionary| pdos.sample_events(now_ns, dictionary));
+            }
             while let Some(frame) = self.pdos.next(now_ns) {
                 mailbox.put(self.defects.sent(frame));
             }
