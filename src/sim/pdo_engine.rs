@@ -133,10 +133,10 @@ impl Pdo {
 pub enum RpdoReception {
     /// The identifier belongs to no RPDO of this device.
     NotMine,
-    /// The data waits for SYNC.
-    Latched,
-    /// The data has been written to the dictionary.
-    Applied,
+    /// The data of the RPDO with this number, counted from 0, waits for SYNC.
+    Latched(usize),
+    /// The data of the RPDO with this number has been written to the dictionary.
+    Applied(usize),
     /// The frame is shorter than the mapping and was ignored.
     TooShort,
 }
@@ -239,13 +239,18 @@ impl PdoEngine {
 
     /// Compiles the parameters of the dictionary. Latched and sampled data is discarded.
     pub fn compile(&mut self, dictionary: &SimulatedDictionary) {
+        self.update(dictionary);
+        self.stop();
+    }
+
+    /// Compiles the parameters of the dictionary. Latched and sampled data stays.
+    pub fn update(&mut self, dictionary: &SimulatedDictionary) {
         for inbound in &mut self.inbound {
             inbound.pdo.compile(dictionary, self.features.is_measured);
         }
         for outbound in &mut self.outbound {
             outbound.pdo.compile(dictionary, self.features.is_measured);
         }
-        self.stop();
     }
 
     /// Receives a frame in NMT operational. A synchronous RPDO waits for SYNC, the others act at once.
@@ -256,7 +261,8 @@ impl PdoEngine {
         dictionary: &mut SimulatedDictionary,
         write: WriteField<'_>,
     ) -> RpdoReception {
-        let Some(inbound) = self.inbound.iter_mut().find(|inbound| inbound.pdo.id == Some(frame.id())) else {
+        let mut inbounds = self.inbound.iter_mut().enumerate();
+        let Some((number, inbound)) = inbounds.find(|(_, inbound)| inbound.pdo.id == Some(frame.id())) else {
             return RpdoReception::NotMine;
         };
         if frame.payload().len() < inbound.pdo.bytes {
@@ -267,19 +273,35 @@ impl PdoEngine {
         }
         if inbound.pdo.is_synchronous() {
             inbound.latched = Some(frame.first_word());
-            return RpdoReception::Latched;
+            return RpdoReception::Latched(number);
         }
         inbound.unpack(frame.first_word(), dictionary, write);
-        RpdoReception::Applied
+        RpdoReception::Applied(number)
     }
 
     /// SYNC, first part: applies the latched data.
     pub fn apply_latched(&mut self, dictionary: &mut SimulatedDictionary, write: WriteField<'_>) {
-        for inbound in &mut self.inbound {
-            if let Some(word) = inbound.latched.take() {
-                inbound.unpack(word, dictionary, &mut *write);
-            }
+        for number in 0..self.inbound.len() {
+            self.apply_latched_of(number, dictionary, &mut *write);
         }
+    }
+
+    /// Applies the latched data of one RPDO. Returns whether there was any.
+    pub fn apply_latched_of(
+        &mut self,
+        number: usize,
+        dictionary: &mut SimulatedDictionary,
+        write: WriteField<'_>,
+    ) -> bool {
+        let inbound = &mut self.inbound[number];
+        let Some(word) = inbound.latched.take() else { return false };
+        inbound.unpack(word, dictionary, write);
+        true
+    }
+
+    /// Whether an RPDO carries an object.
+    pub fn carries(&self, number: usize, place: usize) -> bool {
+        self.inbound[number].pdo.fields.iter().any(|field| field.place == Some(place))
     }
 
     /// SYNC, second part: samples the synchronous TPDOs, which are sent `latency_ns` later. `counter` is that of the SYNC
@@ -343,13 +365,36 @@ impl PdoEngine {
             let events = pdo.pack_events(dictionary);
             let is_timed_out = pdo.event_ns > 0 && since_ns >= pdo.event_ns;
             if !outbound.is_sent || events != outbound.events || is_timed_out {
-                outbound.is_sent = true;
                 outbound.events = events;
-                outbound.last_ns = now_ns;
                 outbound.sampled = outbound.pdo.pack(dictionary);
                 outbound.due_ns = now_ns;
             }
         }
+    }
+
+    /// An event of the device: samples a TPDO, which is sent `latency_ns` later, or when its inhibit time is over.
+    pub fn trigger(
+        &mut self,
+        number: usize,
+        now_ns: Nanoseconds,
+        latency_ns: Nanoseconds,
+        dictionary: &SimulatedDictionary,
+    ) {
+        let outbound = &mut self.outbound[number];
+        let free_ns = if outbound.is_sent { outbound.last_ns + outbound.pdo.inhibit_ns } else { 0 };
+        outbound.sampled = outbound.pdo.pack(dictionary);
+        outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(free_ns));
+    }
+
+    /// How many SYNCs a synchronous TPDO waits for; `None` for another one.
+    pub fn syncs_of(&self, number: usize) -> Option<u8> {
+        let pdo = &self.outbound[number].pdo;
+        pdo.is_synchronous().then_some(pdo.transmission_type)
+    }
+
+    /// The event timer of a TPDO; 0 without one.
+    pub fn event_timer_of(&self, number: usize) -> Nanoseconds {
+        self.outbound[number].pdo.event_ns
     }
 
     /// Whether the event timer of an RPDO has just run out.
@@ -373,6 +418,8 @@ impl PdoEngine {
     pub fn next(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
         let outbound = self.outbound.iter_mut().find(|outbound| outbound.due_ns <= now_ns)?;
         outbound.due_ns = NEVER;
+        outbound.is_sent = true;
+        outbound.last_ns = now_ns;
         outbound.pdo.frame(outbound.sampled)
     }
 

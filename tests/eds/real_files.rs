@@ -1,6 +1,6 @@
 //! Complete files.
 
-use takt::canopen::eds::{self, AccessType, DataTypeCode, DictionaryEntry, Loaded, ObjectType};
+use takt::canopen::eds::{self, DictionaryEntry, Loaded, ObjectType};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
 use takt::sim::erob;

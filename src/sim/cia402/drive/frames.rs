@@ -110,8 +110,8 @@ impl Cia402Drive {
                     self.errors.raise(DeviceError::PdoLength, &mut self.dictionary);
                 }
             }
-            RpdoReception::Latched => self.clear_pdo_error(),
-            RpdoReception::Applied => {
+            RpdoReception::Latched(_) => self.clear_pdo_error(),
+            RpdoReception::Applied(_) => {
                 self.clear_pdo_error();
                 self.follow_modes(now_ns);
                 self.evaluate();

@@ -104,8 +104,8 @@ impl ErobJoint {
                     self.errors.raise(DeviceError::PdoLength, &mut self.dictionary);
                 }
             }
-            RpdoReception::Latched => self.clear_pdo_error(),
-            RpdoReception::Applied => {
+            RpdoReception::Latched(_) => self.clear_pdo_error(),
+            RpdoReception::Applied(_) => {
                 self.clear_pdo_error();
                 self.follow_mode();
                 self.evaluate(now_ns);

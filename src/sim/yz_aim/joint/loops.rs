@@ -45,7 +45,7 @@ impl YzAimJoint {
             self.homing.fail();
             self.torque = 0.0;
         }
-        if self.defects.is_joint_blocked {
+        if self.joint_defects.is_blocked {
             self.joint.halt();
         } else {
             self.joint.step(duration_s, self.torque * self.direction(), false);
@@ -67,7 +67,7 @@ impl YzAimJoint {
     }
 
     fn motion_command(&self) -> MotionCommand {
-        if self.network.is_master_lost() || self.device.is_halted() {
+        if self.is_master_lost || self.device.is_halted() {
             return MotionCommand::Stop;
         }
         if let Some(speed) = self.homing.speed() {
@@ -89,7 +89,7 @@ impl YzAimJoint {
 
     /// The acceleration ramp: counts/s².
     fn acceleration(&self) -> f64 {
-        match self.dictionary.get(at::ACCELERATION) {
+        match self.dictionary.number(at::ACCELERATION) {
             NO_RAMP.. => f64::INFINITY,
             // At least 1: a ramp of 0 would never stop the motor.
             slope => slope.max(1) as f64 * COUNTS_PER_SECOND_PER_RPM,
