@@ -10,7 +10,9 @@
 //!     mailbox  wire        cia402 ── any CiA 402 drive, made from its electronic data sheet
 //!                          erob, yz_aim ── drives of their own, by their manuals and field experience
 //!     frames   bits,        │
-//!     waiting  stuffing   servo ── position, velocity and torque loops
+//!     waiting  stuffing     ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
+//!                           │     canopen_node ── these together, for the drives with CiA 402
+//!                         servo ── position, velocity and torque loops
 //!                           │
 //!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
 //! ```
@@ -45,6 +47,7 @@
 //! assert_eq!(batch[0].frame, Frame::of(Id::canopen(0x700, 5), [0])); // boot-up
 //! ```
 
+mod canopen_node;
 pub mod cia402;
 mod defect;
 mod drive;

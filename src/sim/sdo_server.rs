@@ -28,7 +28,7 @@ pub trait ObjectAccess {
     fn read(&mut self, address: ObjectAddress, value: &mut Vec<u8>) -> Result<(), AbortCode>;
 
     /// Checks that an object can be written, before the value is complete. Returns its length in bytes, if that is fixed.
-    fn check_write(&self, address: ObjectAddress) -> Result<Option<usize>, AbortCode>;
+    fn check_write(&mut self, address: ObjectAddress) -> Result<Option<usize>, AbortCode>;
 
     /// Writes an object with its complete value.
     fn write(&mut self, address: ObjectAddress, value: &[u8]) -> Result<(), AbortCode>;

@@ -1,28 +1,24 @@
 //! The complete drive: it receives frames and time, advances its parts, and sends frames.
 
-mod access;
-mod frames;
-
-use takt_rt::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::axis::{Axis, AxisEvent};
-use super::places::is_measured;
+use super::places::{AXIS_OFFSET, is_measured};
 use super::{Cia402Parameters, NotADrive, dictionary_of};
+use crate::canopen::object::ObjectAddress;
 use crate::config::quirks::Quirks;
+use crate::sim::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, TakesField, ValueSource};
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
-use crate::sim::errors::{DeviceError, Errors};
-use crate::sim::feedback_defects::{FeedbackDefects, ShownObjects};
+use crate::sim::errors::DeviceError;
+use crate::sim::feedback_defects::ShownObjects;
 use crate::sim::mailbox::Mailbox;
-use crate::sim::network::Network;
-use crate::sim::object_dictionary::SimulatedDictionary;
-use crate::sim::pdo_engine::{PdoEngine, PdoFeatures};
+use crate::sim::pdo_engine::PdoFeatures;
 use crate::sim::plant::Gravity;
 use crate::sim::random::Random;
+use crate::sim::sdo_reply::AbortCode;
 use crate::sim::sdo_server::{SdoFeatures, SdoServer};
 
-/// Longest time between two advances.
-const IDLE_NS: Nanoseconds = 1_000_000;
 /// The control loops and the plant run at 8 kHz.
 const STEP_NS: Nanoseconds = 125_000;
 /// From an SDO request to its reply.
@@ -30,28 +26,15 @@ const SHORTEST_REPLY_NS: Nanoseconds = 300_000;
 const LONGEST_REPLY_NS: Nanoseconds = 1_000_000;
 /// From "save" until it takes effect.
 const SAVE_NS: Nanoseconds = 100_000_000;
-const NEVER: Nanoseconds = Nanoseconds::MAX;
 
 /// A simulated CiA 402 drive, made from its data sheet.
 #[derive(Clone, Debug)]
 pub struct Cia402Drive {
-    node: u8,
     quirks: Quirks,
-    power_up_ns: Nanoseconds,
-    feedback_delay_ns: Nanoseconds,
-    dictionary: SimulatedDictionary,
-    network: Network,
-    sdo: SdoServer,
-    pdos: PdoEngine,
-    errors: Errors,
+    canopen: CanopenNode,
     axes: Vec<Axis>,
-    has_pdo_error: bool,
     /// A fault injected since the last advance.
     injected: Option<DriveFault>,
-    defects: FeedbackDefects,
-    save_ns: Nanoseconds,
-    /// From when on PDOs work after NMT start.
-    pdos_ready_ns: Nanoseconds,
     /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
     now_ns: Nanoseconds,
@@ -66,7 +49,12 @@ impl Cia402Drive {
     pub fn new(parameters: Cia402Parameters) -> Result<Self, NotADrive> {
         let mut dictionary = dictionary_of(&parameters)?;
         let Cia402Parameters { node, quirks, axes, power_up_ns, feedback_delay_ns, seed, .. } = parameters;
-        let power_up_ns = quirks.delays.boot_up_ns.unwrap_or(power_up_ns);
+        let delays = NodeDelays {
+            power_up_ns: quirks.delays.boot_up_ns.unwrap_or(power_up_ns),
+            feedback_ns: feedback_delay_ns,
+            save_ns: quirks.delays.save_ns.unwrap_or(SAVE_NS),
+            first_pdo_ns: quirks.delays.first_pdo_ns.unwrap_or(0),
+        };
         let axes = (0u16..).zip(axes).map(|(number, axis)| Axis::new(number, axis, &mut dictionary, &quirks));
         let axes = axes.collect();
         let longest_ns = quirks.delays.sdo_reply_ns.unwrap_or(LONGEST_REPLY_NS);
@@ -76,22 +64,13 @@ impl Cia402Drive {
             SdoFeatures::Blocks
         };
         let latency_ns = SHORTEST_REPLY_NS.min(longest_ns)..longest_ns + 1;
+        let sdo = SdoServer::new(Random::new(seed, node), latency_ns, features);
+        let pdo_features = PdoFeatures { is_measured, watches_rpdos: true };
         Ok(Self {
-            node,
-            power_up_ns,
-            feedback_delay_ns,
-            network: Network::starting(&dictionary, power_up_ns, quirks.power_up),
-            sdo: SdoServer::new(Random::new(seed, node), latency_ns, features),
-            pdos: PdoEngine::new(&dictionary, PdoFeatures { is_measured, watches_rpdos: true }),
-            errors: Errors::new(&dictionary),
+            canopen: CanopenNode::new(node, dictionary, quirks.power_up, sdo, pdo_features, delays),
             axes,
             quirks,
-            dictionary,
-            has_pdo_error: false,
             injected: None,
-            defects: FeedbackDefects::default(),
-            save_ns: NEVER,
-            pdos_ready_ns: 0,
             stepped_ns: 0,
             now_ns: 0,
             wake_ns: 0,
@@ -106,7 +85,7 @@ impl Cia402Drive {
     /// The true state of one of its axes at `now_ns`, counted from 0.
     pub fn observe_axis(&mut self, now_ns: Nanoseconds, axis: usize) -> Option<Observation> {
         self.run_loops(now_ns);
-        let nmt = self.network.state();
+        let nmt = self.canopen.network.state();
         let axis = self.axes.get(axis)?;
         Some(Observation {
             position: axis.joint.position(),
@@ -115,7 +94,7 @@ impl Cia402Drive {
             position_counts: axis.position().round_ties_even() as i64 as i32,
             state: axis.state(),
             statusword: axis.statusword(),
-            error_code: self.dictionary.number_at(axis.places.error_code).unwrap_or(0) as u16,
+            error_code: self.canopen.dictionary.number_at(axis.places.error_code).unwrap_or(0) as u16,
             operation_mode: axis.mode_number(),
             nmt,
             is_braked: axis.is_braked(),
@@ -129,18 +108,10 @@ impl Cia402Drive {
         }
     }
 
-    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
-    fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
-    }
-
     fn step(&mut self, duration_ns: Nanoseconds) {
         self.stepped_ns += duration_ns;
         for index in 0..self.axes.len() {
-            match self.axes[index].step(self.stepped_ns, duration_ns, &self.dictionary) {
+            match self.axes[index].step(self.stepped_ns, duration_ns, &self.canopen.dictionary) {
                 Some(AxisEvent::Failed(error)) => self.fail(index, error),
                 Some(AxisEvent::FaultReset) => self.fault_reset(index),
                 None => {}
@@ -150,111 +121,143 @@ impl Cia402Drive {
 
     /// Has an axis fail: error code, emergency message, fault reaction.
     fn fail(&mut self, index: usize, error: DeviceError) {
-        self.axes[index].fail(error, &mut self.dictionary);
-        self.errors.raise(error, &mut self.dictionary);
+        self.axes[index].fail(error, &mut self.canopen.dictionary);
+        self.canopen.errors.raise(error, &mut self.canopen.dictionary);
     }
 
     fn fault_reset(&mut self, index: usize) {
-        self.dictionary.set_at(self.axes[index].places.error_code, 0);
+        self.canopen.dictionary.set_at(self.axes[index].places.error_code, 0);
         if self.axes.iter().all(|axis| !axis.state().is_faulted()) {
-            self.errors.clear(&mut self.dictionary);
+            self.canopen.errors.clear(&mut self.canopen.dictionary);
         }
     }
 
     /// Evaluates the controlwords.
     fn evaluate(&mut self) {
         for index in 0..self.axes.len() {
-            if self.axes[index].evaluate(&self.dictionary) {
+            if self.axes[index].evaluate(&self.canopen.dictionary) {
                 self.fault_reset(index);
             }
         }
     }
 
     fn follow_modes(&mut self, now_ns: Nanoseconds) {
-        self.axes.iter_mut().for_each(|axis| axis.follow_mode(&self.dictionary, now_ns));
+        self.axes.iter_mut().for_each(|axis| axis.follow_mode(&self.canopen.dictionary, now_ns));
     }
 
     fn latch(&mut self) {
-        self.axes.iter_mut().for_each(|axis| axis.latch(&self.dictionary));
+        self.axes.iter_mut().for_each(|axis| axis.latch(&self.canopen.dictionary));
+    }
+}
+
+impl CanopenDevice for Cia402Drive {
+    const CHECKS_SYNC_LENGTH: bool = true;
+
+    fn canopen(&mut self) -> &mut CanopenNode {
+        &mut self.canopen
     }
 
-    /// The master is lost: every axis does what object 6007 says.
-    fn lose_master(&mut self) {
-        let mut is_fault = false;
-        for axis in &mut self.axes {
-            if axis.lose_master(&self.dictionary) {
-                axis.fail(DeviceError::MasterLost, &mut self.dictionary);
-                is_fault = true;
-            }
+    fn lock_loops(&mut self, now_ns: Nanoseconds) {
+        self.run_loops(now_ns);
+        if now_ns > self.stepped_ns {
+            self.step(now_ns - self.stepped_ns);
         }
-        // The node reports the error even when its axes go on.
-        self.errors.raise(DeviceError::MasterLost, &mut self.dictionary);
-        if !is_fault {
-            self.errors.clear(&mut self.dictionary);
-        }
-        self.stop_services();
     }
 
-    /// Writes the measured values to the dictionary.
+    fn begin_rpdo(&mut self) -> TakesField {
+        |_, _| true
+    }
+
+    fn take_values(&mut self, now_ns: Nanoseconds, _: ValueSource) {
+        self.follow_modes(now_ns);
+        self.evaluate();
+        self.latch();
+    }
+
+    fn is_faulted(&self) -> bool {
+        self.axes.iter().any(|axis| axis.state().is_faulted())
+    }
+
     fn measure(&mut self) {
-        self.axes.iter().for_each(|axis| axis.measure(&self.quirks, &mut self.dictionary));
+        self.axes.iter().for_each(|axis| axis.measure(&self.quirks, &mut self.canopen.dictionary));
     }
 
-    /// Writes the measured values to the dictionary with the effect of the defects, and lets the PDOs take their
-    /// objects.
-    fn report<T>(&mut self, take: impl FnOnce(&mut PdoEngine, &SimulatedDictionary) -> T) -> T {
-        self.measure();
+    /// The torque takes the place of the position.
+    fn shown(&self) -> ShownObjects {
         let places = &self.axes[0].places;
-        let shown = ShownObjects {
+        ShownObjects {
             statusword: places.statusword,
             mode_display: places.mode_display,
             position: places.position,
             instead_of_position: places.torque,
-        };
-        let truth = self.defects.falsify(shown, &mut self.dictionary);
-        let taken = take(&mut self.pdos, &self.dictionary);
-        truth.restore(&mut self.dictionary);
-        taken
-    }
-
-    /// Restarts everything except the joints and the saved parameters.
-    fn start(&mut self, now_ns: Nanoseconds) {
-        self.dictionary.restore(0..=u16::MAX);
-        self.network.restart(now_ns + self.power_up_ns);
-        self.sdo.reset();
-        self.errors.reset();
-        self.pdos.compile(&self.dictionary);
-        for axis in &mut self.axes {
-            axis.restart(&mut self.dictionary, &self.quirks);
         }
-        self.has_pdo_error = false;
-        self.save_ns = NEVER;
     }
 
-    fn schedule(&mut self, now_ns: Nanoseconds) {
-        let has_message = self.errors.is_pending() && self.network.has_services();
-        let due_ns = [
-            now_ns + IDLE_NS,
-            self.network.due_ns(),
-            self.sdo.due_ns().unwrap_or(NEVER),
-            self.pdos.due_ns(),
-            self.save_ns,
-            if has_message { now_ns } else { NEVER },
-        ];
-        self.wake_ns = due_ns.into_iter().min().unwrap_or(NEVER).max(now_ns + 1);
+    fn started(&mut self, now_ns: Nanoseconds) {
+        self.axes.iter_mut().for_each(|axis| axis.started(&self.canopen.dictionary, now_ns));
+    }
+
+    fn restart(&mut self, now_ns: Nanoseconds) {
+        self.canopen.restart(now_ns);
+        for axis in &mut self.axes {
+            axis.restart(&mut self.canopen.dictionary, &self.quirks);
+        }
+    }
+
+    /// Every axis does what object 6007 says.
+    fn lose_master(&mut self) {
+        let CanopenNode { dictionary, errors, .. } = &mut self.canopen;
+        let mut is_fault = false;
+        for axis in &mut self.axes {
+            if axis.lose_master(dictionary) {
+                axis.fail(DeviceError::MasterLost, dictionary);
+                is_fault = true;
+            }
+        }
+        // The node reports the error even when its axes go on.
+        errors.raise(DeviceError::MasterLost, dictionary);
+        if !is_fault {
+            errors.clear(dictionary);
+        }
+    }
+
+    fn check_write(&self, _: usize) -> Result<(), AbortCode> {
+        Ok(())
+    }
+
+    fn check_value(&self, _: ObjectAddress, _: usize, _: i64) -> Result<(), AbortCode> {
+        Ok(())
+    }
+
+    fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+        let object = match address.index {
+            0x6000..=0x9FFF => 0x6000 + (address.index - 0x6000) % AXIS_OFFSET,
+            _ => return,
+        };
+        match object {
+            0x6040 => self.evaluate(),
+            0x6060 => self.follow_modes(now_ns),
+            0x607A | 0x60C1 => self.latch(),
+            0x607E | 0x608F | 0x6091 | 0x6092 | 0x6096 | 0x60A9 => {
+                for axis in &mut self.axes {
+                    axis.set_units(&self.canopen.dictionary, &self.quirks);
+                }
+            }
+            _ => {}
+        }
     }
 }
 
 impl Drive for Cia402Drive {
     fn node(&self) -> u8 {
-        self.node
+        self.canopen.id
     }
 
-    fn receive(&mut self, now_ns: Nanoseconds, frame: &takt_rt::Frame, mailbox: &mut Mailbox) {
+    fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         self.receive_frame(now_ns, frame, mailbox);
-        self.schedule(now_ns);
+        self.wake_ns = self.canopen.wake_ns(now_ns);
     }
 
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
@@ -263,19 +266,8 @@ impl Drive for Cia402Drive {
         if let Some(fault) = self.injected.take() {
             self.fail(0, DeviceError::Fault(fault));
         }
-        if self.network.has_lost_master(now_ns) {
-            self.network.follow_error_behaviour(&self.dictionary);
-            self.lose_master();
-        }
-        if self.pdos.has_lost_rpdo(now_ns) {
-            self.errors.raise(DeviceError::RpdoTimeout, &mut self.dictionary);
-        }
-        if now_ns >= self.save_ns {
-            self.save_ns = NEVER;
-            self.dictionary.save();
-        }
-        self.send_due(now_ns, mailbox);
-        self.schedule(now_ns);
+        self.advance_node(now_ns, mailbox);
+        self.wake_ns = self.canopen.wake_ns(now_ns);
     }
 
     fn wake_ns(&self) -> Nanoseconds {
@@ -296,8 +288,8 @@ impl Drive for Cia402Drive {
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_loops(now_ns);
         mailbox.clear();
-        self.start(now_ns);
-        self.schedule(now_ns);
+        self.restart(now_ns);
+        self.wake_ns = self.canopen.wake_ns(now_ns);
     }
 
     /// On the joint of the first axis.
@@ -323,7 +315,7 @@ impl Drive for Cia402Drive {
             return Err(Unsupported { defect, reason });
         }
         self.run_loops(now_ns);
-        self.defects.set(defect, is_present);
+        self.canopen.defects.set(defect, is_present);
         let first = &mut self.axes[0];
         first.defects.set(defect, is_present);
         match defect {
@@ -331,7 +323,7 @@ impl Drive for Cia402Drive {
             Defect::TorqueOff if is_present => first.lose_torque(),
             Defect::Alarm { code } if is_present => self.fail(0, DeviceError::Alarm(code)),
             Defect::Emergency { code } if is_present => {
-                self.errors.raise(DeviceError::Alarm(code), &mut self.dictionary);
+                self.canopen.errors.raise(DeviceError::Alarm(code), &mut self.canopen.dictionary);
             }
             _ => {}
         }

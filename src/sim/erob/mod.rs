@@ -2,12 +2,12 @@
 //! dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 state machine, six modes of operation, and the joint.
 //!
 //! ```text
-//! objects ── object_dictionary ──┬── sdo_server   SDO: expedited, segmented
-//!                                ├── pdo_engine   RPDO, TPDO, SYNC
-//!                                ├── network      NMT, heartbeat, guarding, SYNC producer
-//!                                ├── errors       emergency messages, error history
-//!                                ├── device       CiA 402: controlword → state → statusword
-//!                                └── motion → servo → plant    set-points → loops → torque → joint
+//! objects ── object_dictionary ── canopen_node ──┬── sdo_server   SDO: expedited, segmented
+//!                                     │          ├── pdo_engine   RPDO, TPDO, SYNC
+//!                                     │          ├── network      NMT, heartbeat, guarding, SYNC producer
+//!                                     │          └── errors       emergency messages, error history
+//!                                   joint ──┬── device            CiA 402: controlword → state → statusword
+//!                                           └── motion → servo → plant    set-points → loops → torque → joint
 //! ```
 //!
 //! Choices where neither the manual nor traces give an answer:

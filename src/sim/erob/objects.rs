@@ -268,10 +268,7 @@ pub mod at {
     use super::{OBJECTS, table_places};
 
     table_places! {
-        ERROR_HISTORY = 0x1003:0;
-        SYNC_ID = 0x1005:0;
         CYCLE_PERIOD = 0x1006:0;
-        CONSUMER_HEARTBEAT = 0x1016:1;
         ERROR_BEHAVIOUR = 0x1029:1;
         MOTOR_ENCODER = 0x2240:0;
         BATTERY_RESET = 0x2242:0;

@@ -18,15 +18,7 @@ impl ErobJoint {
         }
     }
 
-    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
-    pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
-    }
-
-    fn step(&mut self, duration_ns: Nanoseconds) {
+    pub(super) fn step(&mut self, duration_ns: Nanoseconds) {
         let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
         self.stepped_ns += duration_ns;
         self.take_coming_mode();
@@ -37,7 +29,7 @@ impl ErobJoint {
         } else {
             self.torque = 0.0;
         }
-        if self.joint_defects.is_blocked {
+        if self.defects.is_blocked {
             self.joint.halt();
         } else {
             let is_braked = self.is_braked();
@@ -50,8 +42,8 @@ impl ErobJoint {
             self.motion.follow(actual);
         }
         let word = self.device.controlword();
-        let bits = self.motion.status_bits(actual, word, &self.dictionary, duration_s);
-        self.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
+        let bits = self.motion.status_bits(actual, word, &self.canopen.dictionary, duration_s);
+        self.canopen.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
     }
 
     /// One step of set-point, loops and torque.
@@ -66,7 +58,7 @@ impl ErobJoint {
                 }
                 demand
             }
-            None => self.motion.step(self.device.controlword(), actual, &self.dictionary, duration_s),
+            None => self.motion.step(self.device.controlword(), actual, &self.canopen.dictionary, duration_s),
         };
         let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
         let per_mille = self.parameters.rated_torque / 1000.0;
@@ -86,7 +78,7 @@ impl ErobJoint {
     }
 
     fn check_following_error(&mut self, actual: ErobActual) {
-        let window = self.dictionary.real(at::FOLLOWING_ERROR_WINDOW);
+        let window = self.canopen.dictionary.real(at::FOLLOWING_ERROR_WINDOW);
         let error = self.motion.position() - actual.position;
         let is_watched = window >= 0.0 && self.motion.follows_position() && self.device.stop().is_none();
         if is_watched && error.abs() > window {

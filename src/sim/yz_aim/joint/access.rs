@@ -44,7 +44,7 @@ impl ObjectAccess for Objects<'_> {
         Ok(())
     }
 
-    fn check_write(&self, address: ObjectAddress) -> Result<Option<usize>, AbortCode> {
+    fn check_write(&mut self, address: ObjectAddress) -> Result<Option<usize>, AbortCode> {
         let entry = self.unit.dictionary.entry(self.unit.dictionary.find(address)?);
         let is_fixed = is_parameter(address.index) && !self.unit.parameters.quirks.has_settable_pdos;
         if entry.is_writable && !is_fixed { Ok(Some(entry.length)) } else { Err(AbortCode::ReadOnly) }
