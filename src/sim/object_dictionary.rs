@@ -466,7 +466,7 @@ mod tests {
         dictionary.set(VOLTAGE, -5);
         assert_eq!(dictionary.number(VOLTAGE), 0xFFFB);
         dictionary.set(POSITION, i64::from(i32::MAX) + 1);
-        assert_eq!(dictionary.number(POSITION), i32::MIN.into());
+        assert_eq!(dictionary.number(POSITION), i64::from(i32::MIN));
     }
 
     #[test]
