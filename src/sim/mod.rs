@@ -12,7 +12,7 @@
 //!     frames   bits,        │
 //!     waiting  stuffing     ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
 //!                           │     canopen_node ── these together, for the drives with CiA 402
-//!                         servo ── position, velocity and torque loops
+//!                         motion ── ramps, profiles, interpolation; servo ── position, velocity and torque loops
 //!                           │
 //!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
 //! ```
@@ -59,6 +59,7 @@ mod live;
 pub mod lss;
 mod mailbox;
 mod medium;
+mod motion;
 mod network;
 mod object_dictionary;
 mod pdo_engine;

@@ -5,6 +5,7 @@ use takt_rt::{DriveState, NANOSECONDS_PER_SECOND, Nanoseconds, OperationMode};
 use crate::config::quirks::Quirks;
 use crate::sim::errors::DeviceError;
 use crate::sim::feedback_defects::JointDefects;
+use crate::sim::motion::{Actual, Measured};
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::plant::Joint;
 use crate::sim::servo::Servo;
@@ -12,7 +13,7 @@ use crate::sim::servo::Servo;
 use super::Cia402AxisParameters;
 use super::device::{Change, Device, FaultReaction};
 use super::homing::HomingStep;
-use super::motion::{Actual, Demand, Motion};
+use super::motion::Motion;
 use super::places::Places;
 use super::profile::Profile;
 use super::units::{CommissionedScale, Units, units_per_turn};
@@ -356,20 +357,14 @@ impl Axis {
         if is_stopped {
             self.device.stopped();
         }
-        let unit = 1.0 / self.units.position.abs();
-        let velocity = self.joint.velocity() * self.direction();
-        let per_mille = self.parameters.rated_torque / 1000.0;
-        self.servo.set_torque_limit(self.torque_limit(dictionary));
-        self.torque = match demand {
-            Demand::Position { position, velocity: forward, torque } => {
-                let error = (position - actual.position) * unit;
-                self.servo.position(error, forward * unit, velocity, torque * per_mille, duration_s)
-            }
-            Demand::Velocity { velocity: wanted, torque } => {
-                self.servo.velocity(wanted * unit, velocity, torque * per_mille, duration_s)
-            }
-            Demand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
+        let measured = Measured {
+            count: 1.0 / self.units.position.abs(),
+            per_mille: self.parameters.rated_torque / 1000.0,
+            position: actual.position,
+            velocity: self.joint.velocity() * self.direction(),
         };
+        self.servo.set_torque_limit(self.torque_limit(dictionary));
+        self.torque = demand.torque(&mut self.servo, measured, duration_s);
         if !self.device.state().has_torque() {
             self.torque = 0.0;
         }

@@ -7,7 +7,7 @@ use takt_rt::{DriveState, Frame, Nanoseconds, OperationMode};
 
 use super::ErobParameters;
 use super::device::{Change, ErobDevice};
-use super::motion::{ErobActual, ErobMotion};
+use super::motion::ErobMotion;
 use super::objects::{OBJECTS, at, is_measured};
 use crate::config::PowerUpState;
 use crate::sim::canopen_node::{CanopenDevice, CanopenNode, NodeDelays};
@@ -16,6 +16,7 @@ use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::errors::DeviceError;
 use crate::sim::feedback_defects::JointDefects;
 use crate::sim::mailbox::Mailbox;
+use crate::sim::motion::Actual;
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::pdo_engine::PdoFeatures;
 use crate::sim::plant::{Gravity, Joint};
@@ -124,9 +125,9 @@ impl ErobJoint {
         self.parameters.encoder.counts(self.joint.position()).wrapping_add(self.counts_offset)
     }
 
-    fn actual(&self) -> ErobActual {
+    fn actual(&self) -> Actual {
         let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
-        ErobActual { position: self.counts().into(), velocity }
+        Actual { position: self.counts().into(), velocity }
     }
 
     /// The current mode of operation, as in 6061.

@@ -14,7 +14,7 @@ use super::bit_rate::BitRateChange;
 use super::defects::check_possible;
 use super::device::{Level, YzAimDevice};
 use super::homing::Homing;
-use super::motion::{YzAimActual, YzAimMotion};
+use super::motion::YzAimMotion;
 use super::objects::{OBJECTS, at};
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
 use super::process_data::{PDO_FEATURES, Transmission, report_state_first};
@@ -23,6 +23,7 @@ use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::feedback_defects::{FeedbackDefects, JointDefects};
 use crate::sim::mailbox::Mailbox;
+use crate::sim::motion::Actual;
 use crate::sim::network::Network;
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::pdo_engine::PdoEngine;
@@ -179,9 +180,9 @@ impl YzAimJoint {
         self.encoder_counts().wrapping_add(self.counts_offset)
     }
 
-    fn actual(&self) -> YzAimActual {
+    fn actual(&self) -> Actual {
         let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
-        YzAimActual { position: self.counts().into(), velocity }
+        Actual { position: self.counts().into(), velocity }
     }
 
     fn velocity_rpm(&self) -> f64 {

@@ -3,9 +3,9 @@
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::ErobJoint;
-use crate::sim::erob::motion::{ErobActual, ErobDemand};
 use crate::sim::erob::objects::at;
 use crate::sim::errors::DeviceError;
+use crate::sim::motion::{Actual, Measured};
 
 /// The control loops and the plant run at 8 kHz.
 const STEP_NS: Nanoseconds = 125_000;
@@ -49,7 +49,6 @@ impl ErobJoint {
     /// One step of set-point, loops and torque.
     fn drive(&mut self, duration_s: f64) {
         let actual = self.actual();
-        let velocity = self.joint.velocity() * self.direction();
         let demand = match self.device.stop() {
             Some(stop) => {
                 let (demand, is_at_rest) = self.motion.step_stop(stop.deceleration, duration_s);
@@ -60,24 +59,19 @@ impl ErobJoint {
             }
             None => self.motion.step(self.device.controlword(), actual, &self.canopen.dictionary, duration_s),
         };
-        let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
-        let per_mille = self.parameters.rated_torque / 1000.0;
-        self.torque = match demand {
-            ErobDemand::Position { position, velocity: forward, torque } => {
-                let error = (position - actual.position) * unit;
-                self.servo.position(error, forward * unit, velocity, torque * per_mille, duration_s)
-            }
-            ErobDemand::Velocity { velocity: wanted, torque } => {
-                self.servo.velocity(wanted * unit, velocity, torque * per_mille, duration_s)
-            }
-            ErobDemand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
+        let measured = Measured {
+            count: 1.0 / self.parameters.encoder.counts_per_unit.abs(),
+            per_mille: self.parameters.rated_torque / 1000.0,
+            position: actual.position,
+            velocity: self.joint.velocity() * self.direction(),
         };
+        self.torque = demand.torque(&mut self.servo, measured, duration_s);
         if !self.device.state().has_torque() {
             self.torque = 0.0;
         }
     }
 
-    fn check_following_error(&mut self, actual: ErobActual) {
+    fn check_following_error(&mut self, actual: Actual) {
         let window = self.canopen.dictionary.real(at::FOLLOWING_ERROR_WINDOW);
         let error = self.motion.position() - actual.position;
         let is_watched = window >= 0.0 && self.motion.follows_position() && self.device.stop().is_none();

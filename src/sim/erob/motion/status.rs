@@ -2,15 +2,16 @@
 
 use takt_rt::{OperationMode, controlword, statusword};
 
-use super::{ARRIVED, ErobActual, ErobMotion};
+use super::ErobMotion;
 use crate::sim::erob::objects::at;
+use crate::sim::motion::{ARRIVED, Actual};
 use crate::sim::object_dictionary::SimulatedDictionary;
 
 impl ErobMotion {
     /// Statusword bits 10 to 13 of an enabled drive, after a step of `duration_s`.
     pub fn status_bits(
         &mut self,
-        actual: ErobActual,
+        actual: Actual,
         word: u16,
         dictionary: &SimulatedDictionary,
         duration_s: f64,
@@ -36,7 +37,7 @@ impl ErobMotion {
 
     fn is_target_reached(
         &mut self,
-        actual: ErobActual,
+        actual: Actual,
         word: u16,
         dictionary: &SimulatedDictionary,
         duration_s: f64,
@@ -54,12 +55,12 @@ impl ErobMotion {
             }
             Some(OperationMode::ProfileTorque) => (self.torque == dictionary.real(at::TARGET_TORQUE), 0.0),
             Some(OperationMode::CyclicSynchronousPosition) => {
-                let distance = self.interpolation.target - actual.position;
+                let distance = self.generator.target - actual.position;
                 (distance.abs() <= position_window, milliseconds(at::POSITION_WINDOW_TIME))
             }
             Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition) => {
                 let is_done = self.set_points.active.is_none();
-                let distance = self.position - actual.position;
+                let distance = self.generator.position - actual.position;
                 (is_done && distance.abs() <= position_window, milliseconds(at::POSITION_WINDOW_TIME))
             }
             _ => (false, 0.0),

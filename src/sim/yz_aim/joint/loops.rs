@@ -4,6 +4,7 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::load_monitor::LoadMonitor;
 use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
+use crate::sim::motion::Measured;
 use crate::sim::yz_aim::device::Level;
 use crate::sim::yz_aim::homing::Input;
 use crate::sim::yz_aim::motion::MotionCommand;
@@ -100,16 +101,15 @@ impl YzAimJoint {
     fn drive(&mut self, duration_s: f64) {
         let actual = self.actual();
         let demand = self.motion.step(self.motion_command(), self.acceleration(), actual, duration_s);
-        let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
-        let velocity = self.joint.velocity() * self.direction();
         self.servo.set_torque_limit(self.torque_limit());
-        self.torque = match demand.position {
-            Some(position) => {
-                let error = (position - actual.position) * unit;
-                self.servo.position(error, demand.velocity * unit, velocity, 0.0, duration_s)
-            }
-            None => self.servo.velocity(demand.velocity * unit, velocity, 0.0, duration_s),
+        let measured = Measured {
+            count: 1.0 / self.parameters.encoder.counts_per_unit.abs(),
+            // No torque is fed forward.
+            per_mille: 0.0,
+            position: actual.position,
+            velocity: self.joint.velocity() * self.direction(),
         };
+        self.torque = demand.torque(&mut self.servo, measured, duration_s);
     }
 
     fn step_homing(&mut self, duration_s: f64) {
