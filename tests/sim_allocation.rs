@@ -55,15 +55,13 @@ fn allocations() -> u64 {
     ALLOCATIONS.with(Cell::get)
 }
 
+const JOINT: JointParameters =
+    JointParameters { inertia: 0.4, viscous_friction: 1.5, coulomb_friction: 4.0, brake_torque: 110.0 };
+
 fn drive(node: u8) -> Box<dyn Drive> {
     Box::new(ErobJoint::new(ErobParameters {
         node,
-        joint: JointParameters {
-            inertia: 0.4,
-            viscous_friction: 1.5,
-            coulomb_friction: 4.0,
-            brake_torque: 110.0,
-        },
+        joint: JOINT,
         encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
         counts_per_turn: 524_288.0,
         initial_position: 0.0,
@@ -139,12 +137,7 @@ fn live<P: BusPort>(bus: &mut P, received: &mut usize, mut breaks: impl FnMut(&m
 fn drive_of_a_sheet(node: u8) -> Box<dyn Drive> {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
     let axis = Cia402AxisParameters {
-        joint: JointParameters {
-            inertia: 0.4,
-            viscous_friction: 1.5,
-            coulomb_friction: 4.0,
-            brake_torque: 110.0,
-        },
+        joint: JOINT,
         encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
         counts_per_turn: 524_288.0,
         initial_position: 0.0,

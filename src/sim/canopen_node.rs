@@ -11,6 +11,7 @@ use crate::config::PowerUpState;
 use super::drive::NodeState;
 use super::errors::{DeviceError, Errors};
 use super::feedback_defects::{FeedbackDefects, ShownObjects};
+use super::loops::ControlLoops;
 use super::mailbox::Mailbox;
 use super::network::{Network, NmtReset};
 use super::object_dictionary::SimulatedDictionary;
@@ -135,15 +136,12 @@ pub enum ValueSource {
 }
 
 /// A device behind a [`CanopenNode`].
-pub trait CanopenDevice: Sized {
+pub trait CanopenDevice: ControlLoops + Sized {
     /// Whether SYNC must have the length that object 1019 says.
     const CHECKS_SYNC_LENGTH: bool;
 
     /// Its node.
     fn canopen(&mut self) -> &mut CanopenNode;
-
-    /// Runs the control loops exactly up to `now_ns`.
-    fn lock_loops(&mut self, now_ns: Nanoseconds);
 
     /// RPDOs are about to be written: what the device takes from them.
     fn begin_rpdo(&mut self) -> TakesField;

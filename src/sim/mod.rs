@@ -56,6 +56,7 @@ mod errors;
 mod feedback_defects;
 pub mod homing_switches;
 mod live;
+mod loops;
 pub mod lss;
 mod mailbox;
 mod medium;

@@ -12,6 +12,7 @@ use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::errors::DeviceError;
 use crate::sim::feedback_defects::ShownObjects;
+use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;
 use crate::sim::pdo_engine::PdoFeatures;
 use crate::sim::plant::Gravity;
@@ -19,8 +20,6 @@ use crate::sim::random::Random;
 use crate::sim::sdo_reply::AbortCode;
 use crate::sim::sdo_server::{SdoFeatures, SdoServer};
 
-/// The control loops and the plant run at 8 kHz.
-const STEP_NS: Nanoseconds = 125_000;
 /// From an SDO request to its reply.
 const SHORTEST_REPLY_NS: Nanoseconds = 300_000;
 const LONGEST_REPLY_NS: Nanoseconds = 1_000_000;
@@ -101,24 +100,6 @@ impl Cia402Drive {
         })
     }
 
-    /// Runs the loops in steps up to `now_ns`.
-    fn run_loops(&mut self, now_ns: Nanoseconds) {
-        while self.stepped_ns + STEP_NS <= now_ns {
-            self.step(STEP_NS);
-        }
-    }
-
-    fn step(&mut self, duration_ns: Nanoseconds) {
-        self.stepped_ns += duration_ns;
-        for index in 0..self.axes.len() {
-            match self.axes[index].step(self.stepped_ns, duration_ns, &self.canopen.dictionary) {
-                Some(AxisEvent::Failed(error)) => self.fail(index, error),
-                Some(AxisEvent::FaultReset) => self.fault_reset(index),
-                None => {}
-            }
-        }
-    }
-
     /// Has an axis fail: error code, emergency message, fault reaction.
     fn fail(&mut self, index: usize, error: DeviceError) {
         self.axes[index].fail(error, &mut self.canopen.dictionary);
@@ -150,18 +131,28 @@ impl Cia402Drive {
     }
 }
 
+impl ControlLoops for Cia402Drive {
+    fn stepped_ns(&self) -> Nanoseconds {
+        self.stepped_ns
+    }
+
+    fn step(&mut self, duration_ns: Nanoseconds) {
+        self.stepped_ns += duration_ns;
+        for index in 0..self.axes.len() {
+            match self.axes[index].step(self.stepped_ns, duration_ns, &self.canopen.dictionary) {
+                Some(AxisEvent::Failed(error)) => self.fail(index, error),
+                Some(AxisEvent::FaultReset) => self.fault_reset(index),
+                None => {}
+            }
+        }
+    }
+}
+
 impl CanopenDevice for Cia402Drive {
     const CHECKS_SYNC_LENGTH: bool = true;
 
     fn canopen(&mut self) -> &mut CanopenNode {
         &mut self.canopen
-    }
-
-    fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
     }
 
     fn begin_rpdo(&mut self) -> TakesField {

@@ -15,6 +15,7 @@ use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::errors::DeviceError;
 use crate::sim::feedback_defects::JointDefects;
+use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;
 use crate::sim::motion::Actual;
 use crate::sim::object_dictionary::SimulatedDictionary;

@@ -22,6 +22,7 @@ use crate::config::PowerUpState;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::feedback_defects::{FeedbackDefects, JointDefects};
+use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;
 use crate::sim::motion::Actual;
 use crate::sim::network::Network;
@@ -45,10 +46,13 @@ const NEVER: Nanoseconds = Nanoseconds::MAX;
 
 /// The modes of operation in 6060h.
 mod mode {
-    pub const PROFILE_POSITION: i64 = 1;
-    pub const VELOCITY: i64 = 3;
-    pub const HOMING: i64 = 6;
-    pub const INTERPOLATION: i64 = 7;
+    use takt_rt::OperationMode;
+
+    pub const PROFILE_POSITION: i64 = OperationMode::ProfilePosition as i64;
+    pub const VELOCITY: i64 = OperationMode::ProfileVelocity as i64;
+    pub const HOMING: i64 = OperationMode::Homing as i64;
+    pub const INTERPOLATION: i64 = OperationMode::InterpolatedPosition as i64;
+    pub const ALL: [i64; 4] = [PROFILE_POSITION, VELOCITY, HOMING, INTERPOLATION];
 }
 
 /// A simulated YZ-AIM integrated servo with CANopen.

@@ -32,13 +32,6 @@ impl CanopenDevice for ErobJoint {
         &mut self.canopen
     }
 
-    fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
-    }
-
     /// An enabled drive keeps its mode.
     fn begin_rpdo(&mut self) -> TakesField {
         self.target_before = self.canopen.dictionary.number(at::TARGET_POSITION);

@@ -5,20 +5,15 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use super::ErobJoint;
 use crate::sim::erob::objects::at;
 use crate::sim::errors::DeviceError;
+use crate::sim::loops::ControlLoops;
 use crate::sim::motion::{Actual, Measured};
 
-/// The control loops and the plant run at 8 kHz.
-const STEP_NS: Nanoseconds = 125_000;
-
-impl ErobJoint {
-    /// Runs the loops in steps up to `now_ns`.
-    pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
-        while self.stepped_ns + STEP_NS <= now_ns {
-            self.step(STEP_NS);
-        }
+impl ControlLoops for ErobJoint {
+    fn stepped_ns(&self) -> Nanoseconds {
+        self.stepped_ns
     }
 
-    pub(super) fn step(&mut self, duration_ns: Nanoseconds) {
+    fn step(&mut self, duration_ns: Nanoseconds) {
         let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
         self.stepped_ns += duration_ns;
         self.take_coming_mode();
@@ -45,7 +40,9 @@ impl ErobJoint {
         let bits = self.motion.status_bits(actual, word, &self.canopen.dictionary, duration_s);
         self.canopen.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
     }
+}
 
+impl ErobJoint {
     /// One step of set-point, loops and torque.
     fn drive(&mut self, duration_s: f64) {
         let actual = self.actual();

@@ -2,7 +2,7 @@
 
 use takt_rt::{Nanoseconds, controlword};
 
-use super::YzAimJoint;
+use super::{YzAimJoint, mode};
 use crate::canopen::object::ObjectAddress;
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::pdo_engine::is_parameter;
@@ -23,7 +23,7 @@ pub(super) fn write_field(dictionary: &mut SimulatedDictionary, place: usize, bi
 /// Checks what the range of an entry cannot say.
 fn check_meaning(place: usize, number: i64) -> Result<(), AbortCode> {
     let is_right = match place {
-        at::OPERATION_MODE => matches!(number, 1 | 3 | 6 | 7),
+        at::OPERATION_MODE => mode::ALL.contains(&number),
         at::MODBUS_ENABLE => matches!(number, 0 | 1 | 506),
         _ => true,
     };

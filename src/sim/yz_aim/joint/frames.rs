@@ -6,6 +6,7 @@ use super::YzAimJoint;
 use super::access::{Objects, write_field};
 use crate::config::PowerUpState;
 use crate::sim::drive::NodeState;
+use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;
 use crate::sim::network::NmtReset;
 use crate::sim::pdo_engine::RpdoReception;

@@ -4,31 +4,19 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::load_monitor::LoadMonitor;
 use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
+use crate::sim::loops::ControlLoops;
 use crate::sim::motion::Measured;
 use crate::sim::yz_aim::device::Level;
 use crate::sim::yz_aim::homing::Input;
 use crate::sim::yz_aim::motion::MotionCommand;
 use crate::sim::yz_aim::objects::at;
 
-/// The control loops and the plant run at 8 kHz.
-const STEP_NS: Nanoseconds = 125_000;
 /// 6083h: at this value and above there is no ramp (manual IV.1).
 const NO_RAMP: i64 = 60_000;
 
-impl YzAimJoint {
-    /// Runs the loops in steps up to `now_ns`.
-    pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
-        while self.stepped_ns + STEP_NS <= now_ns {
-            self.step(STEP_NS);
-        }
-    }
-
-    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
-    pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
+impl ControlLoops for YzAimJoint {
+    fn stepped_ns(&self) -> Nanoseconds {
+        self.stepped_ns
     }
 
     fn step(&mut self, duration_ns: Nanoseconds) {
@@ -57,7 +45,9 @@ impl YzAimJoint {
             self.motion.engage(self.actual());
         }
     }
+}
 
+impl YzAimJoint {
     /// Restarts the motion at the actual position, when torque comes on or the command changes.
     pub(super) fn engage(&mut self) {
         if !self.was_energised {
