@@ -178,7 +178,8 @@ mod tests {
                 .iter()
                 .find(|object| (object.index, object.subindex) == (address.index, address.subindex));
             let simulated = simulated.unwrap_or_else(|| panic!("{} is unknown", entry.object));
-            assert_eq!(simulated.data_type.bytes(), entry.object.data_type.length(), "{}", entry.object);
+            let bits = simulated.data_type.bits().map(usize::from);
+            assert_eq!(bits, Some(8 * entry.object.data_type.length()), "{}", entry.object);
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Errors of the drive: emergency messages, the error register 1001 and the error history 1003, as far as the data sheet has
-//! them (CiA 301, 7.2.7, 7.5.2.2, 7.5.2.4).
+//! Errors of a simulated device: emergency messages, the error register 1001 and the error history 1003, as far as its
+//! dictionary has them (CiA 301, 7.2.7, 7.5.2.2, 7.5.2.4).
 
 use std::collections::VecDeque;
 
@@ -9,9 +9,9 @@ use crate::sim::object_dictionary::SimulatedDictionary;
 /// Capacity for emergency messages that wait to be sent.
 const PENDING: usize = 8;
 
-/// An error of the drive.
+/// An error of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cia402Error {
+pub enum DeviceError {
     /// An injected fault.
     Fault(DriveFault),
     /// An injected error code.
@@ -28,7 +28,7 @@ pub enum Cia402Error {
     FollowingError,
 }
 
-impl Cia402Error {
+impl DeviceError {
     /// The emergency error code.
     pub const fn code(self) -> u16 {
         match self {
@@ -94,7 +94,7 @@ impl Errors {
     }
 
     /// Records an error in register and history, and queues an emergency message.
-    pub fn raise(&mut self, error: Cia402Error, dictionary: &mut SimulatedDictionary) {
+    pub fn raise(&mut self, error: DeviceError, dictionary: &mut SimulatedDictionary) {
         let register = dictionary.number_at(self.register).unwrap_or(0) as u8 | error.register();
         dictionary.set_at(self.register, register.into());
         for pair in self.history.windows(2).skip(1).rev() {

@@ -1,5 +1,5 @@
-//! NMT state, boot-up, heartbeat producer and consumer, SYNC producer, node guarding (CiA 301, 7.2.8, 7.3.2), each as far as
-//! the data sheet has its object.
+//! NMT state, boot-up, heartbeat producer and consumer, SYNC producer and node guarding of a simulated device (CiA 301,
+//! 7.2.8, 7.3.2), each as far as its dictionary has the object.
 
 use takt_rt::{Id, Nanoseconds};
 
@@ -42,7 +42,7 @@ struct Watched {
     deadline_ns: Nanoseconds,
 }
 
-/// What the drive resets after an NMT command.
+/// What a device resets after an NMT command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NmtReset {
     /// Communication parameters only.
@@ -98,6 +98,11 @@ impl Network {
         };
         network.restart(boot_ns);
         network
+    }
+
+    /// The state that the next boot leads to.
+    pub fn set_power_up(&mut self, power_up: PowerUpState) {
+        self.power_up = power_up;
     }
 
     /// The same node when it boots again.
@@ -221,15 +226,23 @@ impl Network {
         None
     }
 
-    /// Receives the heartbeat of another node.
-    pub fn receive_heartbeat(&mut self, now_ns: Nanoseconds, node: u8, dictionary: &SimulatedDictionary) {
+    /// Receives the heartbeat of another node. Returns whether this node watches it.
+    pub fn receive_heartbeat(
+        &mut self,
+        now_ns: Nanoseconds,
+        node: u8,
+        dictionary: &SimulatedDictionary,
+    ) -> bool {
+        let mut is_watched = false;
         for watched in &mut self.watched {
             let [low, high, of, _] = (dictionary.number(watched.place) as u32).to_le_bytes();
             let timeout_ms = u16::from_le_bytes([low, high]);
             if of == node && timeout_ms > 0 {
                 watched.deadline_ns = now_ns + Nanoseconds::from(timeout_ms) * MILLISECOND_NS;
             }
+            is_watched |= of == node;
         }
+        is_watched
     }
 
     /// Stops monitoring the master until its next heartbeat, as after a write of object 1016.
@@ -237,7 +250,7 @@ impl Network {
         self.watched.iter_mut().for_each(|watched| watched.deadline_ns = NEVER);
     }
 
-    /// Answers a node guarding request, if the drive has objects 100C and 100D, and produces no heartbeat.
+    /// Answers a node guarding request, if the node has objects 100C and 100D, and produces no heartbeat.
     pub fn guarded(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) -> Option<u8> {
         let guard_time_ms = dictionary.number_at(self.places.guard_time)? as Nanoseconds;
         let factor = dictionary.number_at(self.places.life_time_factor)? as Nanoseconds;
@@ -252,9 +265,8 @@ impl Network {
         Some(byte)
     }
 
-    /// Whether the master has just been lost. The NMT state has then changed by object 1029; without it an operational node
-    /// becomes pre-operational (CiA 301, 7.5.2.32).
-    pub fn check_master(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) -> bool {
+    /// Whether the master has just been lost: its heartbeat, or its node guarding.
+    pub fn has_lost_master(&mut self, now_ns: Nanoseconds) -> bool {
         let mut is_lost = self.guard_deadline_ns <= now_ns;
         if is_lost {
             self.guard_deadline_ns = NEVER;
@@ -263,13 +275,16 @@ impl Network {
             watched.deadline_ns = NEVER;
             is_lost = true;
         }
-        if is_lost {
-            match dictionary.number_at(self.places.error_behaviour).unwrap_or(0) {
-                0 if self.state == NodeState::Operational => self.state = NodeState::PreOperational,
-                2 => self.state = NodeState::Stopped,
-                _ => {}
-            }
-        }
         is_lost
+    }
+
+    /// Changes the NMT state after a communication error, by object 1029; without it an operational node becomes
+    /// pre-operational (CiA 301, 7.5.2.32).
+    pub fn follow_error_behaviour(&mut self, dictionary: &SimulatedDictionary) {
+        match dictionary.number_at(self.places.error_behaviour).unwrap_or(0) {
+            0 if self.state == NodeState::Operational => self.state = NodeState::PreOperational,
+            2 => self.state = NodeState::Stopped,
+            _ => {}
+        }
     }
 }
