@@ -15,6 +15,8 @@ COUNTS = 2000
 DRIVES = (
     ("eyou-euservo", 50_000, 500_000),
     ("faulhaber-mcbl300x", 3_000, 30_000),
+    # Its velocities are in r/min.
+    ("maxon-epos4", 60, 600),
     ("schunk-lwa4p", 50_000, 500_000),
 )
 
