@@ -253,6 +253,17 @@ fn the_present_position_becomes_zero_by_homing_method_35_or_37() {
 }
 
 #[test]
+fn a_homing_that_is_faster_than_the_limit_of_the_axis_is_refused() {
+    // It holds 100 r/min for the way to the switch, and lists method 17.
+    let mut bench = sheet_bench(&vendor("maxon-epos4.eds"), "");
+    let home = Task::Home { method: Some(17), within_ns: SECOND, is_forced: false };
+    let failed = bench.run(home).unwrap_err();
+    assert!(matches!(failed.failure, Failure::OutsideLimits { .. }), "{failed:?}");
+    assert_eq!(failed.step, "homing speeds");
+    assert_at_rest(&mut bench, "epos4");
+}
+
+#[test]
 fn a_homing_method_without_its_switch_is_an_error_and_an_unknown_one_is_refused() {
     let mut bench = sheet_bench(&vendor("faulhaber-mcbl300x.eds"), "");
     let home = |method, is_forced| Task::Home { method, within_ns: SECOND, is_forced };

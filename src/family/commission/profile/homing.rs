@@ -18,6 +18,9 @@ use crate::family::commission::target::TargetDrive;
 /// 60E3: the methods that the drive has.
 const SUPPORTED_METHODS: u16 = 0x60E3;
 
+/// Homing methods on the present position, without motion. 37 replaces 35 in newer versions of CiA 402.
+pub const PRESENT_POSITION: [i8; 2] = [35, 37];
+
 /// Whether the standard defines the method: switches and index pulses (1 to 14, 17 to 30, 33, 34), the present position (35, 37).
 fn is_standard(method: i8) -> bool {
     matches!(method, 1..=14 | 17..=30 | 33..=35 | 37)
@@ -51,7 +54,9 @@ pub async fn home(
     if !is_forced {
         check_has_method(c, s, method).await?;
     }
-    check_speeds(c, s).await?;
+    if !PRESENT_POSITION.contains(&method) {
+        check_speeds(c, s).await?;
+    }
     with_torque(c, s, false, run(c, s, method, None, within_ns)).await
 }
 
@@ -141,6 +146,7 @@ async fn check_has_method(c: &SdoSession, s: &TargetDrive, method: i8) -> Result
 
 /// Checks the speeds that the drive holds for homing (6099) against the velocity limit of the axis.
 async fn check_speeds(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
+    c.step("homing speeds");
     for object in [HOMING_SPEED_SWITCH, HOMING_SPEED_ZERO] {
         if let Some(speed) = read_if_there(c, s, &object).await? {
             s.check_velocity(s.velocity_raw_of_profile(speed))?;

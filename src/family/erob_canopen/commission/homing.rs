@@ -5,16 +5,13 @@ use takt_rt::{Nanoseconds, OperationMode};
 use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
-use crate::family::commission::profile::homing;
+use crate::family::commission::profile::homing::{self, PRESENT_POSITION};
 use crate::family::commission::profile::motion::with_torque;
 use crate::family::commission::profile::objects::{HOME_OFFSET, HOMING_METHOD};
 use crate::family::commission::profile::words::modes_words;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
-
-/// Homing methods on the current position, without motion. 37 replaces 35 in newer versions of CiA 402.
-const PRESENT_POSITION: [i8; 2] = [35, 37];
 
 /// `home`
 pub async fn home(
