@@ -131,8 +131,14 @@ impl Device {
         (numerator > 0 && divisor > 0).then(|| numerator as f64 / divisor as f64)
     }
 
-    /// Counts of one turn of the reported position: by the feed constant (6092), or else by the resolution of the encoder (608F).
+    /// Counts of one turn of the reported position: by the quirks, by the feed constant (6092), or else by the resolution of the
+    /// encoder (608F).
     pub fn counts_per_turn(&self) -> Option<f64> {
+        let told = self.quirks.counts_per_turn;
+        told.or_else(|| self.counts_by_objects())
+    }
+
+    fn counts_by_objects(&self) -> Option<f64> {
         self.ratio(FEED, FEED_REVOLUTIONS).or_else(|| self.ratio(ENCODER_INCREMENTS, ENCODER_REVOLUTIONS))
     }
 
