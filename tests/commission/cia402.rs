@@ -1,5 +1,6 @@
 //! Commissioning of the drives that are simulated from data sheets.
 
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -8,8 +9,12 @@ use takt::canopen::eds::AccessType;
 use takt::canopen::object::ObjectAddress;
 use takt::commission::dictionary::{self, SelectedObject};
 use takt::commission::{CommandValue, Failure, MoveKind, TargetDrive, Task};
+use takt::config::quirks::Quirks;
 use takt::family::cia402::Device;
-use takt::sim::{DriveFault, SimulatedBus};
+use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
+use takt::sim::homing_switches::{ReferenceSwitches, Switch};
+use takt::sim::plant::{Encoder, JointParameters};
+use takt::sim::{DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{DriveState, OperationMode};
 
 use super::bench::*;
@@ -250,6 +255,82 @@ fn the_present_position_becomes_zero_by_homing_method_35_or_37() {
         homed += 1;
     }
     assert!(homed >= 5, "{homed}");
+}
+
+/// A drive whose joint has limit switches at ±2 rad, a home switch from 0.5 to 1 rad, and an index pulse at 0.
+fn switched_bench(sheet: &Path) -> Bench {
+    let bench = sheet_bench(sheet, "");
+    let counts_per_turn = 16384.0;
+    let joint = Cia402AxisParameters {
+        joint: JointParameters {
+            inertia: 0.05,
+            viscous_friction: 0.05,
+            coulomb_friction: 0.2,
+            brake_torque: 40.0,
+        },
+        encoder: Encoder { counts_per_unit: counts_per_turn / TAU, zero_counts: 0.0 },
+        counts_per_turn,
+        initial_position: 0.2,
+        rated_torque: 10.0,
+        peak_torque: 20.0,
+        highest_velocity: 12.0,
+        switches: ReferenceSwitches {
+            negative_limit: Some(Switch::below(-2.0)),
+            positive_limit: Some(Switch::above(2.0)),
+            home: Some(Switch { from: 0.5, to: 1.0 }),
+            index_distance: Some(TAU),
+        },
+        end_stops: None,
+    };
+    let drive = Cia402Drive::new(Cia402Parameters {
+        sheet: Device::load(sheet, None).unwrap().dictionary,
+        node: NODE,
+        quirks: Quirks::default(),
+        axes: vec![joint],
+        power_up_ns: 5 * MS,
+        feedback_delay_ns: 20_000,
+        seed: 7,
+    });
+    let rates = WireBitRates { nominal: 1_000_000, data: None };
+    Bench::of(bench.target, SimulatedBus::with_drives(rates, u64::MAX, vec![Box::new(drive.unwrap())]))
+}
+
+#[test]
+fn homing_finds_limit_switches_the_home_switch_and_the_index_pulse_and_counts_from_there() {
+    for name in ["faulhaber-mcbl300x.eds", "maxon-epos4.eds"] {
+        // Methods that both drives have, each with the place that it finds: rad.
+        for (method, place) in [(17, -2.0), (18, 2.0), (23, 0.5), (27, 1.0), (33, 0.0)] {
+            let mut bench = switched_bench(&vendor(name));
+            let of = format!("{name}, method {method}");
+            // 6099:1, 6099:2 and 609A, of the EPOS4 in r/min and r/min/s, of the other in counts.
+            let values = if name.starts_with("maxon") { [7, 1, 100] } else { [1800, 180, 16000] };
+            for (object, value) in ["6099:1", "6099:2", "609A"].into_iter().zip(values) {
+                let Ok(SelectedObject::Known(entry)) = dictionary::find(&bench.target.drive, object) else {
+                    panic!("{of}")
+                };
+                let write = Task::Write { object: entry.object, value, entry: Some(entry) };
+                bench.run(write).unwrap_or_else(|error| panic!("{of}: {error}"));
+            }
+            let home = Task::Home { method: Some(method), within_ns: 60 * SECOND, is_forced: false };
+            let report = bench.run(home).unwrap_or_else(|error| panic!("{of}: {error}"));
+            let seen = bench.observe();
+            assert!((seen.position - place).abs() < 0.05, "{of}: {seen:?} {report:?}");
+            let counted = number(&report, "home_counts") / (16384.0 / TAU);
+            assert!((seen.position - place - counted).abs() < 0.01, "{of}: {seen:?} {report:?}");
+            assert_at_rest(&mut bench, &of);
+        }
+    }
+}
+
+#[test]
+fn a_homing_that_does_not_end_in_its_time_is_stopped() {
+    let mut bench = switched_bench(&vendor("faulhaber-mcbl300x.eds"));
+    let Ok(SelectedObject::Known(entry)) = dictionary::find(&bench.target.drive, "6099:1") else { panic!() };
+    bench.run(Task::Write { object: entry.object, value: 100, entry: Some(entry) }).unwrap();
+    let home = Task::Home { method: Some(17), within_ns: SECOND, is_forced: false };
+    let failed = bench.run(home).unwrap_err();
+    assert!(matches!(failed.failure, Failure::NotInTime { what: "the end of homing", .. }), "{failed:?}");
+    assert_at_rest(&mut bench, "faulhaber");
 }
 
 #[test]
