@@ -32,8 +32,9 @@
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
+//! faults                              faults on purpose
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
-//! faults link sim                     faults on purpose; sockets; simulated buses and drives
+//! link sim                            sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! canopen erob_can                    CiA 301, 305 and 306; eRob's own protocol; both without I/O

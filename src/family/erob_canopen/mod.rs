@@ -18,7 +18,7 @@ use crate::erob_can::entries;
 use crate::erob_can::frame::{self, Request};
 use crate::family::bring_up::AxisSession;
 use crate::family::commission::dictionary::ObjectEntry;
-use crate::family::commission::{SdoSession, TargetDrive, Task};
+use crate::family::commission::{SdoSession, TargetDrive, Task, profile};
 use crate::sim::Drive;
 use crate::sim::erob::{ErobJoint, ErobParameters};
 
@@ -76,8 +76,8 @@ impl Family for ErobCanopen {
         commission::OBJECTS
     }
 
-    fn meaning(&self, object: &Object, value: i64) -> Option<String> {
-        commission::meaning(object, value)
+    fn meaning(&self, drive: &DriveFamily, object: &Object, value: i64) -> Option<String> {
+        profile::objects::meaning(drive, object, value)
     }
 
     fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {

@@ -1,10 +1,11 @@
-//! Motion of an eRob: every motion is prepared, monitored and ended at standstill.
+//! Motion: every one is prepared, monitored and ended at standstill.
 
 pub mod position;
 pub mod torque;
 
 use takt_rt::{Nanoseconds, OperationMode};
 
+use super::access::read_if_there;
 use super::{enabling, reading};
 use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
@@ -17,10 +18,10 @@ use crate::family::commission::target::{CommandValue, TargetDrive};
 use crate::procedure::AxisReading;
 
 /// Interval between two readings of a moving axis.
-const POLL_NS: Nanoseconds = 20_000_000;
+pub const POLL_NS: Nanoseconds = 20_000_000;
 
 /// Checks the drive, runs `work`, and disables the drive at standstill afterwards.
-pub(super) async fn with_torque(
+pub async fn with_torque(
     c: &SdoSession,
     s: &TargetDrive,
     keeps_enabled: bool,
@@ -42,8 +43,7 @@ pub async fn enable(
         let rated = begin(c, s, OperationMode::ProfilePosition, &DriveProfile::default()).await?;
         let position = enabling::enable(c, s).await?;
         if keeps_enabled {
-            // The watchdog is disarmed, because the heartbeat ends with this program.
-            c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
+            enabling::disarm_watchdog(c, s).await?;
         } else {
             c.step("hold");
             poll_until(c, s, rated, hold_ns, POLL_NS, |_| Ok(())).await?;
@@ -102,6 +102,7 @@ async fn run_at(
     duration_ns: Option<Nanoseconds>,
     keeps_enabled: bool,
 ) -> Result<Report, Failure> {
+    check_velocity_is_shown(s)?;
     let rated = begin(c, s, OperationMode::ProfileVelocity, &profile).await?;
     let began = enabling::enable(c, s).await?;
     s.check_direction(began, raw)?;
@@ -117,16 +118,25 @@ async fn run_at(
     c.write(&TARGET_VELOCITY, 0).await?;
     let deceleration = match profile.deceleration {
         Some(deceleration) => deceleration,
-        None => c.read(&PROFILE_DECELERATION).await?,
+        None => read_if_there(c, s, &PROFILE_DECELERATION).await?.unwrap_or(1),
     };
-    let within_ns = s.stopping_ns(raw, deceleration.max(1));
-    let slow = (raw.abs() / 100).max(200);
-    c.wait_for(&VELOCITY_ACTUAL_VALUE, "standstill", within_ns, |velocity| velocity.abs() <= slow).await?;
+    enabling::wait_for_standstill(c, s, s.stopping_ns(raw, deceleration.max(1))).await?;
     if keeps_enabled {
-        c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
+        enabling::disarm_watchdog(c, s).await?;
     }
     let ended = c.read(&POSITION_ACTUAL_VALUE).await?;
     Ok(polling::run_report(s, raw, fastest, began, ended))
+}
+
+/// A motion without a target is stopped before a limit only if the drive shows its velocity.
+fn check_velocity_is_shown(s: &TargetDrive) -> Result<(), Failure> {
+    if s.has(VELOCITY_ACTUAL_VALUE.address) {
+        return Ok(());
+    }
+    Err(Failure::Unsupported {
+        what: "this drive does not show its velocity (606C)".to_owned(),
+        instead: "move it to a position, which its own profile limits".to_owned(),
+    })
 }
 
 /// Prepares the drive and reads its rated torque.
@@ -137,7 +147,7 @@ async fn begin(
     profile: &DriveProfile,
 ) -> Result<Option<f64>, Failure> {
     enabling::prepare(c, s, mode, profile).await?;
-    reading::rated_torque(c).await
+    reading::rated_torque(c, s).await
 }
 
 /// Polls an enabled axis for a time.

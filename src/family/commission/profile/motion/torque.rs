@@ -2,14 +2,14 @@
 
 use takt_rt::{Nanoseconds, OperationMode};
 
-use super::{begin, poll_until, with_torque};
+use super::{begin, check_velocity_is_shown, poll_until, with_torque};
 use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::DriveProfile;
+use crate::family::commission::profile::{enabling, reading};
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::{CommandValue, TargetDrive};
-use crate::family::erob_canopen::commission::enabling;
 
 /// Interval between two readings; short, because an unloaded joint accelerates quickly.
 const POLL_NS: Nanoseconds = 2_000_000;
@@ -35,16 +35,17 @@ pub async fn run(
     })?;
     s.check_velocity(limit)?;
     let limit = s.velocity(limit as f64).abs();
+    check_velocity_is_shown(s)?;
     let work = async {
         let rated = begin(c, s, OperationMode::ProfileTorque, &DriveProfile::default()).await?;
         let Some(rated) = rated else {
             return Err(Failure::Unsupported {
                 what: "the drive does not report its rated torque (6076)".to_owned(),
-                instead: "torque cannot be commanded without it".to_owned(),
+                instead: "say it in the configuration: [axis.joint] rated_torque".to_owned(),
             });
         };
         let per_mille = per_mille(s, torque, rated)?;
-        let real = super::reading::torque(s, Some(rated), per_mille).unwrap_or(0.0);
+        let real = reading::torque(s, Some(rated), per_mille).unwrap_or(0.0);
         s.check_torque(real)?;
         let began = enabling::enable(c, s).await?;
         c.step("torque");

@@ -1,9 +1,11 @@
-//! Enabling and disabling an eRob, with the checks before motion.
+//! Enabling and disabling, with the checks before motion.
 
 use takt_rt::{DriveState, Nanoseconds, OperationMode, controlword};
 
+use super::access::{read_if_there, write_if_writable};
+use super::objects::ABORT_CONNECTION_OPTION;
 use super::reading;
-use super::state::modes_words;
+use super::words::modes_words;
 use crate::canopen::nmt::NmtCommand;
 use crate::canopen::objects::*;
 use crate::family::commission::contact;
@@ -20,6 +22,10 @@ const MASTER: u8 = 127;
 /// Heartbeat period and the drive's heartbeat timeout (object 1016:01).
 const HEARTBEAT_NS: Nanoseconds = 100_000_000;
 const HEARTBEAT_TIMEOUT_MS: i64 = 500;
+/// Value of object 6007: the drive reacts as to a fault.
+const FAULT_SIGNAL: i64 = 1;
+/// How long a drive may move on after a quick stop, if it does not show its velocity.
+const UNSEEN_STANDSTILL_NS: Nanoseconds = 500_000_000;
 /// Wait after NMT start; the drive changes state at once.
 const NMT_PAUSE_NS: Nanoseconds = 20_000_000;
 
@@ -32,7 +38,7 @@ pub async fn state(c: &SdoSession) -> Result<DriveState, Failure> {
 pub async fn check_ready(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
     contact::connect_family(c, s).await?;
     c.step("fault check");
-    if state(c).await?.is_faulted() { Err(reading::fault(c).await?) } else { Ok(()) }
+    if state(c).await?.is_faulted() { Err(reading::fault(c, s).await?) } else { Ok(()) }
 }
 
 /// Disables the drive, sets the mode and the profile, and arms the drive's heartbeat watchdog.
@@ -44,11 +50,14 @@ pub async fn prepare(
 ) -> Result<(), Failure> {
     come_to_rest(c, s).await?;
     c.step("supported modes");
-    let supported = c.read(&SUPPORTED_DRIVE_MODES).await? as u32;
-    if supported & mode.supported_bit() == 0 {
+    let supported = read_if_there(c, s, &SUPPORTED_DRIVE_MODES).await?.unwrap_or(0) as u32;
+    if supported & mode.supported_bit() == 0 && !s.adds_mode(mode) {
         return Err(Failure::Unsupported {
             what: format!("this drive has no {} mode", mode.name()),
-            instead: format!("6502 names {}", modes_words(supported)),
+            instead: match supported {
+                0 => "its data sheet tells which modes it has".to_owned(),
+                _ => format!("6502 names {}", modes_words(supported)),
+            },
         });
     }
     c.step("NMT start");
@@ -57,31 +66,41 @@ pub async fn prepare(
     arm_watchdog(c, s).await?;
     c.step("mode of operation");
     c.write(&MODES_OF_OPERATION, mode as i64).await?;
-    c.wait_for(&MODES_OF_OPERATION_DISPLAY, "the mode", STATE_NS, |value| value == mode as i64).await?;
+    if s.has(MODES_OF_OPERATION_DISPLAY.address) {
+        let is_shown = |value| value == mode as i64;
+        c.wait_for(&MODES_OF_OPERATION_DISPLAY, "the mode", STATE_NS, is_shown).await?;
+    }
     c.step("profile");
     for (object, value) in [
-        (PROFILE_VELOCITY, profile.velocity),
+        (PROFILE_VELOCITY, profile.velocity.map(|velocity| s.profile_velocity_raw(velocity))),
         (PROFILE_ACCELERATION, profile.acceleration),
         (PROFILE_DECELERATION, profile.deceleration),
         (QUICK_STOP_DECELERATION, s.stopping_deceleration()),
     ] {
         if let Some(value) = value {
-            c.write(&object, value).await?;
+            write_if_writable(c, s, &object, value).await?;
         }
     }
     Ok(())
 }
 
-/// Arms the heartbeat watchdog (1016:01, 1029:01): without this program's heartbeat the drive enters NMT stopped, which
-/// stops its motion.
+/// Arms the heartbeat watchdog (1016:01, 1029:01, 6007): without this program's heartbeat the drive enters NMT stopped and
+/// reacts as to a fault, which stops its motion.
 async fn arm_watchdog(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
     if s.node == MASTER {
         c.note("node 127 cannot use the heartbeat watchdog: if this program ends unexpectedly, the drive keeps moving");
         return Ok(());
     }
+    if !s.is_writable(CONSUMER_HEARTBEAT_TIME.address) {
+        c.note(
+            "this drive has no heartbeat watchdog (1016): if this program ends unexpectedly, the drive keeps moving",
+        );
+        return Ok(());
+    }
     c.step("heartbeat");
     c.set_heartbeat(MASTER, Some(HEARTBEAT_NS));
-    c.write(&COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
+    write_if_writable(c, s, &COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
+    write_if_writable(c, s, &ABORT_CONNECTION_OPTION, FAULT_SIGNAL).await?;
     c.write(&CONSUMER_HEARTBEAT_TIME, i64::from(MASTER) << 16 | HEARTBEAT_TIMEOUT_MS).await
 }
 
@@ -89,9 +108,9 @@ async fn arm_watchdog(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
 pub async fn enable(c: &SdoSession, s: &TargetDrive) -> Result<i64, Failure> {
     c.step("target at the actual position");
     let position = c.read(&POSITION_ACTUAL_VALUE).await?;
-    c.write(&TARGET_POSITION, position).await?;
-    c.write(&TARGET_VELOCITY, 0).await?;
-    c.write(&TARGET_TORQUE, 0).await?;
+    for (target, value) in [(TARGET_POSITION, position), (TARGET_VELOCITY, 0), (TARGET_TORQUE, 0)] {
+        write_if_writable(c, s, &target, value).await?;
+    }
     c.step("enable");
     for (word, wanted, what) in [
         (controlword::SHUTDOWN, DriveState::ReadyToSwitchOn, "ready to switch on"),
@@ -105,12 +124,11 @@ pub async fn enable(c: &SdoSession, s: &TargetDrive) -> Result<i64, Failure> {
         })
         .await?;
         if state(c).await?.is_faulted() {
-            return Err(reading::fault(c).await?);
+            return Err(reading::fault(c, s).await?);
         }
     }
     let moved = c.read(&POSITION_ACTUAL_VALUE).await?.saturating_sub(position);
-    let permitted = (s.counts_per_turn / 360.0) as i64;
-    if moved.abs() > permitted { Err(Failure::Jumped { counts: moved }) } else { Ok(position) }
+    if moved.abs() > s.near_counts() { Err(Failure::Jumped { counts: moved }) } else { Ok(position) }
 }
 
 /// Stops any motion by quick stop, then disables. Does nothing to a drive without torque.
@@ -121,20 +139,37 @@ pub async fn come_to_rest(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure
     c.step("stop in control");
     let deceleration = match s.stopping_deceleration() {
         Some(deceleration) => {
-            c.write(&QUICK_STOP_DECELERATION, deceleration).await?;
+            write_if_writable(c, s, &QUICK_STOP_DECELERATION, deceleration).await?;
             deceleration
         }
-        None => c.read(&QUICK_STOP_DECELERATION).await?,
+        None => read_if_there(c, s, &QUICK_STOP_DECELERATION).await?.unwrap_or(1),
     };
-    let velocity = c.read(&VELOCITY_ACTUAL_VALUE).await?;
+    let velocity = read_if_there(c, s, &VELOCITY_ACTUAL_VALUE).await?;
     c.write(&CONTROLWORD, controlword::QUICK_STOP.into()).await?;
-    let within_ns = s.stopping_ns(velocity, deceleration.max(1));
-    let standstill_threshold = standstill_threshold(s);
-    c.wait_for(&VELOCITY_ACTUAL_VALUE, "standstill", within_ns, |velocity| {
-        velocity.abs() <= standstill_threshold
-    })
-    .await?;
+    match velocity {
+        Some(velocity) => {
+            let within_ns = s.stopping_ns(velocity, deceleration.max(1));
+            wait_for_standstill(c, s, within_ns).await?;
+        }
+        None => c.pause(UNSEEN_STANDSTILL_NS).await?,
+    }
     torque_off(c).await
+}
+
+/// Waits until the velocity (606C) is almost zero.
+pub async fn wait_for_standstill(
+    c: &SdoSession,
+    s: &TargetDrive,
+    within_ns: Nanoseconds,
+) -> Result<(), Failure> {
+    let threshold = standstill_threshold(s);
+    let is_slow = |velocity: i64| velocity.abs() <= threshold;
+    c.wait_for(&VELOCITY_ACTUAL_VALUE, "standstill", within_ns, is_slow).await.map(|_| ())
+}
+
+/// Leaves the drive enabled without a watchdog, because the heartbeat ends with this program.
+pub async fn disarm_watchdog(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
+    write_if_writable(c, s, &CONSUMER_HEARTBEAT_TIME, 0).await.map(|_| ())
 }
 
 /// Disables at once (controlword: disable voltage). Bit 7 stays low, so that a later fault reset is a rising edge.
@@ -149,16 +184,21 @@ pub async fn torque_off(c: &SdoSession) -> Result<(), Failure> {
 pub async fn shut_down(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
     come_to_rest(c, s).await?;
     c.step("shut down");
-    c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
+    disarm_watchdog(c, s).await?;
     c.set_heartbeat(MASTER, None);
     c.command(NmtCommand::EnterPreOperational);
     Ok(())
 }
 
-/// Standstill threshold in drive units, a hundredth of the velocity limit. Below it the brake may engage.
+/// Standstill threshold in drive units: a hundredth of the velocity limit, or else a degree of a turn per second. Below it
+/// the brake may engage.
 fn standstill_threshold(s: &TargetDrive) -> i64 {
-    let limit = s.limits.map(|limits| s.velocity_raw(CommandValue::Joint(limits.velocity)).abs() / 100);
-    limit.unwrap_or((s.counts_per_turn / 360.0) as i64)
+    let units = |velocity: f64| s.velocity_raw(CommandValue::Joint(velocity)).abs();
+    let threshold = match s.limits {
+        Some(limits) => units(limits.velocity) / 100,
+        None => units(s.near_counts() as f64 / s.scale.resolution()),
+    };
+    threshold.max(1)
 }
 
 /// `disable`

@@ -1,21 +1,20 @@
-//! Clears the turn count, and stores the parameters.
+//! Clears the turn count of the multi-turn encoder.
 
 use takt_rt::Nanoseconds;
 
-use super::enabling::state;
-use super::objects::{MULTI_TURN_RESET, STORE};
-use super::state::SAVE_SIGNATURE;
+use super::objects::MULTI_TURN_RESET;
+use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
+use crate::family::commission::profile::enabling::state;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
+use crate::family::erob_canopen::MULTI_TURN_BATTERY;
 
-/// Time for which the supply must stay on after the store command.
-const STORING_NS: Nanoseconds = 3_000_000_000;
 /// Longest time until the turn count is cleared.
 const ZEROING_NS: Nanoseconds = 500_000_000;
 
@@ -49,8 +48,24 @@ pub async fn zero(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Result
     Ok(report)
 }
 
+/// Before the fault reset: a multi-turn battery fault needs object 2242, which clears the turn count.
+pub async fn before_fault_reset(c: &SdoSession, code: ErrorCode, is_confirmed: bool) -> Result<(), Failure> {
+    if code != MULTI_TURN_BATTERY {
+        return Ok(());
+    }
+    if !is_confirmed {
+        return Err(Failure::NeedsConsent {
+            consequence: "the battery of the multi-turn encoder is empty or was disconnected; clearing this fault \
+                          (2242 = 1) clears the count of turns too, and the joint's zero must be set again",
+            option: "--yes",
+        });
+    }
+    c.step("clear the count of turns");
+    clear_turns(c).await
+}
+
 /// Writes 2242 = 1. The object's type is not published, so a length error leads to another attempt with another length.
-pub async fn clear_turns(c: &SdoSession) -> Result<(), Failure> {
+async fn clear_turns(c: &SdoSession) -> Result<(), Failure> {
     let mut outcome = c.write(&MULTI_TURN_RESET, 1).await;
     for data_type in [DataType::U8, DataType::U32] {
         if !matches!(
@@ -67,24 +82,4 @@ pub async fn clear_turns(c: &SdoSession) -> Result<(), Failure> {
         outcome = c.write(&Object { data_type, ..MULTI_TURN_RESET }, 1).await;
     }
     outcome
-}
-
-/// `save`: writes "save" to 1010:1 and waits three seconds.
-pub async fn save(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
-    contact::connect_family(c, s).await?;
-    c.step("state");
-    if state(c).await?.has_torque() {
-        return Err(Failure::Enabled);
-    }
-    c.step("store");
-    c.write_once(&STORE, SAVE_SIGNATURE).await?;
-    c.note("do not cut the supply for 3 s");
-    let paused = c.pause(STORING_NS).await;
-    if paused.is_err() {
-        c.note("the drive is still storing the parameters: do not cut the supply yet");
-    }
-    paused?;
-    let mut report = Report::new();
-    report.add("stored", "stored", true, "the parameters that can be stored");
-    Ok(report)
 }

@@ -1,11 +1,8 @@
-//! Names of statusword bits, controlword bits, modes and errors of an eRob.
+//! Names of statusword bits, controlword bits and modes.
 
 use takt_rt::{Command, DriveState, OperationMode, controlword, statusword};
 
-/// The signature for 1010:1: "save" in little-endian order.
-pub const SAVE_SIGNATURE: i64 = 0x6576_6173;
-
-/// State and bits of a statusword. Bits 7 and 12 are often set without a reason on this drive.
+/// State and bits of a statusword. What bit 12 means depends on the mode, so it is not named.
 pub fn statusword_words(word: u16) -> String {
     let bits = [
         (statusword::WARNING, "warning"),

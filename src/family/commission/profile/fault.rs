@@ -1,25 +1,28 @@
-//! Clears a fault by a rising edge of controlword bit 7; a multi-turn battery fault needs object 2242 first.
+//! Clears a fault by a rising edge of controlword bit 7.
 
 use takt_rt::{DriveState, Nanoseconds, controlword};
 
 use super::enabling::state;
-use super::reading::{cure, error_code, summary};
-use super::upkeep::clear_turns;
+use super::reading::{error_code, summary};
+use crate::canopen::emcy::ErrorCode;
 use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
-use crate::family::erob_canopen::{MULTI_TURN_BATTERY, error_text};
 
 /// Controlword bit 7 must stay set for several cycles of the drive.
 const EDGE_NS: Nanoseconds = 50_000_000;
 /// Longest time from the fault reset until the fault state ends; the fault reaction may still be active.
 const CLEARING_NS: Nanoseconds = 1_000_000_000;
 
-/// `clear-fault`
-pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Result<Report, Failure> {
+/// `clear-fault`. `before` is what this fault needs before the reset.
+pub async fn clear(
+    c: &SdoSession,
+    s: &TargetDrive,
+    before: impl AsyncFnOnce(ErrorCode) -> Result<(), Failure>,
+) -> Result<Report, Failure> {
     contact::connect_family(c, s).await?;
     c.step("fault");
     let mut report = Report::new();
@@ -28,19 +31,9 @@ pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Resul
         report.append(summary(c, s).await?);
         return Ok(report);
     }
-    let code = error_code(c).await?;
-    report.add("fault", "fault", format!("0x{:04X}", code.0), error_text(code));
-    if code == MULTI_TURN_BATTERY {
-        if !is_confirmed {
-            return Err(Failure::NeedsConsent {
-                consequence: "the battery of the multi-turn encoder is empty or was disconnected; clearing this fault \
-                              (2242 = 1) clears the count of turns too, and the joint's zero must be set again",
-                option: "--yes",
-            });
-        }
-        c.step("clear the count of turns");
-        clear_turns(c).await?;
-    }
+    let code = error_code(c, s).await?;
+    report.add("fault", "fault", format!("0x{:04X}", code.0), s.error_words(code.0));
+    before(code).await?;
     c.step("fault reset");
     c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
     c.write(&CONTROLWORD, controlword::FAULT_RESET.into()).await?;
@@ -50,8 +43,9 @@ pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Resul
     c.write(&CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
     match cleared {
         Err(Failure::NotInTime { .. }) => {
-            let code = error_code(c).await?;
-            return Err(Failure::FaultPersists { what: error_text(code), advice: Some(cure(code)) });
+            let code = error_code(c, s).await?.0;
+            let advice = Some(s.error_cure(code));
+            return Err(Failure::FaultPersists { what: s.error_words(code), advice });
         }
         other => other?,
     };

@@ -2,16 +2,18 @@
 
 use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
 
+use super::super::access::read_if_there;
+use super::super::objects::POSITION_WINDOW;
 use super::{POLL_NS, begin, with_torque};
 use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::{DriveProfile, MotionProfile};
 use crate::family::commission::polling;
+use crate::family::commission::profile::{enabling, reading};
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
 use crate::family::commission::task::MoveKind;
-use crate::family::erob_canopen::commission::{enabling, reading};
 
 /// Longest time until the drive acknowledges a set-point (statusword bit 12).
 const ACKNOWLEDGE_NS: Nanoseconds = 1_000_000_000;
@@ -29,7 +31,7 @@ pub async fn run(
     let is_immediate = matches!(kind, MoveKind::Absolute { is_immediate: true, .. });
     let work = async {
         let rated = begin(c, s, OperationMode::ProfilePosition, &profile).await?;
-        let profile = complete(c, profile).await?;
+        let profile = complete(c, s, profile).await?;
         c.step("plan the move");
         let here = c.read(&POSITION_ACTUAL_VALUE).await?;
         let (target, stops, dwell_ns) = match kind {
@@ -50,7 +52,7 @@ pub async fn run(
             c.pause(dwell_ns).await?;
         }
         if keeps_enabled {
-            c.write(&CONSUMER_HEARTBEAT_TIME, 0).await?;
+            enabling::disarm_watchdog(c, s).await?;
         }
         let reached = c.read(&POSITION_ACTUAL_VALUE).await?;
         Ok(polling::move_report(s, here, target, stops, reached - at))
@@ -59,17 +61,20 @@ pub async fn run(
 }
 
 /// Reads from the drive what the profile leaves open.
-async fn complete(c: &SdoSession, profile: DriveProfile) -> Result<DriveProfile, Failure> {
+async fn complete(c: &SdoSession, s: &TargetDrive, profile: DriveProfile) -> Result<DriveProfile, Failure> {
     let velocity = match profile.velocity {
         Some(velocity) => velocity,
-        None => c.read(&PROFILE_VELOCITY).await?,
+        None => s.velocity_raw_of_profile(c.read(&PROFILE_VELOCITY).await?),
     };
     if velocity <= 0 {
         return Err(Failure::Missing { what: "--velocity", why: "the drive's profile velocity (6081) is 0" });
     }
     let acceleration = match (profile.acceleration, profile.deceleration) {
         (Some(acceleration), Some(deceleration)) => acceleration.min(deceleration),
-        _ => c.read(&PROFILE_ACCELERATION).await?.min(c.read(&PROFILE_DECELERATION).await?),
+        _ => {
+            let acceleration = c.read(&PROFILE_ACCELERATION).await?;
+            acceleration.min(read_if_there(c, s, &PROFILE_DECELERATION).await?.unwrap_or(acceleration))
+        }
     };
     Ok(DriveProfile { velocity: Some(velocity), acceleration: Some(acceleration.max(1)), ..profile })
 }
@@ -98,7 +103,8 @@ async fn arrive(
     c.step("move");
     let (velocity, acceleration) = (profile.velocity.unwrap_or(1), profile.acceleration.unwrap_or(1));
     let within_ns = s.longest_ns(to - from, velocity, acceleration);
-    let near = (s.counts_per_turn / 360.0) as i64;
+    // The drive says when it is there (bit 10); its window (6067) may be wider than a degree.
+    let near = read_if_there(c, s, &POSITION_WINDOW).await?.unwrap_or(0).max(s.near_counts());
     let began_ns = c.now_ns();
     loop {
         let reading = reading::read_enabled(c, s, rated).await?;
