@@ -67,7 +67,14 @@ pub mod doctor {
     pub use crate::doctor::*;
 }
 
+pub mod erob_can {
+    pub use crate::erob_can::*;
+}
+
 pub mod family {
+    pub mod erob_can {
+        pub use crate::family::erob_can::*;
+    }
     pub mod bring_up {
         pub use crate::family::bring_up::stages::*;
     }
@@ -84,12 +91,20 @@ pub mod link {
     }
 }
 
+pub mod procedure {
+    pub use crate::procedure::{ErobCanSession, Procedure, ProcedureError, ProcedureEvent};
+}
+
 pub mod schedule {
     pub use crate::frame_time::*;
     pub use crate::schedule::response_time::*;
 }
 
 pub mod sim {
+    pub use crate::sim::object_dictionary::table::ObjectRow;
+    pub mod erob_can {
+        pub use crate::sim::erob_can::*;
+    }
     pub use crate::sim::mailbox::*;
     pub use crate::sim::medium::*;
     pub use crate::sim::wire_length::*;

@@ -10,6 +10,7 @@ use takt::config::Config;
 use takt::internals::canopen::lss::{LssRequest, LssResponse};
 use takt::internals::canopen::sdo::{SdoClient, SdoRequest, SdoResponse};
 use takt::internals::canopen::time::TimeOfDay;
+use takt::internals::erob_can::frame::{ReceivedRequest, Reply, Request};
 use takt::sim::SimulatedBus;
 use takt_rt::{
     BusPort, DriveState, Frame, Id, MAX_OBJECTS, MappedObject, Mapping, ProcessImage, ReceiveBatch,
@@ -53,6 +54,16 @@ fn decode(mut input: Input<'_>) {
         }
         if let Some((node, response)) = SdoResponse::decode(&frame) {
             assert_eq!(SdoResponse::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
+        }
+        if let Some(received) = ReceivedRequest::decode(&frame) {
+            let request = match received.value {
+                Some(value) => Request::Write(received.address, value),
+                None => Request::Read(received.address),
+            };
+            assert_eq!(ReceivedRequest::decode(&request.frame(received.node)), Some(received), "{frame:?}");
+        }
+        if let Some(reply) = Reply::decode(frame.payload()) {
+            assert_eq!(Reply::decode(reply.frame(NODE).payload()), Some(reply), "{frame:?}");
         }
         if let Some(request) = LssRequest::decode(&frame) {
             assert_eq!(LssRequest::decode(&request.frame()), Some(request), "{frame:?}");

@@ -8,9 +8,11 @@
 //!     arbitration           │
 //!     who sends, when       │
 //!     mailbox  wire        cia402 ── any CiA 402 drive, made from its electronic data sheet
-//!                          erob, yz_aim ── drives of their own, by their manuals and field experience
+//!                          erob, erob_can, yz_aim ── drives of their own, by their manuals and field experience
 //!     frames   bits,        │
-//!     waiting  stuffing   servo ── position, velocity and torque loops
+//!     waiting  stuffing     ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
+//!                           │     canopen_node ── these together, for the drives with CiA 402
+//!                         motion ── ramps, profiles, interpolation; servo ── position, velocity and torque loops
 //!                           │
 //!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
 //! ```
@@ -37,18 +39,26 @@
 //! # Ok::<(), takt::ConfigError>(())
 //! ```
 
+mod canopen_node;
 pub mod cia402;
 mod defect;
 mod drive;
 pub(crate) mod erob;
+#[cfg_attr(not(feature = "internals"), allow(dead_code, unnameable_types, reason = "no family uses it yet"))]
+pub(crate) mod erob_can;
+mod errors;
+mod feedback_defects;
 pub mod homing_switches;
 #[cfg(feature = "cli")]
 pub(crate) mod live;
+mod loops;
 #[cfg(feature = "cli")]
 pub(crate) mod lss;
 pub(crate) mod mailbox;
 pub(crate) mod medium;
-mod object_dictionary;
+mod motion;
+mod network;
+pub(crate) mod object_dictionary;
 mod pdo_engine;
 pub mod plant;
 mod port;

@@ -24,7 +24,7 @@ use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config};
 use crate::family::{self, SettingUp};
-use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, ProcedureError, SdoQuirks};
+use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, ProcedureError};
 
 /// The target of what is told of bring-up and shutdown.
 const BRING_UP: &str = "takt::bring_up";
@@ -387,8 +387,7 @@ impl Part {
 }
 
 fn session(axis: &Axis, timing: BringUpTiming) -> CanopenSession {
-    let quirks = SdoQuirks { timing: timing.sdo, ..family::of(&axis.drive).sdo_quirks() };
-    CanopenSession::new(CanopenClient::new(axis.node, quirks))
+    CanopenSession::new(CanopenClient::new(axis.node, family::sdo_quirks(&axis.drive, timing.sdo)))
 }
 
 /// Carries out a part, and watches for restarts of the drive: its configuration is then done again, and another part

@@ -5,7 +5,8 @@
 //!            │
 //!       sdo_session ── transfers, pauses and conditions to await, each of which may be interrupted
 //!            │
-//!         family ── one folder a family: objects, alarms, motions
+//!        profile ── the tasks of every drive that keeps to CiA 402
+//!         family ── one folder a family: objects, alarms, motions of its own
 //!            │
 //!     target, motion_profile ── units and limits of the axis
 //! ```
@@ -23,6 +24,7 @@ pub(super) mod motion_profile;
 #[cfg(feature = "cli")]
 pub(super) mod objects;
 pub(super) mod polling;
+pub(super) mod profile;
 pub(super) mod report;
 #[cfg(feature = "cli")]
 pub(crate) mod running;

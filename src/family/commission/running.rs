@@ -1,6 +1,7 @@
 //! The procedure that carries out a task.
 
 use super::{Failure, Report, SdoSession, TargetDrive, Task, objects};
+use crate::family;
 use crate::procedure::{self, CanopenClient, CanopenSession};
 
 /// A running procedure of commissioning.
@@ -11,7 +12,8 @@ pub type ProcedureError = procedure::ProcedureError<Failure>;
 
 /// The procedure that carries out a task with this drive.
 pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
-    let session = CanopenSession::new(CanopenClient::new(target.node, target.family().sdo_quirks()));
+    let quirks = family::sdo_quirks(&target.drive, target.family().sdo_quirks().timing);
+    let session = CanopenSession::new(CanopenClient::new(target.node, quirks));
     let c = SdoSession::new(session.clone());
     Procedure::new(session, async move {
         match task {
