@@ -69,7 +69,7 @@ mod wire;
 pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
-    ModeCondition, Pdo, SenderByte, TorqueLimits,
+    ModeCondition, Pdo, SenderByte, Supervision, TorqueLimits,
 };
 pub use bit_fields::{
     BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits, FieldDrive,

@@ -1,5 +1,6 @@
 //! `takt check`: everything that can be known before motion.
 
+mod supervision;
 mod text;
 mod unattended;
 
@@ -14,6 +15,7 @@ use takt::schedule::{self, BusSchedule};
 use super::exit::Exit;
 use super::print;
 use super::usage_error::UsageError;
+use supervision::SupervisionCheck;
 use unattended::Unattended;
 
 /// Check a configuration: limits, units, bus load, and the worst-case response time of every message
@@ -109,6 +111,8 @@ struct AxisCheck {
     compliance: Option<ComplianceCheck>,
     /// How far off its target a program may leave it.
     target_tolerance: f64,
+    /// How drive and controller see that the other one is there.
+    supervision: SupervisionCheck,
     /// What it does when the controller is gone.
     without_controller: Unattended,
     counts_per_unit: f64,
@@ -197,6 +201,7 @@ impl AxisCheck {
             },
             compliance: ComplianceCheck::of(axis),
             target_tolerance: axis.target_tolerance,
+            supervision: SupervisionCheck::of(axis, config),
             without_controller: Unattended::of(axis, config),
             counts_per_unit,
             resolution: 1.0 / counts_per_unit,

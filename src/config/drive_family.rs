@@ -13,6 +13,7 @@ use takt_rt::{Cia402Codec, MappedObject, ModeCondition, OperationMode};
 
 use super::model::{Control, Identity};
 use super::read::section::Section;
+use super::supervision::ErrorControl;
 
 /// A family of drives: the word for it in a configuration, and what is known of its drives.
 #[derive(Clone)]
@@ -66,6 +67,10 @@ pub struct DriveFacts {
     pub reports_mode: bool,
     /// Whether the drives can be told to answer set-points alone, and not SYNC (`answers_sync`).
     pub may_ignore_sync: bool,
+    /// How the drives show that they live, beside their feedback.
+    pub error_control: ErrorControl,
+    /// Whether the drives can watch the heartbeat of the controller (object 1016).
+    pub consumes_heartbeat: bool,
     /// Whether the drives have emergency objects.
     pub sends_emergencies: bool,
     /// Whether the drives may be operational after power-up, without an NMT command.
@@ -177,6 +182,8 @@ impl DriveFacts {
             has_fixed_process_data: false,
             reports_mode: true,
             may_ignore_sync: false,
+            error_control: ErrorControl::Heartbeat { fixed_ms: None },
+            consumes_heartbeat: true,
             sends_emergencies: true,
             may_power_up_operational: false,
             codec: Cia402Codec::STANDARD,

@@ -24,6 +24,7 @@ mod rules;
 mod scale;
 mod spelling;
 pub(crate) mod spot;
+mod supervision;
 
 use std::fmt;
 use std::path::Path;
@@ -38,6 +39,7 @@ pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
 pub(crate) use read::{Knowledge, parse};
+pub use supervision::{ErrorControl, Supervision};
 
 use thiserror::Error;
 

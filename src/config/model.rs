@@ -235,7 +235,8 @@ pub struct Axis {
     /// The longest time from SYNC until the drive has its feedback ready to be sent. Default 20 µs.
     pub feedback_delay_ns: u64,
     /// Period of the drive's own heartbeat (object 1017); `None`, the default, leaves it off: feedback in every cycle
-    /// proves the drive alive without loading the bus.
+    /// proves the drive alive without loading the bus. A drive without a heartbeat is asked at this period instead, by default at
+    /// that of the controller's heartbeat: node guarding, see [`Axis::supervision`].
     pub heartbeat_ns: Option<u64>,
     /// What is known of the drive beforehand and compared at bring-up. Default: the family's, any revision.
     pub identity: Identity,

@@ -22,6 +22,8 @@ pub fn message_name(kind: MessageKind) -> &'static str {
         MessageKind::SdoResponse => "SDO answer",
         MessageKind::SdoRequest => "SDO request",
         MessageKind::DriveHeartbeat => "heartbeat",
+        MessageKind::GuardRequest => "guard request",
+        MessageKind::GuardReply => "guard reply",
         MessageKind::MasterHeartbeat => "master heartbeat",
         MessageKind::Time => "TIME",
     }

@@ -162,6 +162,45 @@ impl ModeChanges {
     }
 }
 
+/// How it is seen that the node of an axis lives, beside its feedback (CiA 301, 7.2.8).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Supervision {
+    /// Its feedback alone shows it.
+    #[default]
+    Feedback,
+    /// The node sends heartbeats.
+    Heartbeat {
+        /// Slots without one that are allowed.
+        timeout_cycles: u32,
+    },
+    /// The controller asks the node for its state: node guarding.
+    Guarding {
+        /// Slots from one request to the next: the guard time.
+        guard_cycles: u32,
+        /// Slots without a reply that are allowed, from the first request without one on: the life time.
+        life_cycles: u32,
+    },
+}
+
+impl Supervision {
+    /// Slots without a sign of life that are allowed; `None` where none is expected.
+    pub const fn timeout_cycles(self) -> Option<u32> {
+        match self {
+            Self::Feedback => None,
+            Self::Heartbeat { timeout_cycles } => Some(timeout_cycles),
+            Self::Guarding { life_cycles, .. } => Some(life_cycles),
+        }
+    }
+
+    /// Slots from one request to the next, where the node is asked.
+    pub const fn guard_cycles(self) -> Option<u32> {
+        match self {
+            Self::Guarding { guard_cycles, .. } => Some(guard_cycles),
+            Self::Feedback | Self::Heartbeat { .. } => None,
+        }
+    }
+}
+
 /// Everything about an axis that does not change while it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisParameters {
@@ -198,8 +237,8 @@ pub struct AxisParameters {
     pub start_tolerance: f64,
     /// What is done with a stream that asks for more than the limits allow.
     pub follow: Follow,
-    /// Slots without a heartbeat of the node that are allowed; `None` where it sends none.
-    pub heartbeat_timeout_cycles: Option<u32>,
+    /// How it is seen that its node lives. Axes of one node have the same.
+    pub supervision: Supervision,
     /// Following error that is allowed at any time (rad or m).
     pub following_error_limit: f64,
     /// Cycles in a row that the following error may be larger.
@@ -351,7 +390,7 @@ pub(super) mod tests {
             feed_forward: FeedForward::None,
             start_tolerance: 0.01,
             follow: Follow::Smooth,
-            heartbeat_timeout_cycles: None,
+            supervision: Supervision::Feedback,
             following_error_limit: 0.1,
             following_error_cycles: 10,
             missed_feedback_cycles: 3,

@@ -24,6 +24,7 @@ mod executing;
 mod faults;
 mod group;
 mod group_requests;
+mod guarding;
 mod heartbeat;
 mod in_loop;
 mod outbox;
@@ -160,7 +161,7 @@ pub enum Deadline {
 ///     feed_forward: FeedForward::None,
 ///     start_tolerance: 0.02,
 ///     follow: Follow::Smooth,
-///     heartbeat_timeout_cycles: None,
+///     supervision: Supervision::Feedback,
 ///     following_error_limit: 0.1,
 ///     following_error_cycles: 50,
 ///     missed_feedback_cycles: 5,

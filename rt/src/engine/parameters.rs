@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::SEND_BATCH;
-use crate::axis::{Axis, AxisParameters, AxisParametersError, FeedbackSince};
+use crate::axis::{Axis, AxisParameters, AxisParametersError, FeedbackSince, Supervision};
 use crate::bit_set::BitSet;
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::{FrameFormat, Id};
@@ -110,7 +110,7 @@ pub enum SetUpError {
         /// The reason.
         error: AxisParametersError,
     },
-    /// An axis waits for SYNC, or for a heartbeat of its node, on a bus that is no CANopen network.
+    /// An axis waits for SYNC, or for a heartbeat of its node or its replies to node guarding, on a bus that is no CANopen network.
     NotCanopen {
         /// The axis.
         axis: usize,
@@ -183,6 +183,8 @@ pub enum CycleCount {
     Heartbeat,
     /// Until the drives stop for want of a heartbeat.
     HeartbeatTimeout,
+    /// From one request of node guarding to the next.
+    Guard,
     /// From one TIME message to the next.
     Time,
     /// Until every drive must be enabled.
@@ -235,8 +237,8 @@ impl core::fmt::Display for SetUpError {
 
 impl core::error::Error for SetUpError {}
 
-/// Frames of a cycle beside set-points: the heartbeat, TIME, and one service frame.
-pub(super) const OTHER_FRAMES: usize = 3;
+/// Frames of a cycle beside set-points: the heartbeat, TIME, a request of node guarding, and one service frame.
+pub(super) const OTHER_FRAMES: usize = 4;
 
 impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
     /// The longest period of the cycle.
@@ -335,6 +337,10 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         let counts = [
             (CycleCount::Heartbeat, heartbeat(|heartbeat| heartbeat.cycles)),
             (CycleCount::HeartbeatTimeout, heartbeat(|heartbeat| heartbeat.timeout_cycles)),
+            (
+                CycleCount::Guard,
+                self.axes.iter().filter_map(|axis| axis.supervision.guard_cycles()).min().unwrap_or(1),
+            ),
             (CycleCount::Time, self.time_cycles.unwrap_or(1)),
             (CycleCount::EnableTimeout, self.enable_timeout_cycles),
             (CycleCount::NotTransmitted, self.not_transmitted_cycles),
@@ -356,7 +362,7 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         }
         own.validate().map_err(|error| SetUpError::Axis { axis, error })?;
         let is_asked_by_sync = own.feedback_since == FeedbackSince::Sync;
-        if (is_asked_by_sync || own.heartbeat_timeout_cycles.is_some()) && !self.is_canopen(own.bus) {
+        if (is_asked_by_sync || own.supervision != Supervision::Feedback) && !self.is_canopen(own.bus) {
             return Err(SetUpError::NotCanopen { axis });
         }
         let mut before = self.axes.iter().take(axis);

@@ -45,9 +45,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Destination::Feedback { .. } | Destination::Unused => {}
             Destination::Emergency { axis: place } => self.receive_emergency(place.into(), received),
             Destination::ErrorControl { axis: place } => {
-                let state = received.frame.payload().first().copied();
-                if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(place)), state) {
-                    axis.receive_error_control(state);
+                if let Some(message) = received.frame.payload().first() {
+                    self.receive_error_control(place.into(), *message);
                 }
             }
             Destination::Foreign => {
@@ -55,6 +54,14 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 self.receive_foreign_nmt(bus, &received.frame);
             }
             Destination::Service => self.receive_sdo_response(bus, &received.frame),
+        }
+    }
+
+    fn receive_error_control(&mut self, place: usize, message: u8) {
+        let Some(axis) = self.axes.get_mut(place) else { return };
+        let (bus, node) = (axis.parameters().bus, axis.parameters().node);
+        if self.shared.guards.accepts(bus, node, message) {
+            axis.receive_error_control(message);
         }
     }
 
@@ -107,6 +114,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if let Some(heartbeat) = &mut self.shared.heartbeat {
             heartbeat.pass(elapsed);
         }
+        self.shared.guards.pass(elapsed);
         if let Some(time) = &mut self.shared.time {
             time.pass(elapsed, input.now_ns);
         }
@@ -142,6 +150,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
             axis.watch();
         }
+        self.watch_guarded_nodes();
     }
 }
 

@@ -10,7 +10,7 @@ use crate::canopen::emcy::ErrorCode;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
-use crate::config::PdoMapping;
+use crate::config::{PdoMapping, Supervision};
 use crate::family::bring_up::axis_units::{counts, interpolation_time, rounded_up};
 use crate::family::bring_up::configuration_file::{self, write_unless_in_file};
 use crate::family::bring_up::{
@@ -73,6 +73,11 @@ impl Sheet<'_> {
         if self.device.is_writable(CONSUMER_HEARTBEAT_TIME.address) {
             heartbeat::end_watch(c, "expect a communication fault of the drive; the next bring-up clears it")
                 .await?;
+        }
+        // The drive watches for the requests from the first one on.
+        if let Supervision::Guarding { .. } = c.axis.supervision(&c.config.master) {
+            self.set(GUARD_TIME, 0).await?;
+            self.set(LIFE_TIME_FACTOR, 0).await?;
         }
         self.set(PRODUCER_HEARTBEAT_TIME, 0).await
     }
@@ -249,10 +254,16 @@ impl Sheet<'_> {
 
     async fn heartbeats(&self) -> StepResult {
         let c = self.c;
+        let supervision = c.axis.supervision(&c.config.master);
         if self.device.is_writable(PRODUCER_HEARTBEAT_TIME.address) {
             heartbeat::produce(c).await?;
         }
-        if c.config.master.heartbeat_ns.is_some() {
+        if let Supervision::Guarding { guard_time_ns, life_time_factor } = supervision {
+            c.step("node guarding", "choose a heartbeat time that this drive accepts as guard time");
+            self.set(GUARD_TIME, rounded_up(guard_time_ns, 1_000_000)).await?;
+            self.set(LIFE_TIME_FACTOR, life_time_factor.into()).await?;
+        }
+        if c.axis.controller_timeout_ns(&c.config.master).is_some() {
             self.set(COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
             self.set(ABORT_CONNECTION_OPTION, FAULT_SIGNAL).await?;
         }

@@ -7,10 +7,11 @@ use takt_rt::{MappedObject, OperationMode};
 use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary};
 use crate::canopen::object::{Object, ObjectAddress};
 use crate::canopen::objects::{
-    CONTROLWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE, PdoDirection, STATUSWORD,
+    CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE,
+    PRODUCER_HEARTBEAT_TIME, PdoDirection, STATUSWORD,
 };
 use crate::config::quirks::{MotionUnit, Quirks};
-use crate::config::{Control, DriveFacts, Identity, ModeSet, VelocityUnit};
+use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, VelocityUnit};
 
 /// A data sheet, and the quirks of the drive.
 #[derive(Clone, Debug)]
@@ -173,6 +174,34 @@ impl Device {
         [0x1600, 0x1A00].into_iter().all(|index| self.is_writable(ObjectAddress::new(index, 0)))
     }
 
+    /// What the drive has for error control: the heartbeat before node guarding, since it asks less of the bus.
+    pub(super) fn error_control(&self) -> ErrorControl {
+        // What cannot be written and is not known is as good as absent.
+        let fixed = |address| match self.is_writable(address) {
+            true => None,
+            false => Some(self.number(address).unwrap_or(0)),
+        };
+        let is_usable = |address| self.entry(address).is_some() && fixed(address) != Some(0);
+        let (heartbeat, guard_time, life_time) =
+            (PRODUCER_HEARTBEAT_TIME.address, GUARD_TIME.address, LIFE_TIME_FACTOR.address);
+        if is_usable(heartbeat) {
+            let fixed_ms = fixed(heartbeat).and_then(|ms| u16::try_from(ms).ok());
+            ErrorControl::Heartbeat { fixed_ms }
+        } else if is_usable(guard_time) && is_usable(life_time) {
+            ErrorControl::Guarding {
+                fixed_guard_time_ms: fixed(guard_time).and_then(|ms| u16::try_from(ms).ok()),
+                fixed_life_time_factor: fixed(life_time).and_then(|factor| u8::try_from(factor).ok()),
+            }
+        } else {
+            ErrorControl::None
+        }
+    }
+
+    /// Whether the drive can watch the heartbeat of the controller.
+    pub(super) fn consumes_heartbeat(&self) -> bool {
+        self.entry(ObjectAddress::new(0x1016, 1)).is_some()
+    }
+
     /// What is known of the drive.
     pub fn facts(&self, standard: DriveFacts) -> DriveFacts {
         let modes = self.modes();
@@ -207,6 +236,8 @@ impl Device {
             },
             has_fixed_process_data: !self.is_mapped_freely(),
             reports_mode: self.is_mappable(ObjectAddress::new(0x6061, 0)),
+            error_control: self.error_control(),
+            consumes_heartbeat: self.consumes_heartbeat(),
             sends_emergencies: self.entry(ObjectAddress::new(0x1014, 0)).is_some(),
             ..standard
         }

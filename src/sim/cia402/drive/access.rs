@@ -101,6 +101,7 @@ impl Cia402Drive {
     fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
         match address.index {
             0x1005 | 0x1006 => self.network.schedule_sync(now_ns, &self.dictionary),
+            0x100C | 0x100D => self.network.stop_life_guarding(),
             0x1016 => self.network.stop_master_monitor(),
             0x1017 => self.network.schedule_heartbeat(now_ns, &self.dictionary),
             0x1400..=0x1BFF => self.pdos.compile(&self.dictionary),
