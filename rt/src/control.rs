@@ -87,16 +87,21 @@ impl core::fmt::Display for GainError {
 /// sign with every rounding of a standstill.
 const COULOMB_FADE: f64 = 1e-3;
 
-/// What the loops that are closed here compare.
+/// What the loops that are closed here act on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopInput {
     /// The newest set-point; it takes effect at the next SYNC.
     pub set: State,
-    /// The set-point that the joint should have reached when the feedback was taken.
-    pub due: State,
-    /// The position then.
+    /// How far the joint is behind its set-point.
+    pub error: TrackingError,
+}
+
+/// How far a joint is behind the set-point that it should have reached when its feedback was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrackingError {
+    /// rad (m)
     pub position: f64,
-    /// The velocity then.
+    /// rad/s (m/s)
     pub velocity: f64,
 }
 
@@ -194,8 +199,8 @@ impl ControlLaw {
             return fed_forward;
         };
         let direction = (input.set.velocity / COULOMB_FADE).clamp(-1.0, 1.0);
-        stiffness * (input.due.position - input.position)
-            + damping * (input.due.velocity - input.velocity)
+        stiffness * input.error.position
+            + damping * input.error.velocity
             + inertia * input.set.acceleration
             + viscous_friction * input.set.velocity
             + coulomb_friction * direction
@@ -213,10 +218,31 @@ impl ControlLaw {
             Self::ProfileVelocity => scale.velocity_to_drive(input.set.velocity),
             Self::ProfileTorque => 0,
             Self::Velocity { position_gain } => {
-                let velocity = input.set.velocity + position_gain * (input.due.position - input.position);
+                let velocity = input.set.velocity + position_gain * input.error.position;
                 scale.velocity_to_drive(velocity.clamp(-limits.velocity, limits.velocity))
             }
             Self::Torque { .. } => scale.torque_to_per_mille(torque),
+        }
+    }
+
+    /// The error after a cycle without feedback. A joint that follows velocities is taken to do what it was told: the correction
+    /// makes its error smaller. One that follows torques is taken to move as its set-point does: a load is held on.
+    pub fn error_without_feedback(&self, error: TrackingError, cycle_s: f64) -> TrackingError {
+        match *self {
+            Self::Velocity { position_gain } => {
+                let corrected = (position_gain * cycle_s).clamp(0.0, 1.0);
+                TrackingError { position: error.position * (1.0 - corrected), ..error }
+            }
+            _ => error,
+        }
+    }
+
+    /// The error on which the loops go on once a drive is silent for longer than it may be. A correction of the velocity would
+    /// turn the joint for as long as nobody sees it: there is none. A torque still holds the load.
+    pub const fn error_of_silent_drive(&self, error: TrackingError) -> TrackingError {
+        match self {
+            Self::Velocity { .. } => TrackingError { position: 0.0, velocity: 0.0 },
+            _ => error,
         }
     }
 
@@ -261,12 +287,7 @@ mod tests {
 
     fn input(error: f64, velocity: f64) -> LoopInput {
         let set = State { position: 1.0, velocity, acceleration: 2.0 };
-        LoopInput {
-            set,
-            due: State { position: error, velocity, acceleration: 0.0 },
-            position: 0.0,
-            velocity: 0.0,
-        }
+        LoopInput { set, error: TrackingError { position: error, velocity } }
     }
 
     #[test]
@@ -274,6 +295,24 @@ mod tests {
         let law = ControlLaw::Velocity { position_gain: 10.0 };
         let raw = law.target(&input(0.01, 0.5), 0.0, &scale(), &LIMITS);
         assert_eq!(raw, scale().velocity_to_drive(0.6));
+    }
+
+    #[test]
+    fn without_feedback_a_correction_of_the_velocity_fades_and_a_torque_stays() {
+        let error = TrackingError { position: 0.1, velocity: 0.2 };
+        let velocity = ControlLaw::Velocity { position_gain: 10.0 };
+        assert!((velocity.error_without_feedback(error, 1e-3).position - 0.099).abs() < 1e-12);
+        assert_eq!(velocity.error_without_feedback(error, f64::INFINITY).position, 0.0);
+        assert_eq!(velocity.error_of_silent_drive(error).position, 0.0);
+        let torque = ControlLaw::Torque {
+            stiffness: 1000.0,
+            damping: 10.0,
+            inertia: 0.0,
+            viscous_friction: 0.0,
+            coulomb_friction: 0.0,
+        };
+        assert_eq!(torque.error_without_feedback(error, 1e-3), error);
+        assert_eq!(torque.error_of_silent_drive(error), error);
     }
 
     #[test]

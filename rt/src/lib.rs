@@ -82,7 +82,7 @@ pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statuswo
 pub use cia402_codec::{
     Cia402Codec, ProfileRamps, SetPointTransfer, ShownStates, StopCommand, StoppedHeartbeat,
 };
-pub use control::{ControlLaw, Gain, GainError, LoopInput, TorqueDemand};
+pub use control::{ControlLaw, Gain, GainError, LoopInput, TorqueDemand, TrackingError};
 pub use cycle::{Cycle, Flow, SlotPlan};
 pub use engine::{
     BusParameters, CanopenNetwork, CycleCount, CycleInput, Deadline, Engine, EngineParameters,

@@ -3,10 +3,14 @@
 
 mod fixture;
 
-use fixture::{LIMITS, PERIOD_NS, Rig, axis, parameters, scale};
+use std::f64::consts::TAU;
+
+use fixture::{
+    COUNTS_PER_TURN, FRICTION, INERTIA, LIMITS, PERIOD_NS, Rig, axis, axis_in, move_to, parameters, scale,
+};
 use takt_rt::{
-    Axis, AxisParameters, DriveState, Fault, FeedbackSince, Frame, Id, Phase, Request, Rule, StopCause,
-    controlword,
+    Axis, AxisParameters, ControlLaw, DriveState, Fault, FeedbackSince, Frame, Id, Move, Phase, Request,
+    Rule, StopCause, controlword,
 };
 
 fn moving() -> Rig {
@@ -239,4 +243,60 @@ fn feedback_is_shown_with_its_age_also_in_cycles_in_which_none_was_asked_for() {
     let (record, shown, slots) = ages(&rig);
     assert!(record >= 2 && record == shown && u64::from(record) == slots, "{record} {shown} {slots}");
     assert!(rig.engine.axes()[0].feedback_age() < record);
+}
+
+fn with_law(law: ControlLaw) -> Rig {
+    let mut parameters = parameters(1);
+    parameters.axes[0] = axis_in(law, 0, 1);
+    Rig::of(parameters).enable()
+}
+
+/// In CSV and CST the position loop is closed over the bus.
+#[test]
+fn a_joint_whose_loop_is_closed_over_the_bus_follows_its_set_point_to_rest_when_its_drive_falls_silent() {
+    let torque = ControlLaw::Torque {
+        stiffness: 1600.0 * INERTIA,
+        damping: 80.0 * INERTIA,
+        inertia: INERTIA,
+        viscous_friction: FRICTION,
+        coulomb_friction: 0.0,
+    };
+    // Nobody corrects what friction and inertia make of a torque: there the joint may drift a little.
+    for (law, slack) in [(ControlLaw::Velocity { position_gain: 20.0 }, 0.01), (torque, 0.1)] {
+        let mut rig = with_law(law);
+        rig.move_to(2.0);
+        rig.run(200);
+        let counts_per_unit = COUNTS_PER_TURN / TAU;
+        let speed_before = rig.engine.axes()[0].set_point().velocity;
+        rig.drive(0).is_silent = true;
+        let mut last = rig.drive(0).position;
+        while rig.phase() != Phase::Disabled {
+            rig.run(1);
+            let now = rig.drive(0).position;
+            let speed = f64::from(now - last) / counts_per_unit / 1e-3;
+            assert!(speed <= speed_before * 1.05 && speed > -slack, "{law:?}: {speed} of {speed_before}");
+            last = now;
+        }
+        let joint = f64::from(last) / counts_per_unit;
+        let set_point = rig.engine.axes()[0].set_point().position;
+        assert!((joint - set_point).abs() < slack, "{law:?}: {joint}, {set_point}");
+    }
+}
+
+#[test]
+fn one_report_that_is_lost_does_not_move_a_joint_whose_loop_is_closed_over_the_bus() {
+    let mut rig = with_law(ControlLaw::Velocity { position_gain: 20.0 });
+    rig.request(Request::Move(Move { velocity_scale: 0.5, ..move_to(2.0) }));
+    rig.run(400);
+    let velocity = |rig: &mut Rig| {
+        let before = rig.drive(0).position;
+        rig.run(1);
+        rig.drive(0).position - before
+    };
+    let even = velocity(&mut rig);
+    rig.drive(0).is_silent = true;
+    let mut seen = vec![velocity(&mut rig), velocity(&mut rig)];
+    rig.drive(0).is_silent = false;
+    seen.extend((0..4).map(|_| velocity(&mut rig)));
+    assert!(seen.iter().all(|way| (way - even).abs() <= 1), "{even}: {seen:?}");
 }

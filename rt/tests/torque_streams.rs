@@ -122,6 +122,31 @@ fn a_joint_that_a_torque_drives_is_stopped_before_its_position_limit() {
 }
 
 #[test]
+fn a_joint_that_a_torque_drives_is_stopped_in_time_where_set_points_wait_for_a_slower_bus() {
+    let mut parameters = parameters(4);
+    parameters.axes[0] = axis_in(LAW, 0, 1);
+    parameters.axes[0].torque_limits = TorqueLimits { stiffness: 2000.0, damping: 100.0, rate: RATE };
+    parameters.buses[1].divider = 4;
+    let mut rig = Rig::of(parameters).enable();
+    rig.request(Request::Stream);
+    let here = |rig: &Rig, axis: usize| State::rest(rig.engine.axes()[axis].set_point().position);
+    let mut targets = [AxisTarget::Torque(1.0); MAX_AXES];
+    for (axis, target) in targets.iter_mut().enumerate().take(4).skip(1) {
+        *target = AxisTarget::Position { state: here(&rig, axis), torque: 0.0 };
+    }
+    rig.host.wish = Some(StreamWish::Targets(targets));
+    rig.run(18_000);
+    assert!(
+        matches!(causes(&rig)[..], [StopCause::Fault(Fault::PositionLimit { .. })]),
+        "{:?}",
+        causes(&rig)
+    );
+    assert_eq!(rig.phase(), Phase::Holding);
+    let farthest = rig.host.records.iter().map(|record| record.axes[0].position_set).fold(0.0, f64::max);
+    assert!(farthest <= LIMITS.position_max + 1e-9, "{farthest}");
+}
+
+#[test]
 fn a_joint_that_a_torque_makes_too_fast_is_stopped_within_its_limits() {
     let mut rig = streaming();
     rig.stream_target(AxisTarget::Torque(1e6));

@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 11] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 13] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -277,6 +277,11 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 11] = [
         "A gentle move turned a joint outward that was coming back from beyond a position limit",
     ),
     (62_000_047_392, "A drive caught up with its own highest velocity after 66 missed slots in a row"),
+    (
+        66_000_012_085,
+        "A stop for a joint that a torque drove did not count the cycles for which set-points wait for a slower bus",
+    ),
+    (65_000_032_737, "The correction of a velocity stayed as it was when the feedback did not come any more"),
 ];
 
 /// The same of those whose streams command every kind of point.

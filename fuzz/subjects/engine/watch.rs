@@ -107,7 +107,8 @@ impl Watch {
                     // A callback that is over comes to rest by a move.
                     Phase::Moving => matches!(from, Phase::Holding | Phase::Streaming),
                     Phase::Streaming => from == Phase::Holding,
-                    Phase::Stopping => matches!(from, Phase::Moving | Phase::Streaming),
+                    // A joint of a group that holds may still be on its way to its set-point.
+                    Phase::Stopping => matches!(from, Phase::Holding | Phase::Moving | Phase::Streaming),
                     Phase::Disabling => !matches!(from, Phase::Passive | Phase::Disabled),
                 };
                 assert!(is_possible, "{from:?} to {to:?}");

@@ -4,7 +4,7 @@ use super::late_reply::SetPointSkip;
 use super::torque_loop::TorqueLoop;
 use super::{Axis, AxisParameters, CommandPdo, FeedForward};
 use crate::cia402::{Goal, controlword};
-use crate::control::{ControlLaw, LoopInput};
+use crate::control::{ControlLaw, LoopInput, TrackingError};
 use crate::frame::Frame;
 use crate::pdo::{CommandSlot, TransmissionType};
 
@@ -45,6 +45,7 @@ impl Axis {
     fn target(&mut self, is_enabled: bool) -> (i32, f64) {
         if !is_enabled {
             self.torque_loop = TorqueLoop::default();
+            self.error_if_unheard = TrackingError::default();
             self.command.set(CommandSlot::VelocityOffset, 0);
             self.command.set(CommandSlot::TorqueOffset, 0);
         }
@@ -56,11 +57,13 @@ impl Axis {
             return (law.idle(self.joint.position_counts()), 0.0);
         }
         let input = self.loop_input();
+        let cycle_s = self.reception.cycle_s();
+        self.error_if_unheard = law.error_without_feedback(input.error, cycle_s);
         // Where nobody takes a torque, none is wanted either.
         let is_torque_taken = law.target_slot() == CommandSlot::TargetTorque || feed_forward.has_torque();
         let torque = if is_torque_taken {
             // Nothing, where an unlimited rate meets a period that is not known: `max` leaves out what is no number.
-            let fade = (torque_limits.rate * self.reception.cycle_s()).max(0.0);
+            let fade = (torque_limits.rate * cycle_s).max(0.0);
             self.torque_loop.next(law, &input, limits.torque, fade)
         } else {
             0.0
@@ -72,14 +75,27 @@ impl Axis {
         (raw, torque)
     }
 
-    /// What the loops that are closed here compare in this cycle.
+    /// What the loops that are closed here act on in this cycle.
     #[inline]
     pub(super) fn loop_input(&self) -> LoopInput {
-        LoopInput {
-            set: self.set_points.sent_now(),
-            due: self.set_points.due(),
-            position: self.joint.position(),
-            velocity: self.joint.velocity(),
+        LoopInput { set: self.set_points.sent_now(), error: self.tracking_error() }
+    }
+
+    /// How far the joint is behind its set-point. In a cycle without feedback the last position says nothing of that: the
+    /// set-point has gone on since, and so has the joint.
+    #[inline]
+    fn tracking_error(&self) -> TrackingError {
+        let age = self.feedback_age();
+        if age > self.parameters.missed_feedback_cycles {
+            return self.parameters.law.error_of_silent_drive(self.error_if_unheard);
+        }
+        if age > 0 {
+            return self.error_if_unheard;
+        }
+        let due = self.set_points.due();
+        TrackingError {
+            position: due.position - self.joint.position(),
+            velocity: due.velocity - self.joint.velocity(),
         }
     }
 

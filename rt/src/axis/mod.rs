@@ -43,6 +43,7 @@ mod torque_loop;
 use arrayvec::ArrayVec;
 
 use crate::cia402::DriveState;
+use crate::control::TrackingError;
 use crate::guard::FollowingErrorGuard;
 use crate::host::AxisSnapshot;
 use crate::pdo::{CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, ProcessImage};
@@ -90,6 +91,8 @@ pub struct Axis {
     /// Where the axis rests while a stream has run dry, or a callback commands nothing.
     stream_rest: f64,
     torque_loop: TorqueLoop,
+    /// What the loops that are closed here go on with if the next feedback does not come.
+    error_if_unheard: TrackingError,
     profile: ProfileMode,
     joint: JointEstimate,
     following: FollowingErrorGuard,
@@ -124,6 +127,7 @@ impl Axis {
             mode: Mode::default(),
             stream_rest: 0.0,
             torque_loop: TorqueLoop::default(),
+            error_if_unheard: TrackingError::default(),
             profile: ProfileMode::default(),
             joint: JointEstimate::default(),
             following,

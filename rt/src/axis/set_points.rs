@@ -15,7 +15,7 @@ const VELOCITY_OVERSHOOT: f64 = 1.2;
 /// A velocity that is too high for a stop in time is made lower by this factor, down to this share of it.
 const SLOWED_DOWN: f64 = 0.9;
 const SLOWEST_SHARE: f64 = 0.01;
-/// Cycles from the report of a joint to the first set-point of a stop that it is reason for.
+/// Cycles from the report of a joint to the first set-point of a stop that it is reason for, beside those that set-points wait.
 const REACTION_CYCLES: f64 = 3.0;
 
 /// By how much a step may be longer than the velocity limit allows, relative to it: the guard lets half of that pass.
@@ -36,6 +36,11 @@ impl SetPoints {
     /// From now on set-points wait for so many cycles before they are sent.
     pub(super) fn set_delay(&mut self, cycles: u32) {
         self.delay.set(cycles);
+    }
+
+    /// For how many cycles set-points wait before they are sent.
+    fn delay_cycles(&self) -> f64 {
+        self.delay.cycles() as f64
     }
 
     /// The newest set-point.
@@ -75,7 +80,7 @@ impl SetPoints {
     /// Goes on evenly from where a joint is reported, as if it had always been on its way like that. The set-point that the
     /// report belongs to was sent two cycles ago.
     pub(super) fn begin_at(&mut self, position: f64, velocity: f64, period_s: f64) {
-        let delayed = self.delay.cycles() as f64;
+        let delayed = self.delay_cycles();
         let ahead = |cycles: f64| State {
             position: position + velocity * cycles * period_s,
             velocity,
@@ -249,7 +254,8 @@ impl Axis {
     /// A stop begins ahead of the report by the cycles that it takes to be obeyed.
     fn beyond_limit(&self, position: f64, velocity: f64, period_s: f64) -> Option<(f64, f64)> {
         let limits = &self.parameters.limits;
-        let begin = position + REACTION_CYCLES * velocity * period_s;
+        let reaction_cycles = REACTION_CYCLES + self.set_points.delay_cycles();
+        let begin = position + reaction_cycles * velocity * period_s;
         let way = braking_distance(limits, velocity.abs(), 0.0);
         if velocity > 0.0 {
             Some((begin + way, begin + way - limits.position_max))

@@ -69,6 +69,7 @@ impl TorqueLoop {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::TrackingError;
     use crate::plan::State;
     use proptest::prelude::*;
 
@@ -82,7 +83,7 @@ mod tests {
 
     fn input(error: f64) -> LoopInput {
         let set = State::rest(error);
-        LoopInput { set, due: set, position: 0.0, velocity: 0.0 }
+        LoopInput { set, error: TrackingError { position: error, velocity: 0.0 } }
     }
 
     fn demand() -> impl Strategy<Value = TorqueDemand> {
