@@ -89,6 +89,8 @@ struct AxisCheck {
     name: String,
     bus: String,
     node: u8,
+    /// Its number among the axes of its node.
+    node_axis: u8,
     mode: &'static str,
     /// The modes that it may be changed to at run time.
     other_modes: Vec<&'static str>,
@@ -174,6 +176,7 @@ impl AxisCheck {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
             node: axis.node,
+            node_axis: axis.drive.node_axis,
             mode: mode_word(axis.control.operation_mode()),
             other_modes: axis.other_modes.iter().map(|control| mode_word(control.operation_mode())).collect(),
             mode_change: (!axis.other_modes.is_empty())

@@ -184,7 +184,8 @@ pub struct Axis {
     pub name: String,
     /// Its bus, an index into [`Config::buses`].
     pub bus: usize,
-    /// Its CANopen node ID, 1 to 127.
+    /// The CANopen node ID of its drive, 1 to 127. Axes of one drive with several axes have the same bus and node ID, and each
+    /// another [`node_axis`](super::DriveFacts::node_axis).
     pub node: u8,
     /// The family of the drive.
     pub drive: DriveFamily,

@@ -6,8 +6,8 @@ use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
     FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
-    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, ScaleError, SetUpError, SlotPlan,
-    Supervision, TimingLadder, TorqueLimits,
+    MappedObject, Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, ScaleError, SetUpError,
+    SlotPlan, Supervision, TimingLadder, TorqueLimits,
 };
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
@@ -140,16 +140,17 @@ fn axis_parameters(
     config: &Config,
     cycles: &impl Fn(u64) -> u32,
 ) -> Result<AxisParameters, AssembleError> {
-    let data = ProcessData::of(axis);
+    let data = ProcessData::of(axis, config);
     let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
     let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
-        let pdo = Pdo::classic(plan.id, Mapping::commands(&plan.objects)?);
+        let pdo = Pdo::classic(plan.id, Mapping::commands(&of_first_axis(plan, axis))?);
         Ok(CommandPdo { pdo, transmission: plan.transmission })
     };
-    let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&plan.objects)?));
+    let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&of_first_axis(plan, axis))?));
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,
+        node_axis: axis.drive.node_axis,
         commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback_since: feedback_since(&data.feedback),
@@ -176,6 +177,11 @@ fn axis_parameters(
         following_error_cycles: cycles(axis.following_error.time_ns),
         missed_feedback_cycles: axis.missed_feedback_cycles,
     })
+}
+
+/// The objects of a PDO by the numbers that those of the first axis of a node have.
+fn of_first_axis(plan: &PdoPlan, axis: &Axis) -> Vec<MappedObject> {
+    plan.objects.iter().map(|object| object.as_of_first_axis(axis.drive.node_axis)).collect()
 }
 
 fn supervision(axis: &Axis, config: &Config, cycles: &impl Fn(u64) -> u32) -> Supervision {

@@ -25,6 +25,7 @@ pub use warning::{Warning, WarningKind, is_rounded};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
+use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
 use crate::family::commission::dictionary::ObjectEntry;
@@ -53,6 +54,12 @@ pub trait Family: ConfiguredFamily {
     fn process_data(&self, axis: &Axis) -> ProcessData {
         let written = ProcessData::mapped_freely(axis);
         if axis.mapping == PdoMapping::AsStored { written.padded() } else { written }
+    }
+
+    /// The identifier that a PDO (counted from 1) of the drive of an axis has by its data sheet, where that gives one. It is asked for the
+    /// PDOs of further axes of a node, for which the pre-defined connection set has none.
+    fn pdo_id(&self, _axis: &Axis, _direction: PdoDirection, _number: u16) -> Option<Id> {
+        None
     }
 
     /// How the PDOs that a drive reports are matched with those that its axis needs.
@@ -117,7 +124,7 @@ pub trait Family: ConfiguredFamily {
         task: Task,
     ) -> CarryingOut<'a>;
 
-    /// The drive that stands in for an axis on a simulated bus.
+    /// The drive that stands in for an axis on a simulated bus, and for the other axes of its node, where the drive has several.
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive>;
 }
 

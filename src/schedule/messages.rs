@@ -126,13 +126,23 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     messages.extend(own.map(|message| BusMessage { jitter_ns: config.cycle.period_ns, ..message }));
     let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
     let is_guarded = |axis: &Axis| matches!(axis.supervision(&config.master), Supervision::Guarding { .. });
-    let guarded = axes().filter(|(_, axis)| is_guarded(axis)).count();
+    // What a node sends for all of its axes counts once, with the first of them.
+    let nodes = || {
+        axes().filter(|(index, axis)| {
+            let is_its = |(_, other): &(usize, &Axis)| other.node == axis.node;
+            axes().find(is_its).is_some_and(|(first, _)| first == *index)
+        })
+    };
+    let guarded = nodes().filter(|(_, axis)| is_guarded(axis)).count();
     for (index, axis) in axes() {
-        messages.extend(axis_messages(index, axis, period_ns));
+        messages.extend(axis_messages(index, axis, config, period_ns));
+    }
+    for (index, axis) in nodes() {
+        messages.extend(emergency(index, axis));
         messages.extend(error_control(index, axis, config, guarded));
     }
     messages.extend(
-        axes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
+        nodes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
     );
     messages.sort_by_key(|message| message.id.arbitration_key());
     messages
@@ -151,15 +161,11 @@ fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period
     }
 }
 
-fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
-    let data = ProcessData::of(axis);
+fn axis_messages(index: usize, axis: &Axis, config: &Config, period_ns: u64) -> Vec<BusMessage> {
+    let data = ProcessData::of(axis, config);
     let of_axis =
         |kind, pdo: &PdoPlan, period_ns| message(kind, Some(index), pdo.id, pdo.length(), period_ns);
     let mut messages = vec![];
-    if axis.drive.sends_emergencies {
-        let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
-        messages.push(message(kind, Some(index), id, EMERGENCY_BYTES, EMERGENCY_INTERVAL_NS));
-    }
     messages.extend(data.feedback.iter().map(|pdo| {
         let is_asynchronous = pdo.transmission_type > LAST_SYNCHRONOUS_TYPE;
         let answers_set_points = pdo.reply != Reply::No && is_asynchronous;
@@ -182,6 +188,13 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     let every_cycle = data.commands.iter().filter(|pdo| pdo.transmission == TransmissionType::EveryCycle);
     messages.extend(every_cycle.map(|pdo| of_axis(MessageKind::SetPoint, pdo, period_ns)));
     messages
+}
+
+fn emergency(index: usize, axis: &Axis) -> Option<BusMessage> {
+    let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
+    axis.drive
+        .sends_emergencies
+        .then(|| message(kind, Some(index), id, EMERGENCY_BYTES, EMERGENCY_INTERVAL_NS))
 }
 
 /// Heartbeats of a drive, or the requests and replies of node guarding. A request is sent in a cycle of the controller, and may

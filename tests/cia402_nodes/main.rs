@@ -1,5 +1,6 @@
-//! Nodes of drives that are known by their data sheets: how they are supervised.
+//! Nodes of drives that are known by their data sheets: how they are supervised, and several axes of one.
 
 mod guarding;
 mod listening_bus;
 mod machine;
+mod two_axes;

@@ -7,7 +7,7 @@ use crate::cia402_codec::Cia402Codec;
 use crate::control::{ControlLaw, GainError};
 use crate::frame::{Frame, FrameFormat, Id};
 use crate::guard::{AxisLimits, LimitError};
-use crate::pdo::{MAX_PDOS, Mapping, ProcessImage, TransmissionType};
+use crate::pdo::{MAX_NODE_AXES, MAX_PDOS, Mapping, ProcessImage, TransmissionType};
 use crate::source::Follow;
 use crate::units::Scale;
 
@@ -208,6 +208,9 @@ pub struct AxisParameters {
     pub bus: u8,
     /// The node ID, 1 to 127.
     pub node: u8,
+    /// Its number among the axes of the node, 1 to 8: 1 where the node has one axis. The objects of axis n stand 0x800 · (n − 1) higher
+    /// than those of the first one.
+    pub node_axis: u8,
     /// What is sent, in order.
     pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
     /// What is expected each cycle of the bus.
@@ -258,6 +261,11 @@ pub enum AxisParametersError {
         /// What it is.
         node: u8,
     },
+    /// The number of the axis in its node is not one from 1 to 8.
+    NodeAxis {
+        /// What it is.
+        node_axis: u8,
+    },
     /// There is no PDO in one of the directions.
     NoPdo,
     /// A limit is not a number that can be kept.
@@ -292,6 +300,9 @@ impl core::fmt::Display for AxisParametersError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NodeId { node } => write!(f, "{node} is no node ID: those are 1 to 127"),
+            Self::NodeAxis { node_axis } => {
+                write!(f, "{node_axis} is no number of an axis in its node: those are 1 to 8")
+            }
             Self::NoPdo => f.write_str("there must be a PDO to the drive and one from it"),
             Self::Limit(error) => error.fmt(f),
             Self::Gain(error) => error.fmt(f),
@@ -317,6 +328,9 @@ impl AxisParameters {
     pub fn validate(&self) -> Result<(), AxisParametersError> {
         if !NODE_IDS.contains(&self.node) {
             return Err(AxisParametersError::NodeId { node: self.node });
+        }
+        if !(1..=MAX_NODE_AXES).contains(&self.node_axis) {
+            return Err(AxisParametersError::NodeAxis { node_axis: self.node_axis });
         }
         if self.commands.is_empty() || self.feedback.is_empty() {
             return Err(AxisParametersError::NoPdo);
@@ -359,6 +373,7 @@ pub(super) mod tests {
         AxisParameters {
             bus: 0,
             node: 5,
+            node_axis: 1,
             commands: [CommandPdo::every_cycle(command)].into_iter().collect(),
             feedback: [feedback].into_iter().collect(),
             feedback_since: FeedbackSince::Sync,
@@ -408,6 +423,12 @@ pub(super) mod tests {
         assert_eq!(parameters().validate(), Ok(()));
         for node in [0, 128, 129, 255] {
             assert_eq!(error_of(|axis| axis.node = node), AxisParametersError::NodeId { node });
+        }
+        for node_axis in [0, 9, 255] {
+            assert_eq!(
+                error_of(|axis| axis.node_axis = node_axis),
+                AxisParametersError::NodeAxis { node_axis }
+            );
         }
         assert_eq!(error_of(|axis| axis.feedback.clear()), AxisParametersError::NoPdo);
         let error = error_of(|axis| axis.limits.velocity = -1.0);

@@ -130,6 +130,7 @@ pub enum Deadline {
 /// let axis = AxisParameters {
 ///     bus: 0,
 ///     node: 1,
+///     node_axis: 1,
 ///     commands: [CommandPdo::every_cycle(pdo(0x200, commands))].into_iter().collect(),
 ///     feedback: [pdo(0x180, feedback)].into_iter().collect(),
 ///     feedback_since: FeedbackSince::Sync,

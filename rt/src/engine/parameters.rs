@@ -120,9 +120,16 @@ pub enum SetUpError {
         /// The node ID.
         node: u8,
     },
-    /// Two nodes have one node ID: two axes of a bus, or an axis and the controller.
+    /// Two nodes have one node ID: an axis and the controller, or two axes of a bus that have the same number in their node.
     DuplicateNodeId {
         /// The axis that came second, or that has the node ID of the controller.
+        axis: usize,
+        /// The node ID.
+        node: u8,
+    },
+    /// Axes of one node are to be supervised in different ways.
+    NodeSupervision {
+        /// One of them.
         axis: usize,
         /// The node ID.
         node: u8,
@@ -217,6 +224,9 @@ impl core::fmt::Display for SetUpError {
             }
             Self::DuplicateNodeId { axis, node } => {
                 write!(f, "axis {axis}: another node has its node ID, {node}")
+            }
+            Self::NodeSupervision { axis, node } => {
+                write!(f, "axis {axis}: another axis of node {node} is supervised in another way")
             }
             Self::EmptyGroup { group } => write!(f, "group {group} has no axis"),
             Self::UnknownGroupAxis { group, axis } => {
@@ -366,8 +376,13 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
             return Err(SetUpError::NotCanopen { axis });
         }
         let mut before = self.axes.iter().take(axis);
-        if before.any(|other| (other.bus, other.node) == (own.bus, own.node)) {
+        let place = |axis: &AxisParameters| (axis.bus, axis.node, axis.node_axis);
+        if before.any(|other| place(other) == place(own)) {
             return Err(SetUpError::DuplicateNodeId { axis, node: own.node });
+        }
+        let mut of_node = self.axes.iter().filter(|other| (other.bus, other.node) == (own.bus, own.node));
+        if of_node.any(|other| other.supervision != own.supervision) {
+            return Err(SetUpError::NodeSupervision { axis, node: own.node });
         }
         Ok(())
     }
@@ -406,6 +421,7 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
     parameters: &EngineParameters<AXES, BUSES>,
 ) -> Result<[Dispatch; BUSES], SetUpError> {
     let mut dispatch: [Dispatch; BUSES] = core::array::from_fn(|_| Dispatch::default());
+    let mut nodes: ArrayVec<(u8, u8), AXES> = ArrayVec::new();
     for (place, number) in (0..).zip(parameters.axes_of_groups().flatten()) {
         let axis = usize::from(number);
         let own = parameters.axes.get(axis).ok_or(SetUpError::NoAxis)?;
@@ -413,7 +429,9 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
         let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
         let table = table.ok_or(SetUpError::UnknownBus { axis })?;
         enter_process_data(table, place, own).map_err(taken)?;
-        if parameters.is_canopen(own.bus) {
+        if parameters.is_canopen(own.bus) && !nodes.contains(&(own.bus, own.node)) {
+            // What a node sends beside process data reaches each of its axes, by the entry of the first of them.
+            nodes.push((own.bus, own.node));
             enter_services(table, place, own).map_err(taken)?;
         }
     }

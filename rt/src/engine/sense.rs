@@ -61,23 +61,30 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let Some(axis) = self.axes.get_mut(place) else { return };
         let (bus, node) = (axis.parameters().bus, axis.parameters().node);
         if self.shared.guards.accepts(bus, node, message) {
-            axis.receive_error_control(message);
+            self.axes_of_node(bus, node).for_each(|axis| axis.receive_error_control(message));
         }
     }
 
     fn receive_emergency(&mut self, place: usize, received: &Received) {
         let [low, high, register, manufacturer @ ..] = received.frame.first_word().to_le_bytes();
         let code = u16::from_le_bytes([low, high]);
-        let group = group_at(&self.groups, place);
-        let Some(axis) = self.axes.get_mut(place) else { return };
-        axis.receive_emergency(code);
-        let kind = EventKind::Emergency { axis: axis.number(), code, register, manufacturer };
-        self.shared.events.push(Event {
-            slot: self.shared.present_slot(),
-            at_ns: received.at_ns,
-            group,
-            kind,
-        });
+        let node = |axis: &Axis| (axis.parameters().bus, axis.parameters().node);
+        let Some(sender) = self.axes.get(place).map(node) else { return };
+        for (place, axis) in self.axes.iter_mut().enumerate().filter(|(_, axis)| node(axis) == sender) {
+            axis.receive_emergency(code);
+            let kind = EventKind::Emergency { axis: axis.number(), code, register, manufacturer };
+            self.shared.events.push(Event {
+                slot: self.shared.present_slot(),
+                at_ns: received.at_ns,
+                group: group_at(&self.groups, place),
+                kind,
+            });
+        }
+    }
+
+    /// The axes of a node.
+    fn axes_of_node(&mut self, bus: u8, node: u8) -> impl Iterator<Item = &mut Axis> {
+        self.axes_of(bus.into()).filter(move |axis| axis.parameters().node == node)
     }
 
     /// Takes what another master has told the nodes of a bus.

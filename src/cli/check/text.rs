@@ -161,7 +161,11 @@ fn limits_table(axes: &[&[AxisCheck]]) -> Table {
         table.row([
             counted_span(group.iter().map(|axis| axis.name.as_str())),
             span(group.iter().map(|axis| axis.bus.as_str())),
-            if lowest == highest { lowest.to_string() } else { format!("{lowest} to {highest}") },
+            match axis.node_axis {
+                1 if lowest == highest => lowest.to_string(),
+                1 => format!("{lowest} to {highest}"),
+                number => format!("{lowest}, axis {number}"),
+            },
             axis.mode.to_owned(),
             axis.unit().to_owned(),
             format!("{:.4}", axis.position_min),

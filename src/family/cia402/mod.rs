@@ -15,9 +15,12 @@ pub use starting::starting_configuration;
 
 use std::path::PathBuf;
 
+use takt_rt::Id;
+
 use super::bring_up::AxisSession;
 use super::commission::{Failure, SdoSession, TargetDrive, Task};
 use super::{CarryingOut, Family, SettingUp};
+use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use crate::sim::Drive;
 use bring_up::Sheet;
@@ -48,16 +51,26 @@ impl ConfiguredFamily for Cia402 {
 
     fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
         let quirks: Option<PathBuf> = keys.path("quirks");
+        let node_axis = keys.node_axis();
         keys.require("eds", "the electronic data sheet of the drive: eds = \"my-drive.eds\"");
         let eds = keys.path("eds")?;
-        match Device::load(&eds, quirks.as_deref()) {
-            Ok(device) => Some(drive(device)),
+        let node_axis = node_axis?;
+        let device = match Device::load(&eds, quirks.as_deref()) {
+            Ok(device) => device,
             Err(reason) => {
                 keys.refuse(
                     "eds",
                     eds.display().to_string(),
                     format!("the data sheet of a CiA 402 drive: {reason}"),
                 );
+                return None;
+            }
+        };
+        let axes = device.axes();
+        match device.of_axis(node_axis) {
+            Ok(device) => Some(drive(device)),
+            Err(reason) => {
+                keys.refuse("node_axis", node_axis.to_string(), format!("1 to {axes}: {reason}"));
                 None
             }
         }
@@ -86,6 +99,10 @@ impl Family for Cia402 {
         remarks(device(axis))
     }
 
+    fn pdo_id(&self, axis: &Axis, direction: PdoDirection, number: u16) -> Option<Id> {
+        device(axis).pdo_id(direction, number, axis.node)
+    }
+
     fn carry_out<'a>(&'a self, _: &'a SdoSession, _: &'a TargetDrive, _: Task) -> CarryingOut<'a> {
         Box::pin(async move {
             Err(Failure::Unsupported {
@@ -96,7 +113,7 @@ impl Family for Cia402 {
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
-        simulated::drive(axis, device(axis), &config.simulation)
+        simulated::drive(axis, device(axis), config)
     }
 }
 

@@ -63,6 +63,7 @@ fn axis() -> Option<AxisParameters> {
     Some(AxisParameters {
         bus: 0,
         node: 1,
+        node_axis: 1,
         commands: [CommandPdo::every_cycle(pdo(0x200, Mapping::commands(&commands).ok()?))]
             .into_iter()
             .collect(),
