@@ -306,6 +306,12 @@ impl Mapping {
         })
     }
 
+    /// The bits of the payload that carry a number, and not a gap.
+    pub(crate) fn own_bits(&self) -> u64 {
+        let fields = self.fields.iter().filter(|field| field.slot != CommandSlot::Zero as u8);
+        fields.fold(0, |bits, field| bits | u64::from(field.mask) << field.shift)
+    }
+
     fn compile(
         objects: &[MappedObject],
         slot_of: impl Fn(MappedObject) -> Result<(u8, bool), MappingError>,

@@ -53,12 +53,15 @@ pub struct CommandPdo {
     pub pdo: Pdo,
     /// When.
     pub transmission: TransmissionType,
+    /// For how many axes its frame is: 1 as a rule. Where it is for several, the drive of each takes its own part and passes over that
+    /// of the others (dummy mapping, CiA 301, 7.4.7.1), and the frame leaves when each of them has its part in it.
+    pub axes: u8,
 }
 
 impl CommandPdo {
     /// One that is sent in every cycle of its bus.
     pub const fn every_cycle(pdo: Pdo) -> Self {
-        Self { pdo, transmission: TransmissionType::EveryCycle }
+        Self { pdo, transmission: TransmissionType::EveryCycle, axes: 1 }
     }
 }
 

@@ -7,6 +7,7 @@ use super::group::{Commands, Group};
 use super::heartbeat::HeartbeatProducer;
 use super::parameters::CanopenNetwork;
 use super::shared::Shared;
+use super::shared_frames::SharedFrames;
 use super::state::{GroupState, PowerRemoval};
 use super::{Deadline, Engine, SendBatch, has_cycle};
 use crate::axis::{Axis, FeedbackSince};
@@ -156,6 +157,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             return;
         }
         self.unsent.clear(bus);
+        let mut shared_frames = SharedFrames::default();
         for place in shared.places_on(bus).iter() {
             let own_place = place.checked_sub(self.places.start);
             let Some(axis) = own_place.and_then(|place| axes.get_mut(place)) else { continue };
@@ -165,10 +167,16 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             if self.has_other_modes {
                 axis.command_other_modes();
             }
-            for frame in axis.frames() {
-                shared.dropped += u64::from(batch.try_push(frame).is_err());
+            for (frame, axes) in axis.frames() {
+                let is_taken = if axes == 1 {
+                    batch.try_push(frame).is_ok()
+                } else {
+                    shared_frames.add(&frame, axes, batch)
+                };
+                shared.dropped += u64::from(!is_taken);
             }
         }
+        shared_frames.leave_out_incomplete(batch);
     }
 
     /// Where a drive is led in this cycle.

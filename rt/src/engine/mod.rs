@@ -34,6 +34,7 @@ mod requests;
 mod sdo_fallback;
 mod sense;
 mod shared;
+mod shared_frames;
 mod slots;
 mod state;
 mod step;

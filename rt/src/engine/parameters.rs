@@ -127,6 +127,13 @@ pub enum SetUpError {
         /// The node ID.
         node: u8,
     },
+    /// A command frame for several axes is not alike for all of them, or they are not of one group on one bus.
+    SharedCommand {
+        /// One of them.
+        axis: usize,
+        /// The identifier.
+        id: Id,
+    },
     /// Axes of one node are to be supervised in different ways.
     NodeSupervision {
         /// One of them.
@@ -224,6 +231,12 @@ impl core::fmt::Display for SetUpError {
             }
             Self::DuplicateNodeId { axis, node } => {
                 write!(f, "axis {axis}: another node has its node ID, {node}")
+            }
+            Self::SharedCommand { axis, id } => {
+                write!(
+                    f,
+                    "axis {axis}: the command {id:?} cannot be shared with the other axes that it is for"
+                )
             }
             Self::NodeSupervision { axis, node } => {
                 write!(f, "axis {axis}: another axis of node {node} is supervised in another way")
@@ -380,6 +393,7 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         if before.any(|other| place(other) == place(own)) {
             return Err(SetUpError::DuplicateNodeId { axis, node: own.node });
         }
+        self.validate_shared_commands(axis, own)?;
         let mut of_node = self.axes.iter().filter(|other| (other.bus, other.node) == (own.bus, own.node));
         if of_node.any(|other| other.supervision != own.supervision) {
             return Err(SetUpError::NodeSupervision { axis, node: own.node });

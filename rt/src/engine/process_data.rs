@@ -43,6 +43,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let (Some(table), Some(axis)) = (self.dispatch.get_mut(bus), self.axes.get_mut(place)) else {
             return Err(RejectReason::NoProcessData);
         };
+        // The part of the others would be missing in a frame that they share.
+        if let Some(shared) = axis.parameters().commands.iter().find(|command| command.axes > 1) {
+            return Err(RejectReason::IdTaken { id: shared.pdo.id });
+        }
         if commands.is_empty() || feedback.is_empty() {
             return Err(RejectReason::NoProcessData);
         }
@@ -93,7 +97,7 @@ fn objects(pdo: &MappedPdo, node_axis: u8) -> ArrayVec<MappedObject, MAX_OBJECTS
 
 fn command(pdo: &MappedPdo, node_axis: u8) -> Result<CommandPdo, MappingError> {
     let mapping = Mapping::commands(&objects(pdo, node_axis))?;
-    Ok(CommandPdo { pdo: Pdo::classic(pdo.id, mapping), transmission: pdo.transmission })
+    Ok(CommandPdo { pdo: Pdo::classic(pdo.id, mapping), transmission: pdo.transmission, axes: 1 })
 }
 
 fn feedback(pdo: &MappedPdo, node_axis: u8) -> Result<Pdo, MappingError> {
