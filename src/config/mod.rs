@@ -38,7 +38,7 @@ pub use mode_words::{MODES, mode_word};
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
-pub(crate) use read::{Knowledge, parse};
+pub(crate) use read::{Knowledge, PhaseChoice, parse};
 pub use supervision::{ErrorControl, Supervision};
 
 use thiserror::Error;

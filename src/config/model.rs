@@ -155,6 +155,19 @@ pub struct Bus {
     /// Whether SDO transfers go on while the axes are enabled. A request and its answer then need room in the
     /// worst cycle; else they wait until the axes are disabled. Default `false`.
     pub sdo_while_enabled: bool,
+    /// Whether axes share command frames. Default: each has its own. A file may leave it to the schedule; this is what that finds.
+    pub command_frames: CommandFrames,
+}
+
+/// Whose commands a frame carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CommandFrames {
+    /// Each axis has frames of its own.
+    #[default]
+    OnePerAxis,
+    /// Axes of one group share frames, as far as the data sheets of their drives allow it (dummy mapping) and it makes the frames
+    /// of a cycle shorter.
+    Shared,
 }
 
 /// What a bus is connected to.

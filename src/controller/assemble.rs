@@ -144,7 +144,7 @@ fn axis_parameters(
     let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
     let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
         let pdo = Pdo::classic(plan.id, Mapping::commands(&of_first_axis(plan, axis))?);
-        Ok(CommandPdo { pdo, transmission: plan.transmission })
+        Ok(CommandPdo { pdo, transmission: plan.transmission, axes: plan.axes })
     };
     let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&of_first_axis(plan, axis))?));
     Ok(AxisParameters {

@@ -16,7 +16,7 @@ pub mod yz_aim;
 
 use std::pin::Pin;
 
-use takt_rt::{Frame, Id};
+use takt_rt::{Frame, Id, MappedObject};
 
 pub use error_words::{error_cure, error_words};
 pub use registry::{NameTaken, all, named, of, register};
@@ -60,6 +60,17 @@ pub trait Family: ConfiguredFamily {
     /// PDOs of further axes of a node, for which the pre-defined connection set has none.
     fn pdo_id(&self, _axis: &Axis, _direction: PdoDirection, _number: u16) -> Option<Id> {
         None
+    }
+
+    /// How many objects an RPDO (counted from 1) of the drive of an axis can map, beside or in place of its own, where several axes are to
+    /// share a command; 0 where they cannot.
+    fn mappable_objects(&self, _axis: &Axis, _number: u8) -> usize {
+        0
+    }
+
+    /// Whether the drive of an axis can pass over a part of a frame by this dummy object.
+    fn can_pass_over(&self, _axis: &Axis, _dummy: MappedObject) -> bool {
+        false
     }
 
     /// How the PDOs that a drive reports are matched with those that its axis needs.

@@ -1,5 +1,7 @@
 //! Every message that a configuration puts on a bus.
 
+use std::collections::HashSet;
+
 use serde::Serialize;
 use takt_rt::{FrameKind, Id, TIME_ID, TransmissionType};
 
@@ -144,6 +146,9 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     messages.extend(
         nodes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
     );
+    // A frame that axes share counts once, with the first of them.
+    let mut set_points = HashSet::new();
+    messages.retain(|message| message.kind != MessageKind::SetPoint || set_points.insert(message.id));
     messages.sort_by_key(|message| message.id.arbitration_key());
     messages
 }

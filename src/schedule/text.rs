@@ -157,6 +157,9 @@ pub fn remedy(remedy: &Remedy) -> String {
         Remedy::ServiceFrames { frames } => {
             format!("fewer service frames: service_frames_per_cycle = {frames}")
         }
+        Remedy::SharedCommandFrames => {
+            "command frames that axes share: [[bus]] command_frames = \"shared\"".to_owned()
+        }
         Remedy::NoAnswersToSync => {
             "no answers to SYNC, at the price of feedback that is a cycle older: answers_sync = false"
                 .to_owned()

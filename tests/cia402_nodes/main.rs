@@ -3,4 +3,5 @@
 mod guarding;
 mod listening_bus;
 mod machine;
+mod shared_commands;
 mod two_axes;

@@ -8,6 +8,7 @@
 use takt_rt::Id;
 
 use super::process_data::{PdoPlan, ProcessData, pdo_id};
+use super::shared_commands;
 use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, PdoMapping};
 use crate::family;
@@ -20,9 +21,8 @@ const HIGHEST_NODE: u8 = 126;
 
 /// The process data of an axis among the others of its bus.
 pub fn process_data(axis: &Axis, config: &Config) -> ProcessData {
-    let own = family::of(&axis.drive).process_data(axis);
     if axis.drive.node_axis == 1 {
-        return own;
+        return shared_commands::process_data(axis, config);
     }
     let mut taken = Taken::by_first_axes(axis.bus, config);
     let further = config.axes.iter().filter(|other| other.bus == axis.bus && other.drive.node_axis > 1);
@@ -32,7 +32,7 @@ pub fn process_data(axis: &Axis, config: &Config) -> ProcessData {
             return data;
         }
     }
-    own
+    family::of(&axis.drive).process_data(axis)
 }
 
 /// What is taken on a bus.
@@ -52,7 +52,7 @@ impl Taken {
                 taken.ids.extend(predefined(PdoDirection::Receive, first.node));
                 taken.ids.extend(predefined(PdoDirection::Transmit, first.node));
             }
-            let data = family::of(&first.drive).process_data(first);
+            let data = shared_commands::process_data(first, config);
             taken.ids.extend(data.all().map(|pdo| pdo.id));
         }
         taken

@@ -23,6 +23,7 @@ mod network_state;
 pub mod pdo_mapping;
 mod process_data;
 mod reported_mapping;
+mod shared_commands;
 mod stages;
 
 pub use crate::procedure::Access;

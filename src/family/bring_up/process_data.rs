@@ -27,6 +27,8 @@ pub struct PdoPlan {
     pub transmission_type: u8,
     /// The mapped objects, in order.
     pub objects: Vec<MappedObject>,
+    /// For how many axes its frame is, for an RPDO: 1 unless they share it.
+    pub axes: u8,
     /// Condition the controller sends it, for an RPDO.
     pub transmission: TransmissionType,
     /// Whether it is sent in reply to a command, for a TPDO.
@@ -55,7 +57,15 @@ impl PdoPlan {
         transmission: TransmissionType,
     ) -> Self {
         let id = pdo_id(direction, number, node);
-        Self { number: number.into(), id, transmission_type: 0, objects, transmission, reply: Reply::No }
+        Self {
+            number: number.into(),
+            id,
+            transmission_type: 0,
+            objects,
+            axes: 1,
+            transmission,
+            reply: Reply::No,
+        }
     }
 
     /// The payload in bytes.

@@ -300,6 +300,7 @@ fn plan_of(
         id: expected,
         transmission_type: transmission_type.unwrap_or(axis.transmission_type),
         objects: pdo.objects.clone(),
+        axes: 1,
         transmission,
         reply: Reply::No,
     })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use takt_rt::{Id, MAX_NODE_AXES, MappedObject, OperationMode};
+use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, OperationMode};
 
 use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary};
 use crate::canopen::object::{Object, ObjectAddress};
@@ -148,6 +148,16 @@ impl Device {
             has(parameters.cob_id()) && has(parameters.mapped_count())
         };
         (1..=4).take_while(has_slot).last().unwrap_or(0)
+    }
+
+    /// How many objects one of the first RPDOs can map, by the sub-indices that its mapping has.
+    pub fn mappable_objects(&self, number: u8) -> usize {
+        if number > self.pdo_slots(PdoDirection::Receive) {
+            return 0;
+        }
+        let parameters = PdoParameters::of(PdoDirection::Receive, number);
+        let has = |position: &u8| self.entry(parameters.mapped_object(*position).address).is_some();
+        (1..=MAX_OBJECTS as u8).take_while(has).count()
     }
 
     /// The identifier of a PDO by the data sheet, for a drive with this node ID; `None` if it gives none.

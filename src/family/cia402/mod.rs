@@ -15,7 +15,7 @@ pub use starting::starting_configuration;
 
 use std::path::PathBuf;
 
-use takt_rt::Id;
+use takt_rt::{Id, MappedObject};
 
 use super::bring_up::AxisSession;
 use super::commission::{Failure, SdoSession, TargetDrive, Task};
@@ -101,6 +101,14 @@ impl Family for Cia402 {
 
     fn pdo_id(&self, axis: &Axis, direction: PdoDirection, number: u16) -> Option<Id> {
         device(axis).pdo_id(direction, number, axis.node)
+    }
+
+    fn mappable_objects(&self, axis: &Axis, number: u8) -> usize {
+        device(axis).mappable_objects(number)
+    }
+
+    fn can_pass_over(&self, axis: &Axis, dummy: MappedObject) -> bool {
+        device(axis).dictionary.dummies.iter().any(|code| code.0 == dummy.index)
     }
 
     fn carry_out<'a>(&'a self, _: &'a SdoSession, _: &'a TargetDrive, _: Task) -> CarryingOut<'a> {
