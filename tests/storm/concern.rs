@@ -5,7 +5,7 @@ use takt::config::{Axis, Config};
 use takt::family;
 use takt::faults::{
     Direction, DriveEffect, Effect, FaultInjector, ForeignFrames, FrameEffect, FrameFunction,
-    InterfaceEffect, Part, Selection,
+    InterfaceEffect, Part, Selection, Trigger,
 };
 use takt::schedule::analyse;
 use takt::sim::Defect;
@@ -21,7 +21,7 @@ pub struct Concern {
     pub is_driven_by_others: bool,
     /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
     pub is_misled: bool,
-    /// Another master has reset its communication: its drive has forgotten whom it watches.
+    /// Its drive waits for no heartbeat: another master has reset its communication, or it has heard none yet.
     pub is_unwatched: bool,
     /// No SDO gets to its drive while this lasts.
     pub is_cut_off: bool,
@@ -165,6 +165,12 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
             NmtCommand::decode(&frame),
             Some((NmtCommand::ResetCommunication, target)) if [NmtTarget::All, NmtTarget::Node(axis.node)].contains(&target)
         ),
+        // A drive waits for heartbeats from the first one on that it hears (CiA 301, 7.2.8.3.2.2). This one may have heard none.
+        Effect::Frames(FrameEffect::Drop) => {
+            fault.window.trigger == Trigger::Start
+                && fault.selection.direction != Direction::Received
+                && fault.selection.function == Some(FrameFunction::Heartbeat)
+        }
         _ => false,
     };
     let is_cut_off = match fault.effect {

@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 13] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 14] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -280,6 +280,10 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 13] = [
     (
         66_000_012_085,
         "A stop for a joint that a torque drove did not count the cycles for which set-points wait for a slower bus",
+    ),
+    (
+        66_000_032_281,
+        "A drive that had heard no heartbeat yet was cut off with its bus, and nothing could stop it",
     ),
     (65_000_032_737, "The correction of a velocity stayed as it was when the feedback did not come any more"),
 ];
