@@ -82,6 +82,7 @@ fn logger(criterion: &mut Criterion) {
             bus: None,
             group: 0,
             family: None,
+            own_errors: vec![],
             unit: Unit::Radian,
             plans_own_profile: false,
             counts_per_unit: 83_443.0,

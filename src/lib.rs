@@ -32,11 +32,12 @@
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
+//! faults                              faults on purpose
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
-//! faults link sim                     faults on purpose; sockets; simulated buses and drives
+//! link sim                            sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
-//! canopen                             the protocols of CiA 301, 305 and 306, without I/O
+//! canopen erob_can                    CiA 301, 305 and 306; eRob's own protocol; both without I/O
 //! channels                            the lock-free door to the real-time thread
 //! trajectory frame_time sleep_alignment source_text printable text_file
 //! ```
@@ -68,6 +69,7 @@ pub mod commission;
 pub mod config;
 pub mod controller;
 pub mod doctor;
+pub mod erob_can;
 mod error;
 pub mod family;
 pub mod faults;

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 23] = [
+const ORDER: [&str; 24] = [
     "cli",
     "doctor",
     "jitter",
@@ -15,13 +15,14 @@ const ORDER: [&str; 23] = [
     "controller",
     "telemetry",
     "schedule",
-    "family",
     "faults",
+    "family",
     "link",
     "sim",
     "config",
     "procedure",
     "canopen",
+    "erob_can",
     "channels",
     "trajectory",
     "frame_time",

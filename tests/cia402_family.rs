@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use takt::Config;
 use takt::canopen::objects::PdoDirection;
 use takt::canopen::pdo_configuration::PdoConfiguration;
+use takt::config::Control;
 use takt::controller::{Outcome, VirtualRun};
 use takt::family::bring_up::{PdoPlan, ProcessData};
 use takt::family::cia402::{self, Device};
@@ -39,12 +40,13 @@ fn run(config: &Config) -> Vec<f64> {
 }
 
 #[test]
-fn an_arm_of_three_makers_drives_runs_its_program_at_1_ms() {
+fn an_arm_of_three_makers_drives_moves_in_csp_at_1_ms() {
     let config = Config::load(&repository().join("configs/three-drives.toml")).unwrap();
     assert_eq!(config.cycle.period_ns, 1_000_000);
     let makers: std::collections::BTreeSet<_> =
         config.axes.iter().map(|axis| cia402::device(axis).dictionary.device.vendor_name.clone()).collect();
     assert_eq!(makers.len(), 3);
+    assert!(config.axes.iter().all(|axis| axis.control == Control::Position));
     for (axis, position) in config.axes.iter().zip(run(&config)) {
         assert!(position.abs() < 0.01, "{}: {position}", axis.name);
     }

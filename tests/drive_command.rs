@@ -255,3 +255,38 @@ fn how_fast_has_no_direction() {
     }
     is_refused(&["torque", "1 Nm", "--max-velocity", "-1 deg/s"], "is below zero");
 }
+
+#[test]
+fn a_drive_of_any_maker_is_commissioned_by_its_configuration() {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/three-drives.toml");
+    let of = |arguments: &[&str]| {
+        let all = [&[config.to_str().unwrap(), "shoulder", "--fast", "--json"], arguments].concat();
+        takt(&all).output().unwrap()
+    };
+    let output = of(&["move", "absolute", "10 deg"]);
+    ends_with(0, &output);
+    assert!((json(&output)["result"]["position"].as_f64().unwrap().to_degrees() - 10.0).abs() < 0.1);
+    ends_with(0, &of(&["save"]));
+    let output = of(&["restore"]);
+    ends_with(2, &output);
+    assert!(json(&output)["failure"].as_str().unwrap().contains("add --yes to do it"), "{}", said(&output));
+}
+
+#[test]
+fn a_drive_without_a_configuration_is_named_by_its_data_sheet() {
+    let sheet = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/eds/vendors/schunk-lwa4p.eds");
+    let sheet = sheet.to_str().unwrap();
+    let of = |arguments: &[&str]| {
+        takt(&[&["--bus", "nosuchcan", "--node", "3"], arguments].concat()).output().unwrap()
+    };
+    let output = of(&["--eds", sheet, "info"]);
+    ends_with(2, &output);
+    assert!(errors(&output).contains("--counts-per-turn"), "{}", errors(&output));
+    // The interface is looked for only when everything is known of the drive.
+    let output = of(&["--eds", sheet, "--counts-per-turn", "65536", "info"]);
+    ends_with(2, &output);
+    assert!(errors(&output).contains("nosuchcan"), "{}", errors(&output));
+    let output = of(&["--family", "cia402", "info"]);
+    ends_with(2, &output);
+    assert!(errors(&output).contains("--eds FILE"), "{}", errors(&output));
+}

@@ -6,12 +6,16 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::sync::Arc;
 
+use takt::canopen::eds;
+use takt::config::quirks::Quirks;
 use takt::controller::port::Port;
 use takt::faults::{
     DelayPlace, DriveEffect, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect,
     Part, ScenarioFault, Selection, Trigger, Window,
 };
+use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
 use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::homing_switches::ReferenceSwitches;
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::{Defect, Drive, DriveFault, SimulatedBus, WireBitRates};
@@ -51,15 +55,13 @@ fn allocations() -> u64 {
     ALLOCATIONS.with(Cell::get)
 }
 
+const JOINT: JointParameters =
+    JointParameters { inertia: 0.4, viscous_friction: 1.5, coulomb_friction: 4.0, brake_torque: 110.0 };
+
 fn drive(node: u8) -> Box<dyn Drive> {
     Box::new(ErobJoint::new(ErobParameters {
         node,
-        joint: JointParameters {
-            inertia: 0.4,
-            viscous_friction: 1.5,
-            coulomb_friction: 4.0,
-            brake_torque: 110.0,
-        },
+        joint: JOINT,
         encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
         counts_per_turn: 524_288.0,
         initial_position: 0.0,
@@ -86,6 +88,13 @@ fn live<P: BusPort>(bus: &mut P, received: &mut usize, mut breaks: impl FnMut(&m
         [0x2F, 0x00, 0x14, 2, 1, 0, 0, 0],
         [0x2F, 0x00, 0x18, 2, 1, 0, 0, 0],
         [0x40, 0x72, 0x60, 0, 0, 0, 0, 0],
+        // A download in segments, and an upload in blocks, which the eRob refuses.
+        [0x21, 0x81, 0x60, 0, 4, 0, 0, 0],
+        [0x07, 0x11, 0x22, 0x33, 0x44, 0, 0, 0],
+        [0xA0, 0x18, 0x10, 1, 127, 0, 0, 0],
+        [0xA3, 0, 0, 0, 0, 0, 0, 0],
+        [0xA2, 1, 127, 0, 0, 0, 0, 0],
+        [0xA1, 0, 0, 0, 0, 0, 0, 0],
     ];
     for cycle in 0..1000u64 {
         let now_ns = cycle * 1_000_000;
@@ -124,8 +133,43 @@ fn live<P: BusPort>(bus: &mut P, received: &mut usize, mut breaks: impl FnMut(&m
     }
 }
 
+/// A drive made from the data sheet of the eRob.
+fn drive_of_a_sheet(node: u8) -> Box<dyn Drive> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
+    let axis = Cia402AxisParameters {
+        joint: JOINT,
+        encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
+        counts_per_turn: 524_288.0,
+        initial_position: 0.0,
+        rated_torque: 31.0,
+        peak_torque: 56.0,
+        highest_velocity: 4.0,
+        switches: ReferenceSwitches::default(),
+        end_stops: None,
+    };
+    let parameters = Cia402Parameters {
+        sheet: eds::load(&path).unwrap().dictionary,
+        node,
+        quirks: Quirks::default(),
+        axes: vec![axis],
+        power_up_ns: 5_000_000,
+        feedback_delay_ns: 20_000,
+        seed: 7,
+    };
+    Box::new(Cia402Drive::new(parameters).unwrap())
+}
+
 #[test]
 fn a_second_on_the_simulated_bus_takes_no_heap_memory() {
+    live_without_memory(drive);
+}
+
+#[test]
+fn a_second_of_drives_made_from_a_data_sheet_takes_no_heap_memory() {
+    live_without_memory(drive_of_a_sheet);
+}
+
+fn live_without_memory(drive: fn(u8) -> Box<dyn Drive>) {
     let before = allocations();
     let drives = [1, 2, 3].map(drive).into();
     let mut bus =

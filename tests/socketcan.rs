@@ -25,7 +25,9 @@ impl VirtualCan {
     }
 
     fn port(&self, identifiers: &[Id]) -> SocketCanPort {
-        self.port_with(&SocketCanOptions { identifiers: identifiers.to_vec(), ..SocketCanOptions::default() })
+        let identifiers = identifiers.to_vec();
+        let data_bit_rate = Some(5_000_000);
+        self.port_with(&SocketCanOptions { identifiers, data_bit_rate, ..SocketCanOptions::default() })
     }
 
     fn port_with(&self, options: &SocketCanOptions) -> SocketCanPort {

@@ -330,9 +330,9 @@ fn the_dictionary_is_the_one_of_the_manual() {
         };
         assert_eq!(u16::from_str_radix(index, 16), Ok(object.index), "{line}");
         assert_eq!(u8::from_str_radix(subindex, 16), Ok(object.subindex), "{line}");
-        assert_eq!(number(bits), Some(object.bits.into()), "{line}");
-        assert!(access == "unspecified" || (access == "rw") == object.is_writable, "{line}");
-        assert!(savable == "unknown" || (savable == "yes") == object.is_stored, "{line}");
+        assert_eq!(number(bits), object.data_type.bits().map(Into::into), "{line}");
+        assert!(access == "unspecified" || (access == "rw") == object.access.is_writable(), "{line}");
+        assert!(savable == "unknown" || (savable == "yes") == object.is_saved, "{line}");
         if !wider.contains(&object.index) {
             assert!(number(lowest).is_none_or(|lowest| lowest == object.lowest), "{line}");
             assert!(number(highest).is_none_or(|highest| highest == object.highest), "{line}");

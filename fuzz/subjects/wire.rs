@@ -9,6 +9,7 @@ use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
 use takt::canopen::time::TimeOfDay;
 use takt::config::Config;
+use takt::erob_can::frame::{ReceivedRequest, Reply, Request};
 use takt::sim::SimulatedBus;
 use takt_rt::{
     BusPort, DriveState, Frame, Id, MAX_OBJECTS, MappedObject, Mapping, ProcessImage, ReceiveBatch,
@@ -52,6 +53,16 @@ fn decode(mut input: Input<'_>) {
         }
         if let Some((node, response)) = SdoResponse::decode(&frame) {
             assert_eq!(SdoResponse::decode(&response.frame(node)), Some((node, response)), "{frame:?}");
+        }
+        if let Some(received) = ReceivedRequest::decode(&frame) {
+            let request = match received.value {
+                Some(value) => Request::Write(received.address, value),
+                None => Request::Read(received.address),
+            };
+            assert_eq!(ReceivedRequest::decode(&request.frame(received.node)), Some(received), "{frame:?}");
+        }
+        if let Some(reply) = Reply::decode(frame.payload()) {
+            assert_eq!(Reply::decode(reply.frame(NODE).payload()), Some(reply), "{frame:?}");
         }
         if let Some(request) = LssRequest::decode(&frame) {
             assert_eq!(LssRequest::decode(&request.frame()), Some(request), "{frame:?}");

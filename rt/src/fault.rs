@@ -204,6 +204,9 @@ pub enum Fault {
     CallbackPanicked,
 }
 
+/// The second number of [`Fault::ForeignMaster`] where the identifier has 29 bits; 0 where it has 11, as in earlier recordings.
+const EXTENDED_ID_BITS: f64 = 29.0;
+
 impl Fault {
     /// The rule that is broken.
     pub const fn rule(&self) -> Rule {
@@ -274,7 +277,9 @@ impl Fault {
             | Self::TimingUnfit { missed: cycles, limit } => (cycles.into(), limit.into()),
             Self::NodeNotOperational { state } => (state.into(), 0.0),
             Self::DuplicateNode { node } => (node.into(), 0.0),
-            Self::ForeignMaster { id } => (id.value().into(), 0.0),
+            Self::ForeignMaster { id } => {
+                (id.value().into(), if id.is_extended() { EXTENDED_ID_BITS } else { 0.0 })
+            }
             Self::CallbackOverrun { spent_ns, budget_ns } => (spent_ns as f64, budget_ns as f64),
             Self::NoTrajectory
             | Self::BusLost
@@ -324,6 +329,9 @@ impl Fault {
             Rule::UnexpectedBootUp => Self::UnexpectedBootUp,
             Rule::EmergencyMessage => Self::EmergencyMessage { code: seen as u16 },
             Rule::DuplicateNode => Self::DuplicateNode { node: seen as u8 },
+            Rule::ForeignMaster if allowed == EXTENDED_ID_BITS => {
+                Self::ForeignMaster { id: Id::extended(seen as u32).ok()? }
+            }
             Rule::ForeignMaster => Self::ForeignMaster { id: Id::base(seen as u32).ok()? },
             Rule::TimingUnfit => Self::TimingUnfit { missed: seen as u32, limit: allowed as u32 },
             Rule::CallbackOverrun => {
@@ -331,5 +339,20 @@ impl Fault {
             }
             Rule::CallbackPanicked => Self::CallbackPanicked,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_frame_of_another_master_keeps_the_length_of_its_identifier() {
+        for id in [Id::base(0x080).unwrap(), Id::extended(0x080).unwrap(), Id::extended(0x1234_5678).unwrap()]
+        {
+            let fault = Fault::ForeignMaster { id };
+            let (seen, allowed) = fault.numbers();
+            assert_eq!(Fault::from_numbers(Rule::ForeignMaster, seen, allowed), Some(fault));
+        }
     }
 }

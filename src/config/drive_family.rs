@@ -46,8 +46,12 @@ pub struct DriveFacts {
     pub identity: Identity,
     /// Counts of one turn of the position that the drives report. `None`: a configuration must say it.
     pub counts_per_turn: Option<f64>,
-    /// The unit of velocities (objects 606C, 60FF, 6081).
+    /// The unit of velocities (objects 606C, 60FF).
     pub velocity_unit: VelocityUnit,
+    /// The unit of profile velocities (6081, 6099), where it is another one.
+    pub profile_velocity_unit: Option<VelocityUnit>,
+    /// The unit of accelerations (6083, 6084, 6085): so much velocity in a second; `None`: that of profile velocities.
+    pub acceleration_unit: Option<VelocityUnit>,
     /// The modes that the drives have.
     pub modes: ModeSet,
     /// The mode where a configuration names none.
@@ -175,6 +179,8 @@ impl DriveFacts {
             identity: Identity { device_type: None, vendor: None, product: None, revision: None },
             counts_per_turn: None,
             velocity_unit: VelocityUnit::Counts(1.0),
+            profile_velocity_unit: None,
+            acceleration_unit: None,
             modes: ModeSet::of(&OperationMode::ALL),
             usual_mode: Control::Position,
             mode_changes: ModeChangeRule::When(ModeCondition::Disabled),
@@ -204,6 +210,18 @@ impl DriveFacts {
     /// What the drives call a speed of one turn of their position in a second.
     pub const fn velocity_units_per_turn(&self, counts_per_turn: f64) -> f64 {
         self.velocity_unit.units_per_turn(counts_per_turn)
+    }
+
+    /// Units of profile velocities (6081) for one unit of velocities (60FF).
+    pub fn profile_velocity_units_per_velocity_unit(&self, counts_per_turn: f64) -> f64 {
+        let unit = self.profile_velocity_unit.unwrap_or(self.velocity_unit);
+        unit.units_per_turn(counts_per_turn) / self.velocity_units_per_turn(counts_per_turn)
+    }
+
+    /// Units of accelerations (6083) for one unit of velocities (60FF) in a second.
+    pub fn acceleration_units_per_velocity_unit(&self, counts_per_turn: f64) -> f64 {
+        let unit = self.acceleration_unit.or(self.profile_velocity_unit).unwrap_or(self.velocity_unit);
+        unit.units_per_turn(counts_per_turn) / self.velocity_units_per_turn(counts_per_turn)
     }
 }
 

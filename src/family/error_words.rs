@@ -1,7 +1,9 @@
 //! The error codes of drives in words, each with its cure. What a code means depends on the family of the drive.
 
-use super::registry::named;
+use super::DataSheet;
+use super::registry::{named, of};
 use crate::canopen::emcy::ErrorCode;
+use crate::config::DriveFamily;
 
 /// A drive that reports a fault without a code.
 const NO_CODE: &str = "`takt drive … info` reads what the drive knows of it, and `clear-fault` clears it";
@@ -64,6 +66,22 @@ pub fn error_words(family: Option<&str>, code: u16) -> String {
         Some(family) => family.error_words(code),
         None => ErrorCode(code).to_string(),
     }
+}
+
+/// The code of a drive in words: its own, or else those of its family.
+pub fn drive_error_words(drive: &DriveFamily, code: u16) -> String {
+    own_error_words(own_errors(drive), code).unwrap_or_else(|| of(drive).error_words(code))
+}
+
+/// The error codes that a drive has its own words for.
+pub fn own_errors(drive: &DriveFamily) -> &[(u16, String)] {
+    of(drive).data_sheet(drive).map_or(&[], DataSheet::own_errors)
+}
+
+/// The code in a drive's own words, if it has some for it.
+pub fn own_error_words(own: &[(u16, String)], code: u16) -> Option<String> {
+    let own = own.iter().find(|(known, _)| *known == code);
+    own.map(|(_, words)| format!("0x{code:04X} ({words})"))
 }
 
 /// What clears the fault and its cause.

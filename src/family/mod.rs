@@ -7,6 +7,8 @@
 pub mod bring_up;
 pub mod cia402;
 pub mod commission;
+mod data_sheet;
+pub mod erob_can;
 pub mod erob_canopen;
 mod error_words;
 mod registry;
@@ -18,7 +20,8 @@ use std::pin::Pin;
 
 use takt_rt::{Frame, Id, MappedObject};
 
-pub use error_words::{error_cure, error_words};
+pub use data_sheet::DataSheet;
+pub use error_words::{drive_error_words, error_cure, error_words, own_error_words, own_errors};
 pub use registry::{NameTaken, all, named, of, register};
 pub use simulated_bus::simulated_drives;
 pub use warning::{Warning, WarningKind, is_rounded};
@@ -26,6 +29,7 @@ pub use warning::{Warning, WarningKind, is_rounded};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
 use crate::canopen::objects::PdoDirection;
+use crate::canopen::sdo::SdoTiming;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
 use crate::family::commission::dictionary::ObjectEntry;
@@ -97,7 +101,12 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
-    /// An error code of a drive in words.
+    /// What the data sheet of a drive says, where the drives of the family differ.
+    fn data_sheet<'d>(&self, _drive: &'d DriveFamily) -> Option<&'d dyn DataSheet> {
+        None
+    }
+
+    /// An error code of a drive in words. A drive whose data sheet has words of its own has those instead.
     fn error_words(&self, code: u16) -> String {
         ErrorCode(code).to_string()
     }
@@ -118,7 +127,7 @@ pub trait Family: ConfiguredFamily {
     }
 
     /// The meaning of an object's value in words, if it has one beyond its number.
-    fn meaning(&self, _object: &Object, _value: i64) -> Option<String> {
+    fn meaning(&self, _drive: &DriveFamily, _object: &Object, _value: i64) -> Option<String> {
         None
     }
 
@@ -157,6 +166,16 @@ pub struct OtherProtocol {
     pub request: Frame,
     /// The identifier of the reply.
     pub answer: Id,
+}
+
+/// The quirks of the SDO server of a drive, with this timing; the drive gets at least the time to answer that its data sheet
+/// says.
+pub(crate) fn sdo_quirks(drive: &DriveFamily, mut timing: SdoTiming) -> SdoQuirks {
+    let family = of(drive);
+    if let Some(reply_ns) = family.data_sheet(drive).and_then(DataSheet::sdo_reply_ns) {
+        timing.reply_timeout_ns = timing.reply_timeout_ns.max(2 * reply_ns);
+    }
+    SdoQuirks { timing, ..family.sdo_quirks() }
 }
 
 /// Every identifier between a drive and its master: those that CANopen gives to its node (CiA 301, 7.3.3), and those of

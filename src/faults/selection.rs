@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use takt_rt::Frame;
+use takt_rt::{Frame, Id};
 
 use crate::canopen::function_code;
 use crate::sim::random::Random;
@@ -65,6 +65,9 @@ pub struct Selection {
     pub function: Option<FrameFunction>,
     /// The node ID in the identifier; `None` for any.
     pub node: Option<u8>,
+    /// The identifiers of the vendor's own protocol of this node. Its frames are shorter than those of SDO, which other nodes
+    /// have with the same identifiers.
+    pub own_protocol: Vec<Id>,
     /// The probability of being selected, 0 to 1.
     pub probability: f64,
     /// The largest number of frames; the fault ends with the last one. `None`: no limit.
@@ -81,6 +84,7 @@ impl Default for Selection {
             ids: 0..=0x1FFF_FFFF,
             function: None,
             node: None,
+            own_protocol: vec![],
             probability: 1.0,
             count: None,
             seed: 1,
@@ -96,7 +100,13 @@ impl Selection {
         (self.direction == Direction::Both || self.direction == direction)
             && self.ids.contains(&id)
             && self.function.is_none_or(|function| is_canopen && function.includes(id))
-            && self.node.is_none_or(|node| is_canopen && id >= 0x080 && id & 0x7F == u32::from(node))
+            && self.node.is_none_or(|node| {
+                is_canopen && id >= 0x080 && id & 0x7F == u32::from(node) || self.is_of_own_protocol(frame)
+            })
+    }
+
+    fn is_of_own_protocol(&self, frame: &Frame) -> bool {
+        frame.payload().len() < 8 && self.own_protocol.contains(&frame.id())
     }
 }
 
@@ -143,7 +153,6 @@ impl Selector {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::Id;
 
     fn frame(id: u32) -> Frame {
         Frame::of(Id::base(id).unwrap(), [])
@@ -168,6 +177,19 @@ mod tests {
         assert!(!selection.includes(&frame(0x281), Direction::Received));
         assert!(!selection.includes(&frame(0x182), Direction::Received));
         assert!(!selection.includes(&frame(0x101), Direction::Received));
+    }
+
+    #[test]
+    fn the_frames_of_the_vendors_own_protocol_belong_to_the_node_that_speaks_it() {
+        let own = [0x642, 0x5C2].map(|id| Id::base(id).unwrap()).to_vec();
+        let of_2 = Selection { node: Some(2), own_protocol: own, ..Selection::default() };
+        let of_66 = Selection { node: Some(66), ..Selection::default() };
+        let question = Frame::of(Id::base(0x642).unwrap(), [0, 2]);
+        assert!(of_2.includes(&question, Direction::Sent));
+        // The SDO frames of node 66 have the same identifiers, and eight bytes.
+        let sdo = Frame::of(Id::base(0x642).unwrap(), [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+        assert!(!of_2.includes(&sdo, Direction::Sent) && of_66.includes(&sdo, Direction::Sent));
+        assert!(of_2.includes(&frame(0x182), Direction::Received));
     }
 
     #[test]

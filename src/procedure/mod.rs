@@ -12,7 +12,8 @@
 //! session ── what its code awaits: time, messages, an interruption
 //!    │
 //! client ── one protocol with one drive: frames, or bytes
-//!    └── canopen_client, canopen_session ── SDO, NMT, EMCY, heartbeat
+//!    ├── canopen_client, canopen_session ── SDO, NMT, EMCY, heartbeat
+//!    └── erob_can_session ── reads, writes and commands of eRob's own protocol
 //! ```
 //!
 //! A waiting procedure is given up by dropping its code: [`ProcedureSession::give_up_when`], or the whole [`Procedure`].
@@ -22,6 +23,7 @@ mod access;
 mod canopen_client;
 mod canopen_session;
 mod client;
+mod erob_can_session;
 mod event;
 mod parallel;
 mod running;
@@ -32,6 +34,7 @@ pub use access::Access;
 pub use canopen_client::CanopenClient;
 pub use canopen_session::{CanopenSession, POLL_NS};
 pub use client::Client;
+pub use erob_can_session::ErobCanSession;
 pub use event::{AxisReading, ProcedureEvent};
 pub use parallel::Parallel;
 pub use running::{Procedure, ProcedureError};

@@ -20,17 +20,25 @@ pub struct Mailbox {
     order: QueueOrder,
     frames: VecDeque<Frame>,
     capacity: usize,
+    /// Whether it takes CAN FD frames.
+    takes_fd: bool,
 }
 
 impl Mailbox {
     /// An empty mailbox with this capacity.
     pub fn new(order: QueueOrder, capacity: usize) -> Self {
-        Self { order, frames: VecDeque::with_capacity(capacity), capacity }
+        Self { order, frames: VecDeque::with_capacity(capacity), capacity, takes_fd: true }
     }
 
-    /// Adds a frame, if there is room.
+    /// The mailbox of a node on a classic bus: it refuses CAN FD frames.
+    pub fn classic(mut self) -> Self {
+        self.takes_fd = false;
+        self
+    }
+
+    /// Adds a frame, if there is room and the bus may carry it.
     pub fn push(&mut self, frame: Frame) -> bool {
-        if self.frames.len() >= self.capacity {
+        if self.frames.len() >= self.capacity || frame.is_fd() && !self.takes_fd {
             return false;
         }
         let at = match self.order {
@@ -44,11 +52,14 @@ impl Mailbox {
     /// Adds a frame, or replaces a waiting one with the same identifier, like a message buffer that is written again:
     /// the newest data is sent.
     pub fn put(&mut self, frame: Frame) -> bool {
-        if let Some(waiting) = self.frames.iter_mut().find(|waiting| waiting.id() == frame.id()) {
-            *waiting = frame;
-            return true;
+        let waiting = self.frames.iter_mut().find(|waiting| waiting.id() == frame.id());
+        match waiting {
+            Some(waiting) if self.takes_fd || !frame.is_fd() => {
+                *waiting = frame;
+                true
+            }
+            _ => self.push(frame),
         }
-        self.push(frame)
     }
 
     /// The frame that this node offers to the arbitration.

@@ -54,6 +54,10 @@ impl Medium {
     /// A free bus with one station for each mailbox.
     pub fn new(rates: WireBitRates, mailboxes: Vec<Mailbox>) -> Self {
         let is_connected = vec![true; mailboxes.len()];
+        let mailboxes = match rates.data {
+            Some(_) => mailboxes,
+            None => mailboxes.into_iter().map(Mailbox::classic).collect(),
+        };
         Self { rates, mailboxes, is_connected, on_wire: None, free_ns: 0, busy_ns: 0 }
     }
 
@@ -193,6 +197,18 @@ mod tests {
             start_ns += duration_ns;
         }
         assert_eq!(medium.busy_ns(), start_ns);
+    }
+
+    #[test]
+    fn a_station_takes_can_fd_frames_only_on_a_bus_that_is_set_up_for_them() {
+        let long = Frame::fd(Id::base(0x201).unwrap(), &[7; 16], true).unwrap();
+        let mut classic = Medium::with_master(RATES, 8, 1, 8);
+        for station in [0, 1] {
+            assert!(!classic.mailbox_mut(station).push(long) && !classic.mailbox_mut(station).put(long));
+        }
+        assert!(classic.mailbox_mut(0).push(frame(0x201)));
+        let mut flexible = Medium::with_master(WireBitRates { data: Some(5_000_000), ..RATES }, 8, 1, 8);
+        assert!(flexible.mailbox_mut(0).push(long) && flexible.mailbox_mut(1).put(long));
     }
 
     #[test]

@@ -8,9 +8,11 @@
 //!     arbitration           │
 //!     who sends, when       │
 //!     mailbox  wire        cia402 ── any CiA 402 drive, made from its electronic data sheet
-//!                          erob, yz_aim ── drives of their own, by their manuals and field experience
+//!                          erob, erob_can, yz_aim ── drives of their own, by their manuals and field experience
 //!     frames   bits,        │
-//!     waiting  stuffing   servo ── position, velocity and torque loops
+//!     waiting  stuffing     ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
+//!                           │     canopen_node ── these together, for the drives with CiA 402
+//!                         motion ── ramps, profiles, interpolation; servo ── position, velocity and torque loops
 //!                           │
 //!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
 //! ```
@@ -45,15 +47,22 @@
 //! assert_eq!(batch[0].frame, Frame::of(Id::canopen(0x700, 5), [0])); // boot-up
 //! ```
 
+mod canopen_node;
 pub mod cia402;
 mod defect;
 mod drive;
 pub mod erob;
+pub mod erob_can;
+mod errors;
+mod feedback_defects;
 pub mod homing_switches;
 mod live;
+mod loops;
 pub mod lss;
 mod mailbox;
 mod medium;
+mod motion;
+mod network;
 mod object_dictionary;
 mod pdo_engine;
 pub mod plant;
@@ -70,6 +79,7 @@ pub use drive::{Drive, DriveFault, NodeState, Observation};
 pub use live::LiveDrives;
 pub use mailbox::{Mailbox, QueueOrder};
 pub use medium::{FrameOnWire, Medium, WireBitRates};
+pub use object_dictionary::table::ObjectRow;
 pub use plant::Gravity;
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
 pub use sdo_reply::AbortCode;

@@ -1,11 +1,14 @@
-//! The object dictionary of a simulated device: its objects as an electronic data sheet describes them, their values, and
-//! the non-volatile memory.
+//! The object dictionary of a simulated device: its objects as an electronic data sheet or a table describes them, their
+//! values, and the non-volatile memory.
+
+pub mod table;
 
 use crate::canopen::eds;
 use crate::canopen::eds::{AccessType, DataTypeCode, ObjectType, ValueKind};
 use crate::canopen::object::ObjectAddress;
 
 use super::sdo_reply::AbortCode;
+use table::ObjectRow;
 
 /// Room for a value of variable length, such as a text, when the data sheet has a shorter one: bytes.
 const TEXT_CAPACITY: usize = 64;
@@ -42,29 +45,70 @@ pub struct ObjectEntry {
     pub is_saved: bool,
     low: i128,
     high: i128,
-    default: u64,
-    saved: u64,
-    value: u64,
+    default: i64,
+    saved: i64,
     bytes: Vec<u8>,
+    /// Bits of 64 that its type does not use, and the range of its type.
+    unused_bits: u32,
+    type_range: (i64, i64),
 }
 
 impl ObjectEntry {
-    fn mask(&self) -> u64 {
-        if self.length >= 8 { u64::MAX } else { (1 << (8 * self.length)) - 1 }
-    }
-
-    fn signed(&self, bits: u64) -> i128 {
-        let unused = 64 - 8 * self.length.clamp(1, 8) as u32;
-        match self.kind {
-            ObjectKind::Signed => i128::from((bits << unused).cast_signed() >> unused),
-            _ => i128::from(bits & self.mask()),
+    /// An entry of this type that can be read, with the value 0.
+    fn new(address: ObjectAddress, data_type: DataTypeCode) -> Self {
+        let (kind, bits) = match data_type.kind() {
+            ValueKind::Unsigned(bits) | ValueKind::Real(bits) => (ObjectKind::Unsigned, bits),
+            ValueKind::Signed(bits) => (ObjectKind::Signed, bits),
+            ValueKind::Text | ValueKind::Bytes | ValueKind::Other => (ObjectKind::Bytes, 0),
+        };
+        let length = usize::from(bits).div_ceil(8);
+        let unused_bits = 64 - 8 * length.clamp(1, 8) as u32;
+        let type_range = match kind {
+            ObjectKind::Signed => (i64::MIN >> unused_bits, i64::MAX >> unused_bits),
+            _ => (0, i64::try_from(u64::MAX >> unused_bits).unwrap_or(i64::MAX)),
+        };
+        Self {
+            address,
+            kind,
+            length,
+            is_readable: true,
+            is_writable: false,
+            maps_to_rpdo: false,
+            maps_to_tpdo: false,
+            is_saved: false,
+            low: i128::MIN,
+            high: i128::MAX,
+            default: 0,
+            saved: 0,
+            bytes: vec![],
+            unused_bits,
+            type_range,
         }
     }
 
-    fn check_range(&self, bits: u64) -> Result<(), AbortCode> {
-        match self.signed(bits) {
-            value if value > self.high => Err(AbortCode::ValueTooHigh),
-            value if value < self.low => Err(AbortCode::ValueTooLow),
+    /// The number in these bits, of which those beyond its length are cut off.
+    fn fit(&self, bits: i64) -> i64 {
+        let aligned = bits << self.unused_bits;
+        match self.kind {
+            ObjectKind::Signed => aligned >> self.unused_bits,
+            _ => (aligned.cast_unsigned() >> self.unused_bits).cast_signed(),
+        }
+    }
+
+    /// The nearest whole number that its type has.
+    fn nearest(&self, value: f64) -> i64 {
+        let (lowest, highest) = self.type_range;
+        (value.round_ties_even() as i64).clamp(lowest, highest)
+    }
+
+    fn check_range(&self, number: i64) -> Result<(), AbortCode> {
+        let number = match self.kind {
+            ObjectKind::Signed => i128::from(number),
+            _ => i128::from(number.cast_unsigned()),
+        };
+        match number {
+            number if number > self.high => Err(AbortCode::ValueTooHigh),
+            number if number < self.low => Err(AbortCode::ValueTooLow),
             _ => Ok(()),
         }
     }
@@ -74,6 +118,8 @@ impl ObjectEntry {
 #[derive(Clone, Debug, Default)]
 pub struct SimulatedDictionary {
     entries: Vec<ObjectEntry>,
+    /// The numbers of the entries; one without a sign has the bits of its value.
+    numbers: Vec<i64>,
     /// The data types that a PDO may map as placeholders.
     dummies: Vec<u16>,
 }
@@ -100,10 +146,22 @@ impl SimulatedDictionary {
                 read_entry(entry, node, is_count.then_some(highest), is_constant(entry.address))
             }));
         }
-        entries.sort_by_key(|entry| entry.address);
-        let mut own = Self { entries, dummies: sheet.dummies.iter().map(|code| code.0).collect() };
+        let mut own = Self::with(entries, sheet.dummies.iter().map(|code| code.0).collect());
         own.take_identity(&sheet.device);
         own
+    }
+
+    /// The dictionary of a device with this node ID, by a table in the order of the addresses: the places of the entries are
+    /// those of the rows.
+    pub fn of_table(rows: &[ObjectRow], node: u8) -> Self {
+        debug_assert!(rows.is_sorted_by_key(|row| (row.index, row.subindex)));
+        Self::with(rows.iter().map(|row| read_row(row, node)).collect(), vec![])
+    }
+
+    fn with(mut entries: Vec<ObjectEntry>, dummies: Vec<u16>) -> Self {
+        entries.sort_by_key(|entry| entry.address);
+        let numbers = entries.iter().map(|entry| entry.default).collect();
+        Self { entries, numbers, dummies }
     }
 
     /// The identity of the device, where object 1018 has no default: the file says it in `[DeviceInfo]` as well.
@@ -111,7 +169,7 @@ impl SimulatedDictionary {
         let stated = [device.vendor_number, device.product_number, device.revision_number];
         for (subindex, number) in (1..).zip(stated) {
             if let (Some(place), Some(number)) = (self.place(0x1018, subindex), number)
-                && self.entry(place).value == 0
+                && self.number(place) == 0
             {
                 self.set_factory(place, number.into());
             }
@@ -146,15 +204,14 @@ impl SimulatedDictionary {
         self.dummies.contains(&index)
     }
 
-    /// The bits of a number.
-    pub fn bits(&self, place: usize) -> u64 {
-        self.entries[place].value
-    }
-
     /// The value of a number.
     pub fn number(&self, place: usize) -> i64 {
-        let entry = &self.entries[place];
-        entry.signed(entry.value) as i64
+        self.numbers[place]
+    }
+
+    /// The value of a number as a real one.
+    pub fn real(&self, place: usize) -> f64 {
+        self.numbers[place] as f64
     }
 
     /// The value of a number, if the device has the object.
@@ -164,13 +221,17 @@ impl SimulatedDictionary {
 
     /// The value of a number as a real one, if the device has the object.
     pub fn real_at(&self, place: Option<usize>) -> Option<f64> {
-        self.number_at(place).map(|number| number as f64)
+        place.map(|place| self.real(place))
+    }
+
+    /// The value that a restart restores.
+    pub fn saved(&self, place: usize) -> i64 {
+        self.entries[place].saved
     }
 
     /// Sets a number; what does not fit its length is cut off, so a position wraps.
     pub fn set(&mut self, place: usize, value: i64) {
-        let entry = &mut self.entries[place];
-        entry.value = value.cast_unsigned() & entry.mask();
+        self.numbers[place] = self.entries[place].fit(value);
     }
 
     /// Sets a number, if the device has the object.
@@ -180,23 +241,30 @@ impl SimulatedDictionary {
         }
     }
 
+    /// Sets a number to the nearest value that its type has.
+    pub fn set_real(&mut self, place: usize, value: f64) {
+        self.numbers[place] = self.entries[place].nearest(value);
+    }
+
     /// Sets a number to the nearest value that its type has, if the device has the object.
     pub fn set_real_at(&mut self, place: Option<usize>, value: f64) {
-        let Some(place) = place else { return };
+        if let Some(place) = place {
+            self.set_real(place, value);
+        }
+    }
+
+    /// Sets a number to the nearest value within its range.
+    pub fn set_within(&mut self, place: usize, value: f64) {
         let entry = &self.entries[place];
-        let bits = 8 * entry.length.clamp(1, 8) as i32;
-        let (low, high) = match entry.kind {
-            ObjectKind::Signed => (-(2f64.powi(bits - 1)), 2f64.powi(bits - 1) - 1.0),
-            _ => (0.0, 2f64.powi(bits) - 1.0),
-        };
-        self.set(place, value.round_ties_even().clamp(low, high) as i64);
+        let nearest = i128::from(entry.nearest(value));
+        self.numbers[place] = nearest.min(entry.high).max(entry.low) as i64;
     }
 
     /// Sets a value that every restart and "load" restores.
     pub fn set_factory(&mut self, place: usize, value: i64) {
         self.set(place, value);
         let entry = &mut self.entries[place];
-        (entry.default, entry.saved) = (entry.value, entry.value);
+        (entry.default, entry.saved) = (self.numbers[place], self.numbers[place]);
     }
 
     /// Appends the bytes of an SDO transfer.
@@ -204,7 +272,7 @@ impl SimulatedDictionary {
         let entry = &self.entries[place];
         match entry.kind {
             ObjectKind::Bytes => value.extend_from_slice(&entry.bytes),
-            _ => value.extend(entry.value.to_le_bytes().into_iter().take(entry.length)),
+            _ => value.extend(self.numbers[place].to_le_bytes().into_iter().take(entry.length)),
         }
     }
 
@@ -221,9 +289,9 @@ impl SimulatedDictionary {
         }
         let mut bytes = [0; 8];
         bytes[..value.len()].copy_from_slice(value);
-        let bits = u64::from_le_bytes(bytes);
-        entry.check_range(bits)?;
-        Ok(entry.signed(bits) as i64)
+        let number = entry.fit(i64::from_le_bytes(bytes));
+        entry.check_range(number)?;
+        Ok(number)
     }
 
     /// Stores the bytes of an SDO transfer that [`Self::decode`] accepts.
@@ -240,15 +308,19 @@ impl SimulatedDictionary {
         Ok(())
     }
 
-    /// Whether a PDO may write these bits: their range is right.
-    pub fn accepts(&self, place: usize, bits: u64) -> bool {
-        self.entries[place].check_range(bits).is_ok()
+    /// The number in the bits of a PDO, when its range is right.
+    pub fn accepted(&self, place: usize, bits: u64) -> Option<i64> {
+        let entry = &self.entries[place];
+        let number = entry.fit(bits.cast_signed());
+        entry.check_range(number).is_ok().then_some(number)
     }
 
     /// Saves every parameter, as "save" in object 1010 does.
     pub fn save(&mut self) {
-        for entry in self.entries.iter_mut().filter(|entry| entry.is_saved) {
-            entry.saved = entry.value;
+        for (entry, number) in self.entries.iter_mut().zip(&self.numbers) {
+            if entry.is_saved {
+                entry.saved = *number;
+            }
         }
     }
 
@@ -261,37 +333,51 @@ impl SimulatedDictionary {
 
     /// Restores the saved values or defaults of every entry with an index in `indices`, as a restart does.
     pub fn restore(&mut self, indices: std::ops::RangeInclusive<u16>) {
-        for entry in self.entries.iter_mut().filter(|entry| indices.contains(&entry.address.index)) {
-            entry.value = entry.saved;
+        for (entry, number) in self.entries.iter().zip(&mut self.numbers) {
+            if indices.contains(&entry.address.index) {
+                *number = entry.saved;
+            }
         }
+    }
+}
+
+/// Reads a row of a table.
+fn read_row(row: &ObjectRow, node: u8) -> ObjectEntry {
+    let is_writable = row.access.is_writable();
+    let entry = ObjectEntry::new(ObjectAddress::new(row.index, row.subindex), row.data_type);
+    let default = entry.fit(row.default_of(node));
+    ObjectEntry {
+        is_readable: row.access != AccessType::WriteOnly,
+        is_writable,
+        maps_to_rpdo: row.is_mappable && is_writable,
+        maps_to_tpdo: row.is_mappable,
+        is_saved: row.is_saved,
+        low: row.lowest.into(),
+        high: row.highest.into(),
+        default,
+        saved: default,
+        ..entry
     }
 }
 
 /// Reads an entry. `count` is the highest sub-index, which sub-index 0 shows when the sheet gives it no value.
 fn read_entry(entry: &eds::DictionaryEntry, node: u8, count: Option<u8>, is_constant: bool) -> ObjectEntry {
     let data_type = entry.data_type.unwrap_or(DataTypeCode::DOMAIN);
-    let (kind, bits) = match data_type.kind() {
-        ValueKind::Unsigned(bits) | ValueKind::Real(bits) => (ObjectKind::Unsigned, bits),
-        ValueKind::Signed(bits) => (ObjectKind::Signed, bits),
-        ValueKind::Text | ValueKind::Bytes | ValueKind::Other => (ObjectKind::Bytes, 0),
-    };
     let encoded = entry.value().and_then(|value| value.encode(data_type, Some(node)));
     let encoded = encoded.unwrap_or_else(|| count.map_or_else(Vec::new, |count| vec![count]));
+    let own = ObjectEntry::new(entry.address, data_type);
     let mut value = [0; 8];
     let mut bytes = Vec::new();
-    if kind == ObjectKind::Bytes {
+    if own.kind == ObjectKind::Bytes {
         bytes.reserve_exact(TEXT_CAPACITY.max(encoded.len()));
         bytes.extend_from_slice(&encoded);
     } else {
         value.iter_mut().zip(&encoded).for_each(|(to, from)| *to = *from);
     }
-    let value = u64::from_le_bytes(value);
+    let default = own.fit(i64::from_le_bytes(value));
     let (low, high) = limits(entry, data_type, node);
     let is_writable = entry.access.is_writable() && !is_constant;
     ObjectEntry {
-        address: entry.address,
-        kind,
-        length: usize::from(bits).div_ceil(8),
         is_readable: entry.access != AccessType::WriteOnly,
         is_writable,
         maps_to_rpdo: entry.is_mappable && is_writable && entry.access != AccessType::ReadWriteRead,
@@ -300,10 +386,10 @@ fn read_entry(entry: &eds::DictionaryEntry, node: u8, count: Option<u8>, is_cons
         is_saved: is_writable && !is_command(entry.address.index),
         low,
         high,
-        default: value,
-        saved: value,
-        value,
+        default,
+        saved: default,
         bytes,
+        ..own
     }
 }
 
@@ -325,5 +411,87 @@ fn is_command(index: u16) -> bool {
             0x6040 | 0x6042 | 0x6060 | 0x6071 | 0x607A | 0x60B0..=0x60B2 | 0x60C1 | 0x60FF
         ),
         _ => false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::table::{I16, I32, U16, U32};
+    use super::*;
+
+    const ROWS: [ObjectRow; 5] = [
+        ObjectRow::read_only(0x6064, 0, I32, 0),
+        ObjectRow::read_only(0x606C, 0, I16, 0).within([-30_000, 30_000]),
+        ObjectRow::read_only(0x6079, 0, U16, 0),
+        ObjectRow::read_only(0x607A, 0, I32, 0).with_access(AccessType::ReadWrite),
+        ObjectRow::read_only(0x6081, 0, U32, 10).with_access(AccessType::ReadWrite).saved(),
+    ];
+    const POSITION: usize = 0;
+    const VELOCITY: usize = 1;
+    const VOLTAGE: usize = 2;
+    const TARGET_POSITION: usize = 3;
+    const PROFILE_VELOCITY: usize = 4;
+
+    fn dictionary() -> SimulatedDictionary {
+        SimulatedDictionary::of_table(&ROWS, 5)
+    }
+
+    fn bytes(dictionary: &SimulatedDictionary, place: usize) -> Vec<u8> {
+        let mut bytes = vec![];
+        dictionary.append(place, &mut bytes);
+        bytes
+    }
+
+    #[test]
+    fn a_restore_brings_back_saved_parameters_but_not_set_points() {
+        let mut dictionary = dictionary();
+        dictionary.set(PROFILE_VELOCITY, 77);
+        dictionary.set(TARGET_POSITION, 88);
+        dictionary.save();
+        dictionary.set(PROFILE_VELOCITY, 1);
+        dictionary.restore(0..=0xFFFF);
+        assert_eq!((dictionary.number(PROFILE_VELOCITY), dictionary.number(TARGET_POSITION)), (77, 0));
+        dictionary.forget();
+        dictionary.restore(0..=0xFFFF);
+        assert_eq!(dictionary.number(PROFILE_VELOCITY), 10);
+    }
+
+    #[test]
+    fn signed_values_keep_their_sign_and_wrap_when_they_are_set() {
+        let mut dictionary = dictionary();
+        dictionary.set(VELOCITY, -5);
+        assert_eq!((dictionary.number(VELOCITY), bytes(&dictionary, VELOCITY)), (-5, vec![0xFB, 0xFF]));
+        assert_eq!(dictionary.decode(VELOCITY, &[0xFB, 0xFF]), Ok(-5));
+        assert_eq!(dictionary.accepted(VELOCITY, 0xFFFB), Some(-5));
+        dictionary.set(VOLTAGE, -5);
+        assert_eq!(dictionary.number(VOLTAGE), 0xFFFB);
+        dictionary.set(POSITION, i64::from(i32::MAX) + 1);
+        assert_eq!(dictionary.number(POSITION), i64::from(i32::MIN));
+    }
+
+    #[test]
+    fn real_values_end_at_the_limits_of_their_type_or_of_their_range() {
+        let mut dictionary = dictionary();
+        let mut set = |place, value| {
+            dictionary.set_real(place, value);
+            let by_type = dictionary.number(place);
+            dictionary.set_within(place, value);
+            (by_type, dictionary.number(place))
+        };
+        assert_eq!(set(VELOCITY, 1e9), (32_767, 30_000));
+        assert_eq!(set(VELOCITY, -30_001.0), (-30_001, -30_000));
+        assert_eq!(set(VELOCITY, 2.5), (2, 2));
+        assert_eq!(set(VOLTAGE, -1.0), (0, 0));
+        assert_eq!(set(POSITION, -1e12), (i32::MIN.into(), i32::MIN.into()));
+    }
+
+    #[test]
+    fn a_value_out_of_its_range_is_refused_by_sdo_and_by_pdo() {
+        let dictionary = dictionary();
+        assert_eq!(dictionary.decode(VELOCITY, &30_001i16.to_le_bytes()), Err(AbortCode::ValueTooHigh));
+        assert_eq!(dictionary.decode(VELOCITY, &(-30_001i16).to_le_bytes()), Err(AbortCode::ValueTooLow));
+        assert_eq!(dictionary.accepted(VELOCITY, 30_001), None);
+        assert_eq!(dictionary.decode(VELOCITY, &[0; 3]), Err(AbortCode::LengthTooHigh));
+        assert_eq!(dictionary.decode(VELOCITY, &[0; 1]), Err(AbortCode::LengthTooLow));
     }
 }

@@ -7,7 +7,7 @@ use takt_rt::{Frame, Id, MappedObject, Nanoseconds};
 
 use super::object_dictionary::SimulatedDictionary;
 
-pub use parameters::check_parameter;
+pub use parameters::{check_parameter, is_parameter};
 
 /// The most objects in a PDO.
 const MAX_OBJECTS: usize = 64;
@@ -34,6 +34,11 @@ struct Field {
 impl Field {
     fn mask(self) -> u64 {
         if self.bits >= 64 { u64::MAX } else { (1 << self.bits) - 1 }
+    }
+
+    fn pack(self, dictionary: &SimulatedDictionary) -> u64 {
+        let number = dictionary.number_at(self.place).unwrap_or(0);
+        (number.cast_unsigned() & self.mask()) << self.shift
     }
 }
 
@@ -104,15 +109,18 @@ impl Pdo {
         self.transmission_type <= 240
     }
 
+    /// Whether an event sends it: transmission types 254 and 255. An empty one is not sent.
+    fn is_event_driven(&self) -> bool {
+        self.id.is_some() && self.transmission_type >= 254 && self.bytes > 0
+    }
+
     fn pack(&self, dictionary: &SimulatedDictionary) -> u64 {
-        let value = |field: &Field| field.place.map_or(0, |place| dictionary.bits(place) & field.mask());
-        self.fields.iter().fold(0, |word, field| word | value(field) << field.shift)
+        self.fields.iter().fold(0, |word, field| word | field.pack(dictionary))
     }
 
     fn pack_events(&self, dictionary: &SimulatedDictionary) -> u64 {
-        let value = |field: &Field| field.place.map_or(0, |place| dictionary.bits(place) & field.mask());
         let events = self.fields.iter().filter(|field| field.is_event);
-        events.fold(0, |word, field| word | value(field) << field.shift)
+        events.fold(0, |word, field| word | field.pack(dictionary))
     }
 
     fn frame(&self, word: u64) -> Option<Frame> {
@@ -125,10 +133,10 @@ impl Pdo {
 pub enum RpdoReception {
     /// The identifier belongs to no RPDO of this device.
     NotMine,
-    /// The data waits for SYNC.
-    Latched,
-    /// The data has been written to the dictionary.
-    Applied,
+    /// The data of the RPDO with this number, counted from 0, waits for SYNC.
+    Latched(usize),
+    /// The data of the RPDO with this number has been written to the dictionary.
+    Applied(usize),
     /// The frame is shorter than the mapping and was ignored.
     TooShort,
 }
@@ -191,13 +199,21 @@ impl Outbound {
 pub struct PdoEngine {
     inbound: Vec<Inbound>,
     outbound: Vec<Outbound>,
+    features: PdoFeatures,
+}
+
+/// What a device does with its PDOs.
+#[derive(Clone, Copy, Debug)]
+pub struct PdoFeatures {
     /// Whether an object is a measured value, which changes all the time.
-    is_measured: fn(u16) -> bool,
+    pub is_measured: fn(u16) -> bool,
+    /// Whether it watches the event timers of its RPDOs.
+    pub watches_rpdos: bool,
 }
 
 impl PdoEngine {
     /// The PDOs that the dictionary has.
-    pub fn new(dictionary: &SimulatedDictionary, is_measured: fn(u16) -> bool) -> Self {
+    pub fn new(dictionary: &SimulatedDictionary, features: PdoFeatures) -> Self {
         let places = |first: u16| {
             let numbers = (0..0x200u16).filter(move |number| dictionary.place(first + number, 1).is_some());
             numbers
@@ -216,20 +232,25 @@ impl PdoEngine {
             last_ns: 0,
             is_sent: false,
         });
-        let mut engine = Self { inbound: inbound.collect(), outbound: outbound.collect(), is_measured };
+        let mut engine = Self { inbound: inbound.collect(), outbound: outbound.collect(), features };
         engine.compile(dictionary);
         engine
     }
 
     /// Compiles the parameters of the dictionary. Latched and sampled data is discarded.
     pub fn compile(&mut self, dictionary: &SimulatedDictionary) {
+        self.update(dictionary);
+        self.stop();
+    }
+
+    /// Compiles the parameters of the dictionary. Latched and sampled data stays.
+    pub fn update(&mut self, dictionary: &SimulatedDictionary) {
         for inbound in &mut self.inbound {
-            inbound.pdo.compile(dictionary, self.is_measured);
+            inbound.pdo.compile(dictionary, self.features.is_measured);
         }
         for outbound in &mut self.outbound {
-            outbound.pdo.compile(dictionary, self.is_measured);
+            outbound.pdo.compile(dictionary, self.features.is_measured);
         }
-        self.stop();
     }
 
     /// Receives a frame in NMT operational. A synchronous RPDO waits for SYNC, the others act at once.
@@ -240,28 +261,47 @@ impl PdoEngine {
         dictionary: &mut SimulatedDictionary,
         write: WriteField<'_>,
     ) -> RpdoReception {
-        let Some(inbound) = self.inbound.iter_mut().find(|inbound| inbound.pdo.id == Some(frame.id())) else {
+        let mut inbounds = self.inbound.iter_mut().enumerate();
+        let Some((number, inbound)) = inbounds.find(|(_, inbound)| inbound.pdo.id == Some(frame.id())) else {
             return RpdoReception::NotMine;
         };
         if frame.payload().len() < inbound.pdo.bytes {
             return RpdoReception::TooShort;
         }
-        inbound.deadline_ns = if inbound.pdo.event_ns == 0 { NEVER } else { now_ns + inbound.pdo.event_ns };
+        if self.features.watches_rpdos && inbound.pdo.event_ns > 0 {
+            inbound.deadline_ns = now_ns + inbound.pdo.event_ns;
+        }
         if inbound.pdo.is_synchronous() {
             inbound.latched = Some(frame.first_word());
-            return RpdoReception::Latched;
+            return RpdoReception::Latched(number);
         }
         inbound.unpack(frame.first_word(), dictionary, write);
-        RpdoReception::Applied
+        RpdoReception::Applied(number)
     }
 
     /// SYNC, first part: applies the latched data.
     pub fn apply_latched(&mut self, dictionary: &mut SimulatedDictionary, write: WriteField<'_>) {
-        for inbound in &mut self.inbound {
-            if let Some(word) = inbound.latched.take() {
-                inbound.unpack(word, dictionary, &mut *write);
-            }
+        for number in 0..self.inbound.len() {
+            self.apply_latched_of(number, dictionary, &mut *write);
         }
+    }
+
+    /// Applies the latched data of one RPDO. Returns whether there was any.
+    pub fn apply_latched_of(
+        &mut self,
+        number: usize,
+        dictionary: &mut SimulatedDictionary,
+        write: WriteField<'_>,
+    ) -> bool {
+        let inbound = &mut self.inbound[number];
+        let Some(word) = inbound.latched.take() else { return false };
+        inbound.unpack(word, dictionary, write);
+        true
+    }
+
+    /// Whether an RPDO carries an object.
+    pub fn carries(&self, number: usize, place: usize) -> bool {
+        self.inbound[number].pdo.fields.iter().any(|field| field.place == Some(place))
     }
 
     /// SYNC, second part: samples the synchronous TPDOs, which are sent `latency_ns` later. `counter` is that of the SYNC
@@ -305,12 +345,17 @@ impl PdoEngine {
         }
     }
 
+    /// Whether an event can send a TPDO.
+    pub fn has_events(&self) -> bool {
+        self.outbound.iter().any(|outbound| outbound.pdo.is_event_driven())
+    }
+
     /// Checks the event-driven TPDOs (types 254 and 255). Events: the first time, the event timer, and a change of a
     /// mapped object other than measured values.
     pub fn sample_events(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) {
         for outbound in &mut self.outbound {
             let pdo = &outbound.pdo;
-            if pdo.id.is_none() || pdo.transmission_type < 254 || pdo.bytes == 0 || outbound.due_ns != NEVER {
+            if !pdo.is_event_driven() || outbound.due_ns != NEVER {
                 continue;
             }
             let since_ns = now_ns.saturating_sub(outbound.last_ns);
@@ -320,13 +365,36 @@ impl PdoEngine {
             let events = pdo.pack_events(dictionary);
             let is_timed_out = pdo.event_ns > 0 && since_ns >= pdo.event_ns;
             if !outbound.is_sent || events != outbound.events || is_timed_out {
-                outbound.is_sent = true;
                 outbound.events = events;
-                outbound.last_ns = now_ns;
                 outbound.sampled = outbound.pdo.pack(dictionary);
                 outbound.due_ns = now_ns;
             }
         }
+    }
+
+    /// An event of the device: samples a TPDO, which is sent `latency_ns` later, or when its inhibit time is over.
+    pub fn trigger(
+        &mut self,
+        number: usize,
+        now_ns: Nanoseconds,
+        latency_ns: Nanoseconds,
+        dictionary: &SimulatedDictionary,
+    ) {
+        let outbound = &mut self.outbound[number];
+        let free_ns = if outbound.is_sent { outbound.last_ns + outbound.pdo.inhibit_ns } else { 0 };
+        outbound.sampled = outbound.pdo.pack(dictionary);
+        outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(free_ns));
+    }
+
+    /// How many SYNCs a synchronous TPDO waits for; `None` for another one.
+    pub fn syncs_of(&self, number: usize) -> Option<u8> {
+        let pdo = &self.outbound[number].pdo;
+        pdo.is_synchronous().then_some(pdo.transmission_type)
+    }
+
+    /// The event timer of a TPDO; 0 without one.
+    pub fn event_timer_of(&self, number: usize) -> Nanoseconds {
+        self.outbound[number].pdo.event_ns
     }
 
     /// Whether the event timer of an RPDO has just run out.
@@ -350,6 +418,8 @@ impl PdoEngine {
     pub fn next(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
         let outbound = self.outbound.iter_mut().find(|outbound| outbound.due_ns <= now_ns)?;
         outbound.due_ns = NEVER;
+        outbound.is_sent = true;
+        outbound.last_ns = now_ns;
         outbound.pdo.frame(outbound.sampled)
     }
 

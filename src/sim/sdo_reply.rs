@@ -1,11 +1,4 @@
-//! What the SDO servers of all simulated drives share: the abort codes, the layout of the replies, and the one buffer from
-//! which a reply leaves after the latency of the drive.
-
-use std::ops::Range;
-
-use takt_rt::Nanoseconds;
-
-use super::random::Random;
+//! The replies of the SDO server of a simulated drive: the abort codes and the layout.
 
 /// The SDO abort codes of the simulated drives (CiA 301, 7.2.4.3.17).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,47 +65,4 @@ pub fn downloaded(index: u16, subindex: u8) -> [u8; 8] {
 /// An abort.
 pub fn aborted(index: u16, subindex: u8, code: AbortCode) -> [u8; 8] {
     addressed(0x80, index, subindex, (code as u32).to_le_bytes())
-}
-
-/// The one buffer of a server. While it is full, requests are lost.
-#[derive(Clone, Debug)]
-pub struct ReplyBuffer {
-    /// When the request is finished, and its reply, if it gets one.
-    pending: Option<(Nanoseconds, Option<[u8; 8]>)>,
-    latency: Random,
-    range_ns: Range<Nanoseconds>,
-}
-
-impl ReplyBuffer {
-    /// An empty buffer whose replies take a time in this range.
-    pub fn new(latency: Random, range_ns: Range<Nanoseconds>) -> Self {
-        Self { pending: None, latency, range_ns }
-    }
-
-    /// Discards the reply.
-    pub fn reset(&mut self) {
-        self.pending = None;
-    }
-
-    /// Whether a request is being processed; a further one is lost.
-    pub fn is_busy(&self) -> bool {
-        self.pending.is_some()
-    }
-
-    /// Queues the reply; a request without a reply takes the same time.
-    pub fn put(&mut self, now_ns: Nanoseconds, reply: Option<[u8; 8]>) {
-        self.pending = Some((now_ns + self.latency.within(self.range_ns.clone()), reply));
-    }
-
-    /// When the current request is finished.
-    pub fn due_ns(&self) -> Option<Nanoseconds> {
-        self.pending.map(|(due_ns, _)| due_ns)
-    }
-
-    /// The reply, when it is due.
-    pub fn take(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
-        let (_, reply) = self.pending.filter(|(due_ns, _)| *due_ns <= now_ns)?;
-        self.pending = None;
-        reply
-    }
 }

@@ -1,4 +1,5 @@
-//! The SDO server of a simulated device: one transfer at a time, expedited, segmented or in blocks (CiA 301, 7.2.4).
+//! The SDO server of a simulated device: one transfer at a time, expedited, segmented or in blocks (CiA 301, 7.2.4). Its
+//! replies leave after the latency of the device.
 //!
 //! The server holds the state of a transfer and encodes its frames. [`ObjectAccess`], passed with each request, reads and
 //! writes the objects.
@@ -27,20 +28,35 @@ pub trait ObjectAccess {
     fn read(&mut self, address: ObjectAddress, value: &mut Vec<u8>) -> Result<(), AbortCode>;
 
     /// Checks that an object can be written, before the value is complete. Returns its length in bytes, if that is fixed.
-    fn check_write(&self, address: ObjectAddress) -> Result<Option<usize>, AbortCode>;
+    fn check_write(&mut self, address: ObjectAddress) -> Result<Option<usize>, AbortCode>;
 
     /// Writes an object with its complete value.
     fn write(&mut self, address: ObjectAddress, value: &[u8]) -> Result<(), AbortCode>;
+
+    /// The code with which the device refuses where the standard has `code`; `None` when it does not reply.
+    fn refusal(&self, code: AbortCode) -> Option<AbortCode> {
+        Some(code)
+    }
 }
 
-/// What a server can do beside expedited and segmented transfers.
+/// The transfers that a server has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SdoFeatures {
-    /// Whether it answers every upload in segments, which CiA 301 permits.
-    pub is_upload_segmented: bool,
-    /// Whether it has block transfers.
-    pub has_blocks: bool,
+pub enum SdoFeatures {
+    /// Expedited ones only, with the commands that such a transfer needs.
+    Expedited,
+    /// Expedited and segmented ones.
+    Segmented {
+        /// Whether it answers every upload in segments, which CiA 301 permits.
+        is_upload_segmented: bool,
+    },
+    /// All, block transfers too.
+    Blocks,
 }
+
+/// The commands of expedited transfers: read, and write with and without a size.
+const EXPEDITED: [u8; 6] = [0x40, 0x22, 0x23, 0x27, 0x2B, 0x2F];
+/// The command with which a client aborts.
+const ABORT: u8 = 0x80;
 
 /// The transfer that is under way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,8 +95,8 @@ pub struct SdoServer {
     /// The value of the transfer.
     value: Vec<u8>,
     replies: VecDeque<[u8; 8]>,
-    /// When the replies leave.
-    due_ns: Nanoseconds,
+    /// When the present request is done and its replies leave. The server is busy until then.
+    due_ns: Option<Nanoseconds>,
     latency: Random,
     latency_ns: Range<Nanoseconds>,
     features: SdoFeatures,
@@ -93,7 +109,7 @@ impl SdoServer {
             transfer: Transfer::None,
             value: Vec::with_capacity(BUFFER),
             replies: VecDeque::with_capacity(REPLIES),
-            due_ns: 0,
+            due_ns: None,
             latency,
             latency_ns,
             features,
@@ -106,10 +122,10 @@ impl SdoServer {
             transfer: Transfer::None,
             value: Vec::new(),
             replies: VecDeque::new(),
-            due_ns: 0,
+            due_ns: None,
             latency: Random::placeholder(),
             latency_ns: 0..1,
-            features: SdoFeatures { is_upload_segmented: false, has_blocks: false },
+            features: SdoFeatures::Expedited,
         }
     }
 
@@ -117,31 +133,41 @@ impl SdoServer {
     pub fn reset(&mut self) {
         self.transfer = Transfer::None;
         self.replies.clear();
+        self.due_ns = None;
     }
 
-    /// When the next reply is due.
+    /// When the present request is done.
     pub fn due_ns(&self) -> Option<Nanoseconds> {
-        (!self.replies.is_empty()).then_some(self.due_ns)
+        self.due_ns
     }
 
     /// A reply that is due.
     pub fn answer(&mut self, now_ns: Nanoseconds) -> Option<[u8; 8]> {
-        if self.due_ns > now_ns { None } else { self.replies.pop_front() }
+        if self.due_ns.is_none_or(|due_ns| due_ns > now_ns) {
+            return None;
+        }
+        let reply = self.replies.pop_front();
+        if self.replies.is_empty() {
+            self.due_ns = None;
+        }
+        reply
     }
 
     /// Takes a request. A request before the last reply was sent is lost, because the server has one buffer.
     pub fn request(&mut self, now_ns: Nanoseconds, request: [u8; 8], access: &mut impl ObjectAccess) {
-        if !self.replies.is_empty() {
+        if self.due_ns.is_some() {
             return;
         }
         let address = ObjectAddress::new(u16::from_le_bytes([request[1], request[2]]), request[3]);
-        if let Err(code) = self.handle(request, address, access) {
+        let handled = self.handle(request, address, access);
+        if let Err(code) = handled {
             let ObjectAddress { index, subindex } = self.transfer.address().unwrap_or(address);
             self.transfer = Transfer::None;
-            self.replies.push_back(aborted(index, subindex, code));
+            self.replies.extend(access.refusal(code).map(|code| aborted(index, subindex, code)));
         }
-        if !self.replies.is_empty() {
-            self.due_ns = now_ns + self.latency.within(self.latency_ns.clone());
+        // A refusal in silence takes as long as a reply.
+        if handled.is_err() || !self.replies.is_empty() {
+            self.due_ns = Some(now_ns + self.latency.within(self.latency_ns.clone()));
         }
     }
 
@@ -151,20 +177,27 @@ impl SdoServer {
         address: ObjectAddress,
         access: &mut impl ObjectAccess,
     ) -> Result<(), AbortCode> {
-        if request[0] == 0x80 {
+        if request[0] == ABORT {
             self.transfer = Transfer::None;
             return Ok(());
         }
         if self.receives_block() {
             return self.receive_block_segment(request);
         }
+        if self.features == SdoFeatures::Expedited && !EXPEDITED.contains(&request[0]) {
+            return Err(AbortCode::Command);
+        }
         match request[0] >> 5 {
             0 => self.download_segment(request, access),
             1 => self.download(request, address, access),
             2 => self.upload(address, access),
             3 => self.upload_segment(request),
-            5 if self.features.has_blocks => self.block_upload(request, address, access),
-            6 if self.features.has_blocks => self.block_download(request, address, access),
+            4 => {
+                self.transfer = Transfer::None;
+                Ok(())
+            }
+            5 if self.features == SdoFeatures::Blocks => self.block_upload(request, address, access),
+            6 if self.features == SdoFeatures::Blocks => self.block_download(request, address, access),
             _ => Err(AbortCode::Command),
         }
     }
@@ -240,7 +273,8 @@ impl SdoServer {
         access.read(address, &mut self.value)?;
         let size = self.value.len();
         let ObjectAddress { index, subindex } = address;
-        if (1..=4).contains(&size) && !self.features.is_upload_segmented {
+        let is_segmented = self.features == SdoFeatures::Segmented { is_upload_segmented: true };
+        if (1..=4).contains(&size) && !is_segmented {
             let mut data = [0; 4];
             data[..size].copy_from_slice(&self.value);
             self.replies.push_back(uploaded(index, subindex, data, size));

@@ -58,9 +58,15 @@ impl Servo {
 
     /// Torque for a torque set-point, limited so that the velocity stays within its limit.
     pub fn torque(&mut self, demand: f64, velocity: f64) -> f64 {
+        self.torque_within(demand, velocity, self.velocity_limit)
+    }
+
+    /// As [`Servo::torque`], with another limit of the velocity, if it is a lower one.
+    pub fn torque_within(&mut self, demand: f64, velocity: f64, velocity_limit: f64) -> f64 {
+        let velocity_limit = velocity_limit.min(self.velocity_limit);
         let gain = self.inertia * VELOCITY_RATE;
-        let highest = (gain * (self.velocity_limit - velocity)).min(self.torque_limit);
-        let lowest = (gain * (-self.velocity_limit - velocity)).max(-self.torque_limit);
+        let highest = (gain * (velocity_limit - velocity)).min(self.torque_limit);
+        let lowest = (gain * (-velocity_limit - velocity)).max(-self.torque_limit);
         demand.min(highest).max(lowest).clamp(-self.torque_limit, self.torque_limit)
     }
 }

@@ -44,22 +44,19 @@ impl WireLength {
 
     fn classic(frame: &Frame) -> Self {
         let (head, head_bits) = classic_head(frame);
-        let mut stuffing = Stuffing::default();
         let mut crc = Crc15::default();
         // The register starts at zero, so leading zero bits change nothing and any alignment is right.
         for byte in head.to_be_bytes() {
             crc.push(byte);
         }
-        stuffing.push(head, head_bits);
         for &byte in frame.payload() {
             crc.push(byte);
         }
         let payload_bits = 8 * frame.payload().len() as u32;
-        if payload_bits > 0 {
-            let payload = frame.first_word().swap_bytes() >> (64 - payload_bits);
-            stuffing.push(payload, payload_bits);
-        }
-        stuffing.push(crc.0.into(), 15);
+        let payload = u128::from(frame.first_word().swap_bytes()) >> (64 - payload_bits);
+        let bits = (u128::from(head) << payload_bits | payload) << 15 | u128::from(crc.0);
+        let mut stuffing = Stuffing::default();
+        stuffing.push(bits, head_bits + payload_bits + 15);
         let nominal_bits = head_bits + payload_bits + 15 + stuffing.stuffed + TAIL_BITS;
         Self { nominal_bits, data_bits: 0, stuff_bits: stuffing.stuffed }
     }
@@ -67,7 +64,7 @@ impl WireLength {
     fn flexible(frame: &Frame, has_bit_rate_switch: bool) -> Self {
         let (head, head_bits) = flexible_head(frame, has_bit_rate_switch);
         let mut stuffing = Stuffing::default();
-        stuffing.push(head, head_bits);
+        stuffing.push(head.into(), head_bits);
         let head_stuffed = stuffing.stuffed;
         // ESI (error active: dominant) and the length code.
         stuffing.push(length_code(frame.length()).into(), 1 + 4);
@@ -144,36 +141,65 @@ fn length_code(bytes: usize) -> u8 {
 /// as the first of the next run.
 #[derive(Clone, Copy, Default)]
 struct Stuffing {
-    level: bool,
-    run: u32,
+    /// The run of equal bits at the end: its length, 0 to 4, and in the lowest bit its level.
+    run: u8,
     stuffed: u32,
     /// Whether a stuff bit follows the last bit pushed.
     is_just_stuffed: bool,
 }
 
-impl Stuffing {
-    /// Takes the low `count` bits of `bits`, the highest of them first, a run of equal bits at a time.
-    fn push(&mut self, bits: u64, count: u32) {
-        let mut left = count.min(64);
-        let mut bits = if left == 0 { 0 } else { bits << (64 - left) };
-        while left > 0 {
-            let level = bits >> 63 == 1;
-            let same = if level { bits.leading_ones() } else { bits.leading_zeros() }.min(left);
-            self.push_run(level, same);
-            left -= same;
-            bits = bits.checked_shl(same).unwrap_or(0);
+/// The runs that a bit can follow.
+const RUNS: usize = 10;
+/// What a byte does after each run: see [`after_byte`].
+const STUFFING_TABLE: [[u8; 256]; RUNS] = {
+    let mut table = [[0; 256]; RUNS];
+    let mut run = 0;
+    while run < RUNS {
+        let mut byte = 0;
+        while byte < 256 {
+            table[run][byte] = after_byte(run as u8, byte as u8);
+            byte += 1;
         }
+        run += 1;
     }
+    table
+};
 
-    fn push_run(&mut self, level: bool, length: u32) {
-        self.run = if level == self.level { self.run + length } else { length };
-        self.level = level;
-        self.stuffed += self.run / 5;
-        self.is_just_stuffed = self.run > 0 && self.run.is_multiple_of(5);
-        self.run %= 5;
-        if self.is_just_stuffed {
-            self.level = !level;
-            self.run = 1;
+/// The run after one more bit, and whether a stuff bit came behind it.
+const fn after_bit(run: u8, bit: u8) -> (u8, bool) {
+    let length = if bit == run & 1 { (run >> 1) + 1 } else { 1 };
+    if length == 5 { (1 << 1 | bit ^ 1, true) } else { (length << 1 | bit, false) }
+}
+
+/// The run after eight more bits, with bit 4 if a stuff bit came behind the last one; from bit 5 on the number of stuff
+/// bits.
+const fn after_byte(mut run: u8, byte: u8) -> u8 {
+    let mut stuffed = 0;
+    let mut is_stuffed = false;
+    let mut left = 8;
+    while left > 0 {
+        left -= 1;
+        (run, is_stuffed) = after_bit(run, byte >> left & 1);
+        stuffed += is_stuffed as u8;
+    }
+    stuffed << 5 | (is_stuffed as u8) << 4 | run
+}
+
+impl Stuffing {
+    /// Takes the low `count` bits of `bits`, the highest of them first.
+    fn push(&mut self, bits: u128, count: u32) {
+        let mut left = count;
+        while !left.is_multiple_of(8) {
+            left -= 1;
+            (self.run, self.is_just_stuffed) = after_bit(self.run, (bits >> left) as u8 & 1);
+            self.stuffed += u32::from(self.is_just_stuffed);
+        }
+        while left > 0 {
+            left -= 8;
+            let after = STUFFING_TABLE[usize::from(self.run)][usize::from((bits >> left) as u8)];
+            self.run = after & 0xF;
+            self.is_just_stuffed = after & 0x10 != 0;
+            self.stuffed += u32::from(after >> 5);
         }
     }
 }

@@ -34,6 +34,8 @@ pub struct AxisDescription {
     pub group: usize,
     /// The family of its drive, which its error codes belong to; `None` in a recording of an earlier version.
     pub family: Option<String>,
+    /// The error codes that its drive has its own words for, beside those of its family.
+    pub own_errors: Vec<(u16, String)>,
     /// The unit of its position.
     pub unit: Unit,
     /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
@@ -140,7 +142,8 @@ impl Machine {
 
     /// An error code of the drive of an axis, in words.
     pub fn drive_error(&self, axis: u8, code: u16) -> String {
-        family::error_words(self.family(axis), code)
+        let own = self.axes.get(usize::from(axis)).map_or(&[][..], |axis| &axis.own_errors);
+        family::own_error_words(own, code).unwrap_or_else(|| family::error_words(self.family(axis), code))
     }
 
     /// The cure of an error of the drive of an axis.
@@ -170,6 +173,7 @@ impl AxisDescription {
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()),
             group: config.group_of_axis(number),
             family: Some(axis.drive.word.to_owned()),
+            own_errors: family::own_errors(&axis.drive).to_vec(),
             unit,
             plans_own_profile: matches!(
                 axis.control,

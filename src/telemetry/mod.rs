@@ -18,6 +18,7 @@ mod listener;
 mod logger;
 mod machine;
 mod messages;
+mod own_errors;
 mod realtime;
 mod recorded;
 mod recording;

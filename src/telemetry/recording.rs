@@ -16,6 +16,7 @@ use super::destination::Opened;
 use super::history::OnBus;
 use super::machine::Machine;
 use super::messages::{self, MessageType};
+use super::own_errors;
 use super::wall_clock::WallClock;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
@@ -93,6 +94,10 @@ impl Recording {
                 ("jerk_limit".to_owned(), description.limits.jerk.to_string()),
             ]);
             metadata.extend(description.family.clone().map(|family| ("drive".to_owned(), family)));
+            if !description.own_errors.is_empty() {
+                let text = own_errors::write(&description.own_errors);
+                metadata.insert(own_errors::OWN_ERRORS.to_owned(), text);
+            }
             metadata.extend(description.bus.clone().map(|bus| ("bus".to_owned(), bus)));
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }

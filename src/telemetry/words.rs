@@ -134,6 +134,7 @@ mod tests {
             bus: None,
             group: 0,
             family: Some("erob-canopen".to_owned()),
+            own_errors: vec![],
             unit,
             plans_own_profile: false,
             counts_per_unit: 1.0,

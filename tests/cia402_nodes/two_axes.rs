@@ -4,11 +4,13 @@ use std::io::Write as _;
 use std::path::PathBuf;
 
 use takt::Config;
-use takt::controller::Outcome;
+use takt::commission::bus_session::{self, SessionEvent};
+use takt::commission::{CommandValue, MotionProfile, MoveKind, TargetDrive, Task, procedure};
+use takt::controller::{Outcome, VirtualClock};
 use takt::family::bring_up::ProcessData;
 use takt::family::cia402::{self, Device};
 use takt::schedule::{self, MessageKind};
-use takt::sim::DriveFault;
+use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::{Frame, Id, Origin, Phase, Rule};
 
 use crate::machine::{finish, moving, run_of, sheet};
@@ -275,4 +277,42 @@ fn a_further_axis_alone_is_moved_while_the_first_one_stays_where_it_is() {
     let sent = &run.ports()[0].sent;
     assert_eq!(written(sent, 1, 0x6040, 0), [0; 0]);
     assert!(run.ports()[0].bus.observe(1).unwrap().position.abs() < 1e-6);
+}
+
+#[test]
+fn commissioning_of_the_second_axis_moves_the_second_axis_alone() {
+    let mut config = machine("");
+    config.simulation.longest_gap_ns = u64::MAX;
+    let profile = MotionProfile {
+        velocity: Some(CommandValue::Joint(0.5)),
+        acceleration: Some(CommandValue::Joint(2.0)),
+        deceleration: Some(CommandValue::Joint(2.0)),
+    };
+    let task = Task::Move {
+        kind: MoveKind::Absolute { to: CommandValue::Joint(0.25), is_immediate: false },
+        profile,
+        keeps_enabled: false,
+    };
+    let mut bus = SimulatedBus::new(&config, 0);
+    let procedure = procedure(TargetDrive::of(&config.axes[1]).unwrap(), task);
+    let mut touched = vec![];
+    bus_session::run(
+        procedure,
+        &mut bus,
+        &mut VirtualClock::default(),
+        || false,
+        |_, seen| {
+            if let SessionEvent::Sent(frame) = seen
+                && frame.id() == Id::canopen(0x600, 1)
+            {
+                touched.push(u16::from_le_bytes([frame.payload()[1], frame.payload()[2]]));
+            }
+        },
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
+    let profile_objects: Vec<u16> = touched.into_iter().filter(|index| *index >= 0x6000).collect();
+    assert!(!profile_objects.is_empty());
+    assert!(profile_objects.iter().all(|index| *index >= 0x6800), "{profile_objects:04X?}");
+    // Observed is the first axis of a node.
+    assert!(bus.observe(1).unwrap().position.abs() < 1e-6);
 }

@@ -64,6 +64,7 @@ fn with(drives: Vec<YzAimParameters>) -> Bench {
         drive: family::YZ_AIM,
         travel: Travel::Rotary,
         counts_per_turn: 32_768.0,
+        rated_torque: None,
         scale: Scale::new(scale).unwrap(),
         limits: Some(limits()),
         patience_ns: SECOND,

@@ -1,6 +1,6 @@
 //! Complete files.
 
-use takt::canopen::eds::{self, AccessType, DataTypeCode, DictionaryEntry, Loaded, ObjectType};
+use takt::canopen::eds::{self, DictionaryEntry, Loaded, ObjectType};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::objects::PdoDirection;
 use takt::sim::erob;
@@ -69,27 +69,14 @@ fn every_entry_of_the_erob_file_agrees_with_the_simulated_drive() {
     for object in &erob::OBJECTS {
         let address = ObjectAddress::new(object.index, object.subindex);
         let entry = dictionary.entry(address).unwrap_or_else(|| panic!("{address} is missing"));
-        let code = match object.data_type {
-            erob::ErobDataType::I8 => 2,
-            erob::ErobDataType::I16 => 3,
-            erob::ErobDataType::I32 => 4,
-            erob::ErobDataType::U8 => 5,
-            erob::ErobDataType::U16 => 6,
-            erob::ErobDataType::U32 => 7,
-        };
-        let access = match object.access {
-            erob::ErobAccess::ReadOnly => AccessType::ReadOnly,
-            erob::ErobAccess::ReadWrite => AccessType::ReadWrite,
-            erob::ErobAccess::WriteOnly => AccessType::WriteOnly,
-        };
-        assert_eq!((entry.data_type, entry.access), (Some(DataTypeCode(code)), access), "{address}");
+        assert_eq!((entry.data_type, entry.access), (Some(object.data_type), object.access), "{address}");
         assert_eq!(entry.is_mappable, object.is_mappable, "{address}");
         // A default that the file leaves open is unknown.
         if let Some(bytes) =
-            entry.default.as_ref().map(|stated| stated.value.encode(DataTypeCode(code), Some(2)))
+            entry.default.as_ref().map(|stated| stated.value.encode(object.data_type, Some(2)))
         {
-            let default = object.default + if object.adds_node { 2 } else { 0 };
-            let length = object.data_type.bytes();
+            let default = object.default_of(2);
+            let length = usize::from(object.data_type.bits().unwrap() / 8);
             assert_eq!(bytes.as_deref(), default.to_le_bytes().get(..length), "{address}");
         }
     }

@@ -42,3 +42,49 @@ fn an_invalid_scenario_is_refused_before_any_motion() {
     assert!(problem["message"].as_str().unwrap().contains("elbow"), "{refusal}");
     assert!(problem["help"].as_str().unwrap().contains("joint1"), "{refusal}");
 }
+
+#[test]
+fn an_error_of_a_drive_has_the_words_of_its_quirk_file_in_the_run_its_report_its_recording_and_its_black_box()
+{
+    const WORDS: &str = "0x3210 (the bus bar of the vendor is too hot)";
+    let place = tempfile::tempdir().unwrap();
+    let sheets = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/eds/vendors");
+    let drive = |name: &str, node: u8, more: &str| {
+        format!(
+            "[[axis]]\nname = {name:?}\nbus = \"can\"\nnode = {node}\ndrive = \"cia402\"\ncounts_per_turn = 65536\n\
+             eds = {:?}\n{more}\nlimits = {{ position = [-2, 2], velocity = 2, acceleration = 8, torque = 10 }}\n",
+            sheets.join("eyou-euservo.eds").display().to_string()
+        )
+    };
+    let text = format!(
+        "name = \"two\"\n[[bus]]\nname = \"can\"\n{}{}[[program.move]]\nto = 1.5\n",
+        drive("named", 1, "quirks = \"named.toml\""),
+        drive("plain", 2, "")
+    );
+    fs::write(place.path().join("two.toml"), text).unwrap();
+    fs::write(
+        place.path().join("named.toml"),
+        "[drive]\nvendor = \"V\"\nproduct = \"P\"\nstatus = \"from its data sheet, not tried on hardware\"\nsources = []\n\
+         [errors]\n3210 = \"the bus bar of the vendor is too hot\"\n",
+    )
+    .unwrap();
+    let fault = "[[fault]]\nkind = \"over-voltage\"\naxis = \"named\"\nwhen = \"moving\"\nat = \"200 ms\"\n";
+    fs::write(place.path().join("faults.toml"), fault).unwrap();
+    let takt = |arguments: &[&str]| {
+        Command::new(env!("CARGO_BIN_EXE_takt")).current_dir(place.path()).args(arguments).output().unwrap()
+    };
+    let output = takt(&["run", "two.toml", "--faults", "faults.toml", "--record", "run.mcap"]);
+    let (said, shown) =
+        (String::from_utf8(output.stderr).unwrap(), String::from_utf8(output.stdout).unwrap());
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains(WORDS), "the events: {said}");
+    assert!(shown.contains(WORDS), "the report: {shown}");
+    assert!(!said.contains("DC link over-voltage"), "{said}");
+    let black_box = fs::read_dir(place.path().join("runs")).unwrap().map(|entry| entry.unwrap().path());
+    let black_box = black_box.last().unwrap();
+    for file in [place.path().join("run.mcap"), black_box] {
+        let output = takt(&["report", file.to_str().unwrap()]);
+        let shown = String::from_utf8(output.stdout).unwrap();
+        assert!(shown.contains(WORDS), "{}: {shown}", file.display());
+    }
+}

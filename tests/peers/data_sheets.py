@@ -15,6 +15,8 @@ COUNTS = 2000
 DRIVES = (
     ("eyou-euservo", 50_000, 500_000),
     ("faulhaber-mcbl300x", 3_000, 30_000),
+    # Its velocities are in r/min.
+    ("maxon-epos4", 60, 600),
     ("schunk-lwa4p", 50_000, 500_000),
 )
 
@@ -83,6 +85,9 @@ def move(node, velocity, acceleration):
 
 
 def master_lost(network, node):
+    # Object 6007 says what the drive does then; 1 is a fault, as in a drive without that object.
+    if 0x6007 in node.object_dictionary:
+        node.sdo[0x6007].raw = 1
     node.sdo[0x1016][1].raw = 127 << 16 | 300
     network.send_message(0x77F, [5])
     wait_until("fault", lambda: node.sdo[0x6041].raw & 0x08)

@@ -53,7 +53,7 @@ impl Bench {
 
     /// A bus with any drives that boot within 10 ms.
     pub fn of(drives: Vec<Box<dyn Drive>>) -> Self {
-        let rates = WireBitRates { nominal: 1_000_000, data: None };
+        let rates = WireBitRates { nominal: 1_000_000, data: Some(5_000_000) };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, drives);
         let mut bench = Self { bus, now_ns: 0, heard: vec![] };
         bench.run_ns(0);

@@ -50,6 +50,7 @@ pub fn machine() -> Machine {
         bus: None,
         group: 0,
         family: None,
+        own_errors: vec![],
         unit,
         plans_own_profile: false,
         counts_per_unit: 83_443.0,

@@ -18,7 +18,7 @@ use super::ownership::if_owned;
 ///
 /// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
 /// one), or a node on an interface (`takt drive --bus can0 --node 1 --family erob-canopen …`), of which no limits are
-/// known. Values have a unit and are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the
+/// known; a drive without a family of its own is named by its data sheet (`--eds drive.eds`). Values have a unit and are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the
 /// drive's own. Every motion ends at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
 #[derive(Args, Debug)]
 #[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]

@@ -7,6 +7,7 @@ use clap::Args;
 use takt::commission::TargetDrive;
 use takt::config::{Config, DriveFamily, Interface, Quantity};
 use takt::family;
+use takt::family::cia402::{self, Device};
 
 use super::super::configuration;
 use super::super::usage_error::UsageError;
@@ -27,6 +28,15 @@ pub struct Target {
     /// The family, as `drive` names it in a configuration
     #[arg(long, value_name = "FAMILY", global = true, value_parser = family)]
     family: Option<DriveFamily>,
+    /// The data sheet (EDS or DCF) of a CiA 402 drive, instead of a family
+    #[arg(long, value_name = "FILE", global = true, conflicts_with = "family")]
+    eds: Option<PathBuf>,
+    /// The quirks of the drive, beside its data sheet
+    #[arg(long, value_name = "FILE", global = true, requires = "eds")]
+    quirks: Option<PathBuf>,
+    /// The counts of one turn of the drive's position, if its data sheet does not say
+    #[arg(long, value_name = "N", global = true, requires = "eds", value_parser = clap::value_parser!(u32).range(1..))]
+    counts_per_turn: Option<u32>,
     /// The bit rate of an interface without a configuration
     #[arg(long, value_name = "RATE", global = true, value_parser = bit_rate, default_value = "1 Mbit/s")]
     bit_rate: u32,
@@ -56,10 +66,16 @@ pub enum Bus {
 }
 
 fn family(text: &str) -> Result<DriveFamily, String> {
-    let words = || family::all().iter().map(|family| family.word()).collect::<Vec<_>>().join(", ");
-    family::named(text)
-        .and_then(|family| family.unconfigured())
-        .ok_or_else(|| format!("the families are {}", words()))
+    let Some(family) = family::named(text) else {
+        let all = family::all();
+        let families = all.iter().filter(|family| family.unconfigured().is_some());
+        let words = families.map(|family| family.word()).collect::<Vec<_>>().join(", ");
+        return Err(format!(
+            "the families are {words}; another CiA 402 drive is named by its data sheet: --eds FILE"
+        ));
+    };
+    let needs_sheet = || format!("a drive of the family {text} is named by its data sheet: --eds FILE");
+    family.unconfigured().ok_or_else(needs_sheet)
 }
 
 impl Target {
@@ -73,9 +89,11 @@ impl Target {
     }
 
     fn of_interface(&self) -> Result<(TargetDrive, Bus), UsageError> {
-        let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, &self.family) else {
+        let family = self.unconfigured_drive()?;
+        let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, &family) else {
             return Err(
-                "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (all three)".into(),
+                "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (or --eds FILE)"
+                    .into(),
             );
         };
         let interface = bus.parse::<Interface>();
@@ -93,7 +111,26 @@ impl Target {
         }
     }
 
+    /// The drive by its family or its data sheet, if one of them is given.
+    fn unconfigured_drive(&self) -> Result<Option<DriveFamily>, UsageError> {
+        let Some(eds) = &self.eds else { return Ok(self.family.clone()) };
+        let device = Device::load(eds, self.quirks.as_deref())
+            .map_err(|reason| format!("--eds {}: {reason}", eds.display()))?;
+        let counts_per_turn = self.counts_per_turn.map(f64::from);
+        if counts_per_turn.or(device.counts_per_turn()).is_none() {
+            return Err(
+                "the data sheet does not say how many counts a turn has: give --counts-per-turn N".into()
+            );
+        }
+        Ok(Some(cia402::drive_with(device, counts_per_turn)))
+    }
+
     fn of_configuration(&self, path: &Path) -> Result<(TargetDrive, Bus), UsageError> {
+        if self.eds.is_some() {
+            return Err(
+                "--eds names a drive without a configuration; in one, the axis says `eds = \"…\"`".into()
+            );
+        }
         let mut config = configuration::load(path, &[])?;
         let known: Vec<&str> = config.axes.iter().map(|axis| axis.name.as_str()).collect();
         let index = match (&self.axis, known.as_slice()) {

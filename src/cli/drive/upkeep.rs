@@ -1,4 +1,4 @@
-//! `takt drive … zero | save | set-id | set-bitrate | clear-fault | gains | gear | auto-home | interpolation`
+//! `takt drive … zero | save | restore | set-id | set-bitrate | clear-fault | gains | gear | auto-home | interpolation`
 
 use clap::{Args, Subcommand, ValueEnum};
 
@@ -12,6 +12,8 @@ pub enum Action {
     Zero(Agreement),
     /// Store the parameters in the drive
     Save,
+    /// Give the drive the parameters of the factory at its next reset
+    Restore(Agreement),
     /// Give the drive another node ID
     SetId {
         /// The new node ID
@@ -101,6 +103,7 @@ impl Action {
         match self {
             Self::Zero(_) => "zero",
             Self::Save => "save",
+            Self::Restore(_) => "restore",
             Self::SetId { .. } => "set-id",
             Self::SetBitRate { .. } => "set-bitrate",
             Self::ClearFault(_) => "clear-fault",
@@ -116,6 +119,7 @@ impl Action {
         Ok(match self {
             Self::Zero(agreement) => Task::Zero { is_confirmed: agreement.yes },
             Self::Save => Task::Save,
+            Self::Restore(agreement) => Task::Restore { is_confirmed: agreement.yes },
             Self::SetId { id } => Task::SetId { node: *id },
             Self::SetBitRate { rate } => Task::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
             Self::ClearFault(agreement) => Task::ClearFault { is_confirmed: agreement.yes },

@@ -97,6 +97,9 @@ pub struct Quirks {
     pub drive: QuirkyDrive,
     /// The modes that it has, where object 6502 does not tell.
     pub modes: Option<Vec<OperationMode>>,
+    /// Counts of one turn of the position that it reports (6064) as it leaves the factory, where objects 608F and 6092 do not
+    /// tell.
+    pub counts_per_turn: Option<f64>,
     /// Objects that it lacks although its data sheet lists them.
     pub missing: Vec<ObjectPattern>,
     /// Objects that it refuses to write although its data sheet says otherwise.

@@ -8,6 +8,7 @@ use toml::de::DeTable;
 
 use super::{Confirmation, Delays, MotionUnit, ObjectPattern, Quirks, QuirkyDrive};
 use crate::canopen::object::ObjectAddress;
+use crate::canopen::objects::PROFILE_ACCELERATION;
 use crate::config::ConfigError;
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
@@ -66,6 +67,10 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
             has_modes
         })
     });
+    let counts_per_turn = optional(root.get("counts_per_turn"), |entry| {
+        let counts = entry.integer(1..1 << 32)?;
+        Some(counts as f64)
+    });
     let objects = objects(root.section("objects"));
     let statusword = statusword(root.section("statusword"));
     let units = units(root.section("units"));
@@ -81,6 +86,7 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
     Some(Quirks {
         drive: drive?,
         modes: modes?,
+        counts_per_turn: counts_per_turn?,
         missing,
         constant,
         statusword_set,
@@ -168,7 +174,7 @@ fn statusword(mut section: Section<'_>) -> Option<(u16, u16)> {
 }
 
 fn units(mut section: Section<'_>) -> Option<Vec<(u16, MotionUnit)>> {
-    let read = UNITS.map(|(key, index)| (index, optional(section.get(key), |entry| unit(&entry))));
+    let read = UNITS.map(|(key, index)| (index, optional(section.get(key), |entry| unit(&entry, index))));
     section.finish();
     let mut units = vec![];
     for (index, unit) in read {
@@ -177,19 +183,30 @@ fn units(mut section: Section<'_>) -> Option<Vec<(u16, MotionUnit)>> {
     Some(units)
 }
 
-/// Reads `"counts/s"`, `"0.1 r/min"` and the like: a factor and one of two units, of a velocity or an acceleration.
-fn unit(entry: &Entry<'_>) -> Option<MotionUnit> {
+/// Reads `"counts/s"`, `"0.1 r/min"` and the like: a factor and one of the two units of a velocity, or of an acceleration.
+fn unit(entry: &Entry<'_>, index: u16) -> Option<MotionUnit> {
     let text = entry.text()?;
+    let is_acceleration = index == PROFILE_ACCELERATION.address.index;
     let (factor, name) = match text.split_once(' ') {
         Some((factor, name)) => (factor.parse().ok().filter(|factor| *factor > 0.0), name),
         None => (Some(1.0), text),
     };
-    match (factor, name) {
-        (Some(factor), "counts/s" | "counts/s²") => Some(MotionUnit::PositionUnits(factor)),
-        (Some(factor), "r/min" | "r/min/s") => Some(MotionUnit::RevolutionsPerMinute(factor)),
+    match (factor, name, is_acceleration) {
+        (Some(factor), "counts/s", false) | (Some(factor), "counts/s²" | "counts/s^2", true) => {
+            Some(MotionUnit::PositionUnits(factor))
+        }
+        (Some(factor), "r/min", false) | (Some(factor), "r/min/s", true) => {
+            Some(MotionUnit::RevolutionsPerMinute(factor))
+        }
         _ => {
-            let allowed = "\"counts/s\" or \"r/min\" of a velocity, \"counts/s²\" or \"r/min/s\" of an acceleration, \
-                with a factor if needed: \"0.1 r/min\"";
+            let allowed = match is_acceleration {
+                false => {
+                    "a unit of velocity, \"counts/s\" or \"r/min\", with a factor if needed: \"0.1 r/min\""
+                }
+                true => {
+                    "a unit of acceleration, \"counts/s²\" or \"r/min/s\", with a factor if needed: \"10 counts/s²\""
+                }
+            };
             entry.report_range(format!("{text:?}"), allowed.to_owned());
             None
         }

@@ -23,7 +23,7 @@ use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
 use crate::config::{Axis, Config};
 use crate::family::{self, SettingUp};
-use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure, SdoQuirks};
+use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure};
 
 /// Number of restarts of a drive after which its configuration gives up.
 const MAX_RESTARTS: u8 = 3;
@@ -393,8 +393,7 @@ impl Part {
 }
 
 fn session(axis: &Axis, timing: BringUpTiming) -> CanopenSession {
-    let quirks = SdoQuirks { timing: timing.sdo, ..family::of(&axis.drive).sdo_quirks() };
-    CanopenSession::new(CanopenClient::new(axis.node, quirks))
+    CanopenSession::new(CanopenClient::new(axis.node, family::sdo_quirks(&axis.drive, timing.sdo)))
 }
 
 /// The place of an axis among those of its node, and why it failed.

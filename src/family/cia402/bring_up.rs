@@ -136,7 +136,8 @@ impl Sheet<'_> {
     async fn stop_motion(&self) -> StepResult {
         let (c, limits) = (self.c, &self.c.axis.limits);
         if self.device.is_writable(QUICK_STOP_DECELERATION.address) {
-            write_unless_in_file(c, QUICK_STOP_DECELERATION, counts(c.axis, limits.deceleration)).await?;
+            write_unless_in_file(c, QUICK_STOP_DECELERATION, self.acceleration_units(limits.deceleration))
+                .await?;
         }
         c.write(CONTROLWORD, controlword::QUICK_STOP.into()).await?;
         let stopping_ns = (limits.velocity / limits.deceleration * 1e9) as Nanoseconds;
@@ -151,9 +152,26 @@ impl Sheet<'_> {
 
     /// A velocity in the drive's units.
     fn velocity_units(&self, velocity: f64) -> i64 {
+        self.motion_units(velocity, 1.0)
+    }
+
+    /// A velocity in the drive's units of profile velocities (6081).
+    fn profile_velocity_units(&self, velocity: f64) -> i64 {
+        let axis = self.c.axis;
+        self.motion_units(velocity, axis.drive.profile_velocity_units_per_velocity_unit(axis.counts_per_turn))
+    }
+
+    /// An acceleration in the drive's units.
+    fn acceleration_units(&self, acceleration: f64) -> i64 {
+        let axis = self.c.axis;
+        self.motion_units(acceleration, axis.drive.acceleration_units_per_velocity_unit(axis.counts_per_turn))
+    }
+
+    /// A velocity or an acceleration in units, of which so many are one unit of velocity (in a second).
+    fn motion_units(&self, value: f64, per_velocity_unit: f64) -> i64 {
         let axis = self.c.axis;
         let per_count = axis.drive.velocity_units_per_turn(axis.counts_per_turn) / axis.counts_per_turn;
-        ((counts(axis, velocity) as f64 * per_count).round() as i64).max(1)
+        ((counts(axis, value) as f64 * per_count * per_velocity_unit).round() as i64).max(1)
     }
 
     async fn synchronisation(&self) -> StepResult {
@@ -245,14 +263,14 @@ impl Sheet<'_> {
             let error =
                 if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
             self.limit(FOLLOWING_ERROR_WINDOW, counts(axis, error)).await?;
-            self.limit(PROFILE_VELOCITY, self.velocity_units(limits.velocity)).await?;
+            self.limit(PROFILE_VELOCITY, self.profile_velocity_units(limits.velocity)).await?;
         }
         for (object, acceleration) in [
             (PROFILE_ACCELERATION, limits.acceleration),
             (PROFILE_DECELERATION, limits.deceleration),
             (QUICK_STOP_DECELERATION, limits.deceleration),
         ] {
-            self.limit(object, self.velocity_units(acceleration)).await?;
+            self.limit(object, self.acceleration_units(acceleration)).await?;
         }
         Ok(())
     }

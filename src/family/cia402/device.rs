@@ -2,17 +2,19 @@
 
 use std::path::Path;
 
-use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, OperationMode};
+use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode};
 
-use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary};
-use crate::canopen::object::{Object, ObjectAddress};
+use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
+use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::canopen::objects::{
     CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE,
-    PRODUCER_HEARTBEAT_TIME, PdoDirection, PdoParameters, STATUSWORD,
+    PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection, PdoParameters, STATUSWORD,
 };
 use crate::config::quirks::{MotionUnit, Quirks};
 use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, VelocityUnit};
+use crate::family::DataSheet;
 use crate::family::bring_up::first_pdo;
+use crate::family::commission::profile::objects::HOMING_METHOD;
 
 /// A data sheet, the quirks of the drive, and which of its axes is meant.
 #[derive(Clone, Debug)]
@@ -178,8 +180,14 @@ impl Device {
         (numerator > 0 && divisor > 0).then(|| numerator as f64 / divisor as f64)
     }
 
-    /// Counts of one turn of the reported position: by the feed constant (6092), or else by the resolution of the encoder (608F).
+    /// Counts of one turn of the reported position: by the quirks, by the feed constant (6092), or else by the resolution of the
+    /// encoder (608F).
     pub fn counts_per_turn(&self) -> Option<f64> {
+        let told = self.quirks.counts_per_turn;
+        told.or_else(|| self.counts_by_objects())
+    }
+
+    fn counts_by_objects(&self) -> Option<f64> {
         self.ratio(FEED, FEED_REVOLUTIONS).or_else(|| self.ratio(ENCODER_INCREMENTS, ENCODER_REVOLUTIONS))
     }
 
@@ -206,13 +214,17 @@ impl Device {
         ModeSet(told.0 & having(&TARGETS).0 & !not_by_process_data)
     }
 
-    /// The unit of velocities: by the quirks, by the SI unit (60A9), or by the velocity factor (6096), or else counts per second.
-    fn velocity_unit(&self) -> VelocityUnit {
-        let of_motion = |unit| match unit {
+    /// The unit of a velocity or an acceleration object by the quirks, if they tell.
+    fn unit_by_quirks(&self, index: u16) -> Option<VelocityUnit> {
+        Some(match self.quirks.unit(index)? {
             MotionUnit::PositionUnits(factor) => VelocityUnit::Counts(factor),
             MotionUnit::RevolutionsPerMinute(factor) => VelocityUnit::RevolutionsPerMinute(factor),
-        };
-        let by_quirks = self.quirks.unit(0x60FF).or(self.quirks.unit(0x606C)).map(of_motion);
+        })
+    }
+
+    /// The unit of velocities: by the quirks, by the SI unit (60A9), or by the velocity factor (6096), or else counts per second.
+    fn velocity_unit(&self) -> VelocityUnit {
+        let by_quirks = self.unit_by_quirks(0x60FF).or(self.unit_by_quirks(0x606C));
         let by_si = || si_velocity_unit(u32::try_from(self.number(VELOCITY_UNIT)?).ok()?);
         let by_factor =
             || Some(VelocityUnit::Counts(1.0 / self.ratio(VELOCITY_NUMERATOR, VELOCITY_DIVISOR)?));
@@ -278,6 +290,8 @@ impl Device {
             },
             counts_per_turn: self.counts_per_turn(),
             velocity_unit: self.velocity_unit(),
+            profile_velocity_unit: self.unit_by_quirks(PROFILE_VELOCITY.address.index),
+            acceleration_unit: self.unit_by_quirks(PROFILE_ACCELERATION.address.index),
             modes,
             usual_mode: usual
                 .into_iter()
@@ -295,6 +309,48 @@ impl Device {
             sends_emergencies: self.entry(ObjectAddress::new(0x1014, 0)).is_some(),
             ..standard
         }
+    }
+}
+
+impl DataSheet for Device {
+    fn has(&self, address: ObjectAddress) -> bool {
+        self.entry(address).is_some()
+    }
+
+    fn is_writable(&self, address: ObjectAddress) -> bool {
+        Self::is_writable(self, address)
+    }
+
+    fn data_type(&self, address: ObjectAddress) -> Option<DataType> {
+        let data_type = self.entry(address)?.data_type?;
+        let of_kind = match data_type.kind() {
+            ValueKind::Unsigned(_) => DataType::U8,
+            ValueKind::Signed(_) => DataType::I8,
+            ValueKind::Real(_) | ValueKind::Text | ValueKind::Bytes | ValueKind::Other => return None,
+        };
+        // A BOOLEAN is sent as a byte.
+        of_kind.of_length(usize::from(data_type.bits()?).div_ceil(8))
+    }
+
+    fn adds_mode(&self, mode: OperationMode) -> bool {
+        let tells = self.number(SUPPORTED_MODES).is_some_and(|bits| bits != 0);
+        match (&self.quirks.modes, mode) {
+            (Some(modes), _) => modes.contains(&mode),
+            (None, OperationMode::Homing) => !tells && self.has(&HOMING_METHOD),
+            (None, mode) => !tells && self.modes().contains(mode),
+        }
+    }
+
+    fn own_errors(&self) -> &[(u16, String)] {
+        &self.quirks.errors
+    }
+
+    fn storing_ns(&self) -> Option<Nanoseconds> {
+        self.quirks.delays.save_ns
+    }
+
+    fn sdo_reply_ns(&self) -> Option<Nanoseconds> {
+        self.quirks.delays.sdo_reply_ns
     }
 }
 

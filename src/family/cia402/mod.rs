@@ -4,6 +4,7 @@
 //! A small file beside it says in what the drive deviates from the sheet (`quirks = "my-drive.toml"`, see `drives/`).
 
 mod bring_up;
+mod commission;
 mod device;
 mod remarks;
 mod simulated;
@@ -18,8 +19,10 @@ use std::path::PathBuf;
 use takt_rt::{Id, MappedObject};
 
 use super::bring_up::AxisSession;
-use super::commission::{Failure, SdoSession, TargetDrive, Task};
-use super::{CarryingOut, Family, SettingUp};
+use super::commission::dictionary::ObjectEntry;
+use super::commission::{SdoSession, TargetDrive, Task, profile};
+use super::{CarryingOut, DataSheet, Family, SettingUp};
+use crate::canopen::object::Object;
 use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use crate::sim::Drive;
@@ -34,6 +37,13 @@ const FACTS: DriveFacts = DriveFacts::standard("cia402", "CiA 402 drive");
 /// The drive that a data sheet describes.
 pub fn drive(device: Device) -> DriveFamily {
     DriveFamily::of_drive(device.facts(FACTS), device)
+}
+
+/// The drive that a data sheet describes, with these counts of a turn instead of those of the data sheet, if they are given.
+pub fn drive_with(device: Device, counts_per_turn: Option<f64>) -> DriveFamily {
+    let facts = device.facts(FACTS);
+    let counts_per_turn = counts_per_turn.or(facts.counts_per_turn);
+    DriveFamily::of_drive(DriveFacts { counts_per_turn, ..facts }, device)
 }
 
 /// The data sheet of an axis of this family.
@@ -111,13 +121,26 @@ impl Family for Cia402 {
         device(axis).dictionary.dummies.iter().any(|code| code.0 == dummy.index)
     }
 
-    fn carry_out<'a>(&'a self, _: &'a SdoSession, _: &'a TargetDrive, _: Task) -> CarryingOut<'a> {
-        Box::pin(async move {
-            Err(Failure::Unsupported {
-                what: "only objects of a drive of the family cia402 are read and written here".to_owned(),
-                instead: "move it by `takt run`, or write its objects".to_owned(),
-            })
-        })
+    fn data_sheet<'d>(&self, drive: &'d DriveFamily) -> Option<&'d dyn DataSheet> {
+        let device: &Device = drive.description()?;
+        Some(device)
+    }
+
+    fn objects(&self) -> &'static [ObjectEntry] {
+        profile::objects::STANDARD
+    }
+
+    fn meaning(&self, drive: &DriveFamily, object: &Object, value: i64) -> Option<String> {
+        profile::objects::meaning(drive, object, value)
+    }
+
+    fn carry_out<'a>(
+        &'a self,
+        session: &'a SdoSession,
+        target: &'a TargetDrive,
+        task: Task,
+    ) -> CarryingOut<'a> {
+        Box::pin(commission::carry_out(session, target, task))
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

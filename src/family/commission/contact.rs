@@ -43,16 +43,16 @@ pub async fn connect(c: &SdoSession, target: &TargetDrive) -> Result<(), Failure
     }
 }
 
-/// As [`connect`], and checks that the vendor ID (object 1018:01) is the family's.
+/// As [`connect`], and checks the vendor ID (object 1018:01), where the expected one is known.
 pub async fn connect_family(c: &SdoSession, target: &TargetDrive) -> Result<(), Failure> {
     connect(c, target).await?;
     c.step("identity");
+    let Some(expected) = target.drive.identity.vendor else { return Ok(()) };
     let received = c.read(&VENDOR_ID).await? as u32;
-    let (family, expected) = (target.drive.word, target.drive.identity.vendor);
-    match expected.filter(|expected| *expected != received) {
-        None => Ok(()),
-        Some(expected) => Err(Failure::OtherDrive { family, expected, received }),
+    if received == expected {
+        return Ok(());
     }
+    Err(Failure::OtherDrive { family: target.drive.word, expected, received })
 }
 
 /// Reads the identity into a report, and notes when the vendor is not that of the family.
@@ -64,7 +64,7 @@ pub async fn report_identity(c: &SdoSession, s: &TargetDrive, report: &mut Repor
         ("product_code", PRODUCT_CODE),
         ("revision_number", REVISION_NUMBER),
     ] {
-        let value = c.read(&object).await?;
+        let Some(value) = c.read_optional(&object).await? else { continue };
         report.add(key, object.name, value, object.show(value));
         if object == VENDOR_ID && s.drive.identity.vendor.is_some_and(|vendor| value != i64::from(vendor)) {
             c.note(format!(

@@ -29,6 +29,8 @@ pub enum ObjectUnit {
     Velocity,
     /// A tenth of the drive's unit of velocity.
     VelocityTenth,
+    /// The drive's unit of profile velocities (6081), without a direction.
+    ProfileVelocity,
     /// The drive's unit of acceleration.
     Acceleration,
     /// Per mille of the rated torque.
@@ -71,6 +73,10 @@ impl ObjectEntry {
             ObjectUnit::VelocityTenth => {
                 shown(target.velocity_quantity(), target.velocity(value as f64 / 10.0))
             }
+            ObjectUnit::ProfileVelocity => {
+                let speed = target.velocity(target.velocity_raw_of_profile(value) as f64);
+                shown(target.velocity_quantity(), speed.abs())
+            }
             ObjectUnit::Acceleration => {
                 shown(target.acceleration_quantity(), target.acceleration(value as f64))
             }
@@ -98,7 +104,7 @@ impl ObjectEntry {
         }
         let quantity = match self.unit {
             ObjectUnit::Position | ObjectUnit::Distance => target.position_quantity(),
-            ObjectUnit::Velocity => target.velocity_quantity(),
+            ObjectUnit::Velocity | ObjectUnit::ProfileVelocity => target.velocity_quantity(),
             ObjectUnit::Acceleration => target.acceleration_quantity(),
             ObjectUnit::Torque | ObjectUnit::Of(..) | ObjectUnit::VelocityTenth | ObjectUnit::None => {
                 let reason = match self.unit {
@@ -120,6 +126,7 @@ impl ObjectEntry {
                 target.velocity_raw(value).abs()
             }
             ObjectUnit::Velocity => target.velocity_raw(value),
+            ObjectUnit::ProfileVelocity => target.profile_velocity_raw(target.velocity_raw(value).abs()),
             _ => target.acceleration_raw(value),
         })
     }
@@ -134,25 +141,36 @@ pub enum SelectedObject {
     Unknown(ObjectAddress),
 }
 
+/// The entry of an object: what its family knows of it, and what the data sheet of the drive says, if there is one.
+pub fn entry(drive: &DriveFamily, address: ObjectAddress) -> Option<ObjectEntry> {
+    let family = family::of(drive);
+    let known = family.objects().iter().find(|entry| entry.object.address == address).copied();
+    let Some(sheet) = family.data_sheet(drive) else { return known };
+    let data_type = sheet.data_type(address)?;
+    let (name, unit) = known.map_or(("object", ObjectUnit::None), |entry| (entry.object.name, entry.unit));
+    let permission = if sheet.is_writable(address) { Permission::Write } else { Permission::Read };
+    Some(ObjectEntry { object: Object { address, data_type, name }, permission, unit })
+}
+
 /// Finds an object by `index:subindex` (hexadecimal: `6064`, `0x6064:00`, `60FBh:01`), or by its name or the
 /// beginning of its name.
 ///
 /// # Errors
 /// [`Failure::Unsuitable`] when nothing matches, or when several names begin like this.
 pub fn find(drive: &DriveFamily, text: &str) -> Result<SelectedObject, Failure> {
-    let entries = family::of(drive).objects();
     if let Some(address) = address(text) {
-        let known = entries.iter().find(|entry| entry.object.address == address);
-        return Ok(known.map_or(SelectedObject::Unknown(address), |entry| SelectedObject::Known(*entry)));
+        return Ok(entry(drive, address).map_or(SelectedObject::Unknown(address), SelectedObject::Known));
     }
     let wanted = plain(text);
-    let named = |is_it: &dyn Fn(&str) -> bool| -> Vec<&ObjectEntry> {
-        entries.iter().filter(|entry| is_it(&plain(entry.object.name))).collect()
+    let family = family::of(drive);
+    let named = |is_it: &dyn Fn(&str) -> bool| -> Vec<ObjectEntry> {
+        let named = family.objects().iter().filter(|entry| is_it(&plain(entry.object.name)));
+        named.filter_map(|named| entry(drive, named.object.address)).collect()
     };
     let exact = named(&|name| name == wanted);
     let found = if exact.is_empty() { named(&|name| name.starts_with(&wanted)) } else { exact };
     match found.as_slice() {
-        [one] => Ok(SelectedObject::Known(**one)),
+        [one] => Ok(SelectedObject::Known(*one)),
         [] => Err(Failure::Unsuitable(format!(
             "`{text}` is no object: give index:subindex in hexadecimal (6064, 1018:01) or a name, such as \
              `position actual value`"

@@ -2,7 +2,7 @@
 
 use takt_rt::{Frame, StoppedHeartbeat};
 
-use super::dictionary::ObjectEntry;
+use super::dictionary::{self, ObjectEntry};
 use super::target::TargetDrive;
 use crate::canopen::emcy::Emergency;
 use crate::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
@@ -96,8 +96,8 @@ fn answered(target: &TargetDrive, response: &SdoResponse) -> String {
     }
 }
 
-fn entry(target: &TargetDrive, address: ObjectAddress) -> Option<&'static ObjectEntry> {
-    target.family().objects().iter().find(|entry| entry.object.address == address)
+fn entry(target: &TargetDrive, address: ObjectAddress) -> Option<ObjectEntry> {
+    dictionary::entry(&target.drive, address)
 }
 
 fn named(target: &TargetDrive, address: ObjectAddress) -> String {
@@ -110,7 +110,7 @@ fn value(target: &TargetDrive, address: ObjectAddress, bytes: &[u8]) -> String {
     // A value of another length than in the table is shown as bytes.
     let Some(number) = object.data_type.decode(bytes) else { return format!("{bytes:02X?}") };
     let shown = object.show(number);
-    if let Some(meaning) = target.family().meaning(&object, number) {
+    if let Some(meaning) = target.family().meaning(&target.drive, &object, number) {
         return format!("{shown}: {meaning}");
     }
     match entry.and_then(|entry| entry.physical(target, number)) {

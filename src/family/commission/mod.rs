@@ -5,7 +5,8 @@
 //!            │
 //!       sdo_session ── transfers, pauses and conditions to await, each of which may be interrupted
 //!            │
-//!         family ── one folder a family: objects, alarms, motions
+//!        profile ── the tasks of every drive that keeps to CiA 402
+//!         family ── one folder a family: objects, alarms, motions of its own
 //!            │
 //!     target, motion_profile ── units and limits of the axis
 //! ```
@@ -21,12 +22,14 @@ pub mod meaning;
 pub(super) mod motion_profile;
 pub(super) mod objects;
 pub(super) mod polling;
+pub(super) mod profile;
 pub(super) mod report;
 pub(super) mod scan;
 pub(super) mod sdo_session;
 pub(super) mod target;
 pub(super) mod task;
 
+use crate::family;
 use crate::procedure::{self, CanopenClient, CanopenSession};
 
 pub use failure::Failure;
@@ -44,8 +47,9 @@ pub type ProcedureError = procedure::ProcedureError<Failure>;
 
 /// The procedure that carries out a task with this drive.
 pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
-    let session = CanopenSession::new(CanopenClient::new(target.node, target.family().sdo_quirks()));
-    let c = SdoSession::new(session.clone());
+    let quirks = family::sdo_quirks(&target.drive, target.family().sdo_quirks().timing);
+    let session = CanopenSession::new(CanopenClient::new(target.node, quirks));
+    let c = SdoSession::new(session.clone(), target.drive.node_axis);
     Procedure::new(session, async move {
         match task {
             Task::Read { objects } => objects::read(&c, &target, &objects).await,

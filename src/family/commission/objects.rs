@@ -43,7 +43,7 @@ pub async fn read(c: &SdoSession, target: &TargetDrive, objects: &[ReadObject]) 
             None => number(&object, &uploaded)?,
         };
         let physical = wanted.entry.and_then(|entry| entry.physical(target, value));
-        let meaning = target.family().meaning(&object, value);
+        let meaning = target.family().meaning(&target.drive, &object, value);
         let mut text = object.show(value);
         if let Some((_, shown)) = &physical {
             text = format!("{text} = {shown}");
@@ -81,7 +81,7 @@ pub async fn write(
     report.add("object", "object", object.address.to_string(), object.to_string());
     report.add("written", "written", value, object.show(value));
     if let Some(back) = back {
-        let meaning = target.family().meaning(&object, back);
+        let meaning = target.family().meaning(&target.drive, &object, back);
         let mut text = object.show(back);
         if let Some((_, shown)) = entry.and_then(|entry| entry.physical(target, back)) {
             text = format!("{text} = {shown}");

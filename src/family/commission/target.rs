@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::{Nanoseconds, Scale, ScaleError, ScaleParameters};
+use takt_rt::{Nanoseconds, OperationMode, Scale, ScaleError, ScaleParameters};
 
 use super::failure::Failure;
+use crate::canopen::object::ObjectAddress;
 use crate::config::{Axis, DriveFamily, Limits, Quantity, Travel};
-use crate::family::{self, Family, is_rounded};
+use crate::family::{self, DataSheet, Family, is_rounded};
 
 /// A value as the user wrote it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +33,8 @@ pub struct TargetDrive {
     pub counts_per_turn: f64,
     /// Conversion between joint and drive units.
     pub scale: Scale,
+    /// The rated torque in N·m (N) by the configuration, if it says one.
+    pub rated_torque: Option<f64>,
     /// The limits of the axis, if known.
     pub limits: Option<Limits>,
     /// How long to wait for the first answer.
@@ -54,6 +57,7 @@ impl TargetDrive {
             travel: axis.travel,
             counts_per_turn: axis.counts_per_turn,
             scale: axis.scale()?,
+            rated_torque: axis.joint.rated_torque,
             limits: Some(axis.limits),
             patience_ns: PATIENCE_NS.saturating_add(axis.power_up_ns),
         })
@@ -81,6 +85,7 @@ impl TargetDrive {
                 zero_counts: 0.0,
                 rated_torque: 1.0,
             })?,
+            rated_torque: None,
             limits: None,
             patience_ns: PATIENCE_NS,
         })
@@ -89,6 +94,40 @@ impl TargetDrive {
     /// What takt knows of its family.
     pub fn family(&self) -> &'static dyn Family {
         family::of(&self.drive)
+    }
+
+    fn data_sheet(&self) -> Option<&dyn DataSheet> {
+        self.family().data_sheet(&self.drive)
+    }
+
+    /// Whether the drive has an object, as far as its data sheet tells.
+    pub fn has(&self, address: ObjectAddress) -> bool {
+        self.data_sheet().is_none_or(|sheet| sheet.has(address))
+    }
+
+    /// Whether the drive lets an object be written, as far as its data sheet tells.
+    pub fn is_writable(&self, address: ObjectAddress) -> bool {
+        self.data_sheet().is_none_or(|sheet| sheet.is_writable(address))
+    }
+
+    /// Whether the drive has a mode that its object 6502 may leave out.
+    pub(super) fn adds_mode(&self, mode: OperationMode) -> bool {
+        self.data_sheet().is_some_and(|sheet| sheet.adds_mode(mode))
+    }
+
+    /// How long the drive takes to store its parameters, if it is known.
+    pub(super) fn storing_ns(&self) -> Option<Nanoseconds> {
+        self.data_sheet()?.storing_ns()
+    }
+
+    /// An error code of the drive in words.
+    pub fn error_words(&self, code: u16) -> String {
+        family::drive_error_words(&self.drive, code)
+    }
+
+    /// What clears an error of the drive, and its cause.
+    pub fn error_cure(&self, code: u16) -> &'static str {
+        family::error_cure(Some(self.drive.word), code)
     }
 
     /// The quantity of a position: an angle or a length.
@@ -135,7 +174,29 @@ impl TargetDrive {
 
     /// Acceleration in rad/s² (m/s²) from drive units.
     pub fn acceleration(&self, raw: f64) -> f64 {
-        self.velocity(raw).abs()
+        self.velocity(raw / self.drive.acceleration_units_per_velocity_unit(self.counts_per_turn)).abs()
+    }
+
+    /// A velocity in the unit of profile velocities (6081) from the unit of target velocities (60FF).
+    pub(crate) fn profile_velocity_raw(&self, velocity_raw: i64) -> i64 {
+        let units = self.drive.profile_velocity_units_per_velocity_unit(self.counts_per_turn);
+        away_from_zero(velocity_raw as f64 * units)
+    }
+
+    /// A velocity in the unit of target velocities (60FF) from the unit of profile velocities (6081).
+    pub(crate) fn velocity_raw_of_profile(&self, profile_raw: i64) -> i64 {
+        let units = self.drive.profile_velocity_units_per_velocity_unit(self.counts_per_turn);
+        away_from_zero(profile_raw as f64 / units)
+    }
+
+    /// Within these counts a position counts as the same one: a degree of the joint, or of the drive's turn where the axis is
+    /// linear.
+    pub(crate) fn near_counts(&self) -> i64 {
+        let degree = match self.travel {
+            Travel::Rotary => self.scale.resolution() * 1_f64.to_radians(),
+            Travel::Linear { .. } => self.counts_per_turn / 360.0,
+        };
+        (degree.abs() as i64).max(1)
     }
 
     /// Position in counts.
@@ -182,7 +243,11 @@ impl TargetDrive {
 
     /// Acceleration in drive units, at least 1.
     pub fn acceleration_raw(&self, acceleration: CommandValue) -> i64 {
-        self.velocity_raw(acceleration).abs().max(1)
+        let raw = match acceleration {
+            CommandValue::Joint(acceleration) => away_from_zero(acceleration / self.acceleration(1.0)),
+            CommandValue::Drive(raw) => raw,
+        };
+        raw.abs().max(1)
     }
 
     /// Checks a position in counts against the limits of the axis.

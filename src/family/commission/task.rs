@@ -80,6 +80,11 @@ pub enum Task {
     },
     /// Store the parameters.
     Save,
+    /// Restore the parameters of the factory.
+    Restore {
+        /// Whether the user confirmed it.
+        is_confirmed: bool,
+    },
     /// Change the node ID.
     SetId {
         /// The new node ID, 1 to 127.

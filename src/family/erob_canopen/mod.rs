@@ -8,15 +8,17 @@ mod facts;
 pub use errors::{MULTI_TURN_BATTERY, error_text, error_words};
 pub use facts::FACTS;
 
-use takt_rt::{Frame, Id};
+use takt_rt::Frame;
 
 use super::{CarryingOut, Family, OtherProtocol, SettingUp};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
+use crate::erob_can::entries;
+use crate::erob_can::frame::{self, Request};
 use crate::family::bring_up::AxisSession;
 use crate::family::commission::dictionary::ObjectEntry;
-use crate::family::commission::{SdoSession, TargetDrive, Task};
+use crate::family::commission::{SdoSession, TargetDrive, Task, profile};
 use crate::sim::Drive;
 use crate::sim::erob::{ErobJoint, ErobParameters};
 
@@ -54,13 +56,11 @@ impl Family for ErobCanopen {
     /// The vendor's own protocol of firmware without CANopen. The request 0x0002 reads the position and changes nothing.
     /// Above node ID 63 its identifiers are those of other nodes' SDO.
     fn other_protocol(&self, node: u8) -> Option<OtherProtocol> {
-        let name = "vendor's custom CAN protocol";
-        let id = |base: u32| Id::base(base + u32::from(node)).ok();
-        let (request, answer) = (id(0x640)?, id(0x5C0)?);
+        let read = Request::Read(entries::ACTUAL_POSITION.address);
         (1..=63).contains(&node).then(|| OtherProtocol {
-            name,
-            request: Frame::of(request, [0x00, 0x02]),
-            answer,
+            name: "vendor's custom CAN protocol",
+            request: read.frame(node),
+            answer: frame::reply_id(node),
         })
     }
 
@@ -76,8 +76,8 @@ impl Family for ErobCanopen {
         commission::OBJECTS
     }
 
-    fn meaning(&self, object: &Object, value: i64) -> Option<String> {
-        commission::meaning(object, value)
+    fn meaning(&self, drive: &DriveFamily, object: &Object, value: i64) -> Option<String> {
+        profile::objects::meaning(drive, object, value)
     }
 
     fn process_data_words(&self, target: &TargetDrive, frame: &Frame) -> Option<String> {

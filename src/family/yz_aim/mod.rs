@@ -88,7 +88,7 @@ impl Family for YzAim {
         commission::OBJECTS
     }
 
-    fn meaning(&self, object: &Object, value: i64) -> Option<String> {
+    fn meaning(&self, _: &DriveFamily, object: &Object, value: i64) -> Option<String> {
         commission::meaning(object, value)
     }
 

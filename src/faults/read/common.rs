@@ -8,6 +8,7 @@ use crate::config::bounds::Bounds;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Interface, Quantity};
+use crate::family;
 use crate::faults::selection::{Direction, FrameFunction, Selection};
 use crate::faults::trigger::Trigger;
 use crate::faults::window::Window;
@@ -183,6 +184,10 @@ pub fn selection(section: &mut Section<'_>, location: &Location<'_, '_>, is_sent
             Some(function) => Some(function?),
         },
         node: location.axis.map(|axis| axis.node),
+        own_protocol: location.axis.map_or_else(Vec::new, |axis| {
+            let other = family::of(&axis.drive).other_protocol(axis.node);
+            other.map_or_else(Vec::new, |other| vec![other.request.id(), other.answer])
+        }),
         probability: probability.unwrap_or(Some(all.probability))?,
         count: match count {
             None => None,

@@ -3,15 +3,17 @@
 use takt_rt::{DriveState, NANOSECONDS_PER_SECOND, Nanoseconds, OperationMode};
 
 use crate::config::quirks::Quirks;
+use crate::sim::errors::DeviceError;
+use crate::sim::feedback_defects::JointDefects;
+use crate::sim::motion::{Actual, Measured};
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::plant::Joint;
 use crate::sim::servo::Servo;
 
 use super::Cia402AxisParameters;
 use super::device::{Change, Device, FaultReaction};
-use super::errors::Cia402Error;
 use super::homing::HomingStep;
-use super::motion::{Actual, Demand, Motion};
+use super::motion::Motion;
 use super::places::Places;
 use super::profile::Profile;
 use super::units::{CommissionedScale, Units, units_per_turn};
@@ -26,22 +28,13 @@ struct ComingMode {
     due_ns: Nanoseconds,
 }
 
-/// Defects of the joint.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct JointDefects {
-    /// The joint cannot move.
-    pub is_blocked: bool,
-    /// The brake does not release.
-    pub is_brake_stuck: bool,
-}
-
 /// What an axis asks of the drive after a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AxisEvent {
     /// A fault was reset: the error is over.
     FaultReset,
     /// The axis is to fail.
-    Failed(Cia402Error),
+    Failed(DeviceError),
 }
 
 /// One axis.
@@ -278,7 +271,7 @@ impl Axis {
     }
 
     /// Enters a fault: error code and fault reaction.
-    pub fn fail(&mut self, error: Cia402Error, dictionary: &mut SimulatedDictionary) {
+    pub fn fail(&mut self, error: DeviceError, dictionary: &mut SimulatedDictionary) {
         dictionary.set_at(self.places.error_code, error.code().into());
         let reaction = if error.cuts_power() { FaultReaction::CutPower } else { FaultReaction::ByOption };
         self.device.fault(reaction, &self.places, dictionary);
@@ -325,7 +318,7 @@ impl Axis {
             let is_beyond = motion.exceeds_window(self.actual(), &self.profile(dictionary), duration_s);
             self.motion = motion;
             if is_beyond && self.device.stop().is_none() {
-                event = Some(AxisEvent::Failed(Cia402Error::FollowingError));
+                event = Some(AxisEvent::Failed(DeviceError::FollowingError));
             }
         } else {
             self.motion.follow(self.actual());
@@ -364,20 +357,14 @@ impl Axis {
         if is_stopped {
             self.device.stopped();
         }
-        let unit = 1.0 / self.units.position.abs();
-        let velocity = self.joint.velocity() * self.direction();
-        let per_mille = self.parameters.rated_torque / 1000.0;
-        self.servo.set_torque_limit(self.torque_limit(dictionary));
-        self.torque = match demand {
-            Demand::Position { position, velocity: forward, torque } => {
-                let error = (position - actual.position) * unit;
-                self.servo.position(error, forward * unit, velocity, torque * per_mille, duration_s)
-            }
-            Demand::Velocity { velocity: wanted, torque } => {
-                self.servo.velocity(wanted * unit, velocity, torque * per_mille, duration_s)
-            }
-            Demand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
+        let measured = Measured {
+            count: 1.0 / self.units.position.abs(),
+            per_mille: self.parameters.rated_torque / 1000.0,
+            position: actual.position,
+            velocity: self.joint.velocity() * self.direction(),
         };
+        self.servo.set_torque_limit(self.torque_limit(dictionary));
+        self.torque = demand.torque(&mut self.servo, measured, duration_s);
         if !self.device.state().has_torque() {
             self.torque = 0.0;
         }

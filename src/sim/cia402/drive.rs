@@ -1,57 +1,39 @@
 //! The complete drive: it receives frames and time, advances its parts, and sends frames.
 
-mod access;
-mod frames;
-
-use takt_rt::Nanoseconds;
+use takt_rt::{Frame, Nanoseconds};
 
 use super::axis::{Axis, AxisEvent};
-use super::defects::FeedbackDefects;
-use super::errors::{Cia402Error, Errors};
-use super::network::Network;
-use super::places::is_measured;
+use super::places::{AXIS_OFFSET, is_measured};
 use super::{Cia402Parameters, NotADrive, dictionary_of};
+use crate::canopen::object::ObjectAddress;
 use crate::config::quirks::Quirks;
+use crate::sim::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, TakesField, ValueSource};
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
+use crate::sim::errors::DeviceError;
+use crate::sim::feedback_defects::ShownObjects;
+use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;
-use crate::sim::object_dictionary::SimulatedDictionary;
-use crate::sim::pdo_engine::PdoEngine;
+use crate::sim::pdo_engine::PdoFeatures;
 use crate::sim::plant::Gravity;
 use crate::sim::random::Random;
+use crate::sim::sdo_reply::AbortCode;
 use crate::sim::sdo_server::{SdoFeatures, SdoServer};
 
-/// Longest time between two advances.
-const IDLE_NS: Nanoseconds = 1_000_000;
-/// The control loops and the plant run at 8 kHz.
-const STEP_NS: Nanoseconds = 125_000;
 /// From an SDO request to its reply.
 const SHORTEST_REPLY_NS: Nanoseconds = 300_000;
 const LONGEST_REPLY_NS: Nanoseconds = 1_000_000;
 /// From "save" until it takes effect.
 const SAVE_NS: Nanoseconds = 100_000_000;
-const NEVER: Nanoseconds = Nanoseconds::MAX;
 
 /// A simulated CiA 402 drive, made from its data sheet.
 #[derive(Clone, Debug)]
 pub struct Cia402Drive {
-    node: u8,
     quirks: Quirks,
-    power_up_ns: Nanoseconds,
-    feedback_delay_ns: Nanoseconds,
-    dictionary: SimulatedDictionary,
-    network: Network,
-    sdo: SdoServer,
-    pdos: PdoEngine,
-    errors: Errors,
+    canopen: CanopenNode,
     axes: Vec<Axis>,
-    has_pdo_error: bool,
     /// A fault injected since the last advance.
     injected: Option<DriveFault>,
-    defects: FeedbackDefects,
-    save_ns: Nanoseconds,
-    /// From when on PDOs work after NMT start.
-    pdos_ready_ns: Nanoseconds,
     /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
     now_ns: Nanoseconds,
@@ -66,28 +48,28 @@ impl Cia402Drive {
     pub fn new(parameters: Cia402Parameters) -> Result<Self, NotADrive> {
         let mut dictionary = dictionary_of(&parameters)?;
         let Cia402Parameters { node, quirks, axes, power_up_ns, feedback_delay_ns, seed, .. } = parameters;
-        let power_up_ns = quirks.delays.boot_up_ns.unwrap_or(power_up_ns);
+        let delays = NodeDelays {
+            power_up_ns: quirks.delays.boot_up_ns.unwrap_or(power_up_ns),
+            feedback_ns: feedback_delay_ns,
+            save_ns: quirks.delays.save_ns.unwrap_or(SAVE_NS),
+            first_pdo_ns: quirks.delays.first_pdo_ns.unwrap_or(0),
+        };
         let axes = (0u16..).zip(axes).map(|(number, axis)| Axis::new(number, axis, &mut dictionary, &quirks));
         let axes = axes.collect();
         let longest_ns = quirks.delays.sdo_reply_ns.unwrap_or(LONGEST_REPLY_NS);
-        let features = SdoFeatures { is_upload_segmented: false, has_blocks: !quirks.refuses_blocks };
+        let features = if quirks.refuses_blocks {
+            SdoFeatures::Segmented { is_upload_segmented: false }
+        } else {
+            SdoFeatures::Blocks
+        };
         let latency_ns = SHORTEST_REPLY_NS.min(longest_ns)..longest_ns + 1;
+        let sdo = SdoServer::new(Random::new(seed, node), latency_ns, features);
+        let pdo_features = PdoFeatures { is_measured, watches_rpdos: true };
         Ok(Self {
-            node,
-            power_up_ns,
-            feedback_delay_ns,
-            network: Network::starting(&dictionary, power_up_ns, quirks.power_up),
-            sdo: SdoServer::new(Random::new(seed, node), latency_ns, features),
-            pdos: PdoEngine::new(&dictionary, is_measured),
-            errors: Errors::new(&dictionary),
+            canopen: CanopenNode::new(node, dictionary, quirks.power_up, sdo, pdo_features, delays),
             axes,
             quirks,
-            dictionary,
-            has_pdo_error: false,
             injected: None,
-            defects: FeedbackDefects::default(),
-            save_ns: NEVER,
-            pdos_ready_ns: 0,
             stepped_ns: 0,
             now_ns: 0,
             wake_ns: 0,
@@ -109,7 +91,7 @@ impl Cia402Drive {
     /// The true state of one of its axes at `now_ns`, counted from 0.
     pub fn observe_axis(&mut self, now_ns: Nanoseconds, axis: usize) -> Option<Observation> {
         self.run_loops(now_ns);
-        let nmt = self.network.state();
+        let nmt = self.canopen.network.state();
         let axis = self.axes.get(axis)?;
         Some(Observation {
             position: axis.joint.position(),
@@ -118,160 +100,172 @@ impl Cia402Drive {
             position_counts: axis.position().round_ties_even() as i64 as i32,
             state: axis.state(),
             statusword: axis.statusword(),
-            error_code: self.dictionary.number_at(axis.places.error_code).unwrap_or(0) as u16,
+            error_code: self.canopen.dictionary.number_at(axis.places.error_code).unwrap_or(0) as u16,
             operation_mode: axis.mode_number(),
             nmt,
             is_braked: axis.is_braked(),
         })
     }
 
-    /// Runs the loops in steps up to `now_ns`.
-    fn run_loops(&mut self, now_ns: Nanoseconds) {
-        while self.stepped_ns + STEP_NS <= now_ns {
-            self.step(STEP_NS);
-        }
-    }
-
-    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
-    fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
-    }
-
-    fn step(&mut self, duration_ns: Nanoseconds) {
-        self.stepped_ns += duration_ns;
-        for index in 0..self.axes.len() {
-            match self.axes[index].step(self.stepped_ns, duration_ns, &self.dictionary) {
-                Some(AxisEvent::Failed(error)) => self.fail(index, error),
-                Some(AxisEvent::FaultReset) => self.fault_reset(index),
-                None => {}
-            }
-        }
-    }
-
     /// Has an axis fail: error code, emergency message, fault reaction.
-    fn fail(&mut self, index: usize, error: Cia402Error) {
-        self.axes[index].fail(error, &mut self.dictionary);
-        self.errors.raise(error, &mut self.dictionary);
+    fn fail(&mut self, index: usize, error: DeviceError) {
+        self.axes[index].fail(error, &mut self.canopen.dictionary);
+        self.canopen.errors.raise(error, &mut self.canopen.dictionary);
     }
 
     fn fault_reset(&mut self, index: usize) {
-        self.dictionary.set_at(self.axes[index].places.error_code, 0);
+        self.canopen.dictionary.set_at(self.axes[index].places.error_code, 0);
         if self.axes.iter().all(|axis| !axis.state().is_faulted()) {
-            self.errors.clear(&mut self.dictionary);
+            self.canopen.errors.clear(&mut self.canopen.dictionary);
         }
     }
 
     /// Evaluates the controlwords.
     fn evaluate(&mut self) {
         for index in 0..self.axes.len() {
-            if self.axes[index].evaluate(&self.dictionary) {
+            if self.axes[index].evaluate(&self.canopen.dictionary) {
                 self.fault_reset(index);
             }
         }
     }
 
     fn follow_modes(&mut self, now_ns: Nanoseconds) {
-        self.axes.iter_mut().for_each(|axis| axis.follow_mode(&self.dictionary, now_ns));
+        self.axes.iter_mut().for_each(|axis| axis.follow_mode(&self.canopen.dictionary, now_ns));
     }
 
     fn latch(&mut self) {
-        self.axes.iter_mut().for_each(|axis| axis.latch(&self.dictionary));
+        self.axes.iter_mut().for_each(|axis| axis.latch(&self.canopen.dictionary));
+    }
+}
+
+impl ControlLoops for Cia402Drive {
+    fn stepped_ns(&self) -> Nanoseconds {
+        self.stepped_ns
     }
 
-    /// The master is lost: every axis does what object 6007 says.
+    fn step(&mut self, duration_ns: Nanoseconds) {
+        self.stepped_ns += duration_ns;
+        for index in 0..self.axes.len() {
+            match self.axes[index].step(self.stepped_ns, duration_ns, &self.canopen.dictionary) {
+                Some(AxisEvent::Failed(error)) => self.fail(index, error),
+                Some(AxisEvent::FaultReset) => self.fault_reset(index),
+                None => {}
+            }
+        }
+    }
+}
+
+impl CanopenDevice for Cia402Drive {
+    const CHECKS_SYNC_LENGTH: bool = true;
+
+    fn canopen(&mut self) -> &mut CanopenNode {
+        &mut self.canopen
+    }
+
+    fn begin_rpdo(&mut self) -> TakesField {
+        |_, _| true
+    }
+
+    fn take_values(&mut self, now_ns: Nanoseconds, _: ValueSource) {
+        self.follow_modes(now_ns);
+        self.evaluate();
+        self.latch();
+    }
+
+    fn is_faulted(&self) -> bool {
+        self.axes.iter().any(|axis| axis.state().is_faulted())
+    }
+
+    fn measure(&mut self) {
+        self.axes.iter().for_each(|axis| axis.measure(&self.quirks, &mut self.canopen.dictionary));
+    }
+
+    /// The torque takes the place of the position.
+    fn shown(&self) -> ShownObjects {
+        let places = &self.axes[0].places;
+        ShownObjects {
+            statusword: places.statusword,
+            mode_display: places.mode_display,
+            position: places.position,
+            instead_of_position: places.torque,
+        }
+    }
+
+    fn started(&mut self, now_ns: Nanoseconds) {
+        self.axes.iter_mut().for_each(|axis| axis.started(&self.canopen.dictionary, now_ns));
+    }
+
+    fn restart(&mut self, now_ns: Nanoseconds) {
+        self.canopen.restart(now_ns);
+        for axis in &mut self.axes {
+            axis.restart(&mut self.canopen.dictionary, &self.quirks);
+        }
+    }
+
+    /// Every axis does what object 6007 says.
     fn lose_master(&mut self) {
+        let CanopenNode { dictionary, errors, .. } = &mut self.canopen;
         let mut is_fault = false;
         for axis in &mut self.axes {
-            if axis.lose_master(&self.dictionary) {
-                axis.fail(Cia402Error::MasterLost, &mut self.dictionary);
+            if axis.lose_master(dictionary) {
+                axis.fail(DeviceError::MasterLost, dictionary);
                 is_fault = true;
             }
         }
         // The node reports the error even when its axes go on.
-        self.errors.raise(Cia402Error::MasterLost, &mut self.dictionary);
+        errors.raise(DeviceError::MasterLost, dictionary);
         if !is_fault {
-            self.errors.clear(&mut self.dictionary);
+            errors.clear(dictionary);
         }
-        self.stop_services();
     }
 
-    /// Writes the measured values to the dictionary.
-    fn measure(&mut self) {
-        self.axes.iter().for_each(|axis| axis.measure(&self.quirks, &mut self.dictionary));
+    fn check_write(&self, _: usize) -> Result<(), AbortCode> {
+        Ok(())
     }
 
-    /// Writes the measured values to the dictionary with the effect of the defects, and lets the PDOs take their
-    /// objects.
-    fn report<T>(&mut self, take: impl FnOnce(&mut PdoEngine, &SimulatedDictionary) -> T) -> T {
-        self.measure();
-        let places = self.axes[0].places;
-        let truth = self.defects.falsify(&places, &mut self.dictionary);
-        let taken = take(&mut self.pdos, &self.dictionary);
-        truth.restore(&mut self.dictionary);
-        taken
+    fn check_value(&self, _: ObjectAddress, _: usize, _: i64) -> Result<(), AbortCode> {
+        Ok(())
     }
 
-    /// Restarts everything except the joints and the saved parameters.
-    fn start(&mut self, now_ns: Nanoseconds) {
-        self.dictionary.restore(0..=u16::MAX);
-        self.network.restart(now_ns + self.power_up_ns);
-        self.sdo.reset();
-        self.errors.reset();
-        self.pdos.compile(&self.dictionary);
-        for axis in &mut self.axes {
-            axis.restart(&mut self.dictionary, &self.quirks);
+    fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+        let object = match address.index {
+            0x6000..=0x9FFF => 0x6000 + (address.index - 0x6000) % AXIS_OFFSET,
+            _ => return,
+        };
+        match object {
+            0x6040 => self.evaluate(),
+            0x6060 => self.follow_modes(now_ns),
+            0x607A | 0x60C1 => self.latch(),
+            0x607E | 0x608F | 0x6091 | 0x6092 | 0x6096 | 0x60A9 => {
+                for axis in &mut self.axes {
+                    axis.set_units(&self.canopen.dictionary, &self.quirks);
+                }
+            }
+            _ => {}
         }
-        self.has_pdo_error = false;
-        self.save_ns = NEVER;
-    }
-
-    fn schedule(&mut self, now_ns: Nanoseconds) {
-        let has_message = self.errors.is_pending() && self.network.has_services();
-        let due_ns = [
-            now_ns + IDLE_NS,
-            self.network.due_ns(),
-            self.sdo.due_ns().unwrap_or(NEVER),
-            self.pdos.due_ns(),
-            self.save_ns,
-            if has_message { now_ns } else { NEVER },
-        ];
-        self.wake_ns = due_ns.into_iter().min().unwrap_or(NEVER).max(now_ns + 1);
     }
 }
 
 impl Drive for Cia402Drive {
     fn node(&self) -> u8 {
-        self.node
+        self.canopen.id
     }
 
-    fn receive(&mut self, now_ns: Nanoseconds, frame: &takt_rt::Frame, mailbox: &mut Mailbox) {
+    fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         self.receive_frame(now_ns, frame, mailbox);
-        self.schedule(now_ns);
+        self.wake_ns = self.canopen.wake_ns(now_ns);
     }
 
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
-            self.fail(0, Cia402Error::Fault(fault));
+            self.fail(0, DeviceError::Fault(fault));
         }
-        if self.network.check_master(now_ns, &self.dictionary) {
-            self.lose_master();
-        }
-        if self.pdos.has_lost_rpdo(now_ns) {
-            self.errors.raise(Cia402Error::RpdoTimeout, &mut self.dictionary);
-        }
-        if now_ns >= self.save_ns {
-            self.save_ns = NEVER;
-            self.dictionary.save();
-        }
-        self.send_due(now_ns, mailbox);
-        self.schedule(now_ns);
+        self.advance_node(now_ns, mailbox);
+        self.wake_ns = self.canopen.wake_ns(now_ns);
     }
 
     fn wake_ns(&self) -> Nanoseconds {
@@ -292,8 +286,8 @@ impl Drive for Cia402Drive {
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_loops(now_ns);
         mailbox.clear();
-        self.start(now_ns);
-        self.schedule(now_ns);
+        self.restart(now_ns);
+        self.wake_ns = self.canopen.wake_ns(now_ns);
     }
 
     /// On the joint of the first axis.
@@ -319,16 +313,15 @@ impl Drive for Cia402Drive {
             return Err(Unsupported { defect, reason });
         }
         self.run_loops(now_ns);
-        self.defects.set(defect, is_present);
+        self.canopen.defects.set(defect, is_present);
         let first = &mut self.axes[0];
+        first.defects.set(defect, is_present);
         match defect {
-            Defect::BlockedJoint => first.defects.is_blocked = is_present,
-            Defect::StuckBrake => first.defects.is_brake_stuck = is_present,
             Defect::EncoderJump { distance } if is_present => first.jump(distance),
             Defect::TorqueOff if is_present => first.lose_torque(),
-            Defect::Alarm { code } if is_present => self.fail(0, Cia402Error::Alarm(code)),
+            Defect::Alarm { code } if is_present => self.fail(0, DeviceError::Alarm(code)),
             Defect::Emergency { code } if is_present => {
-                self.errors.raise(Cia402Error::Alarm(code), &mut self.dictionary);
+                self.canopen.errors.raise(DeviceError::Alarm(code), &mut self.canopen.dictionary);
             }
             _ => {}
         }

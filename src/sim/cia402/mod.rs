@@ -3,13 +3,13 @@
 //! deviates from its file stands in its [`Quirks`].
 //!
 //! ```text
-//! data sheet ── object_dictionary ──┬── sdo_server   SDO: expedited, segmented, blocks
-//!                                   ├── pdo_engine   RPDO, TPDO, transmission types
-//!                                   ├── network      NMT, heartbeat, guarding, SYNC producer
-//!                                   ├── errors       emergency messages, error history
-//!                                   └── axis, each: device   CiA 402: controlword → state → statusword
-//!                                         motion, homing     set-points in every mode; profile, units: what objects say
-//!                                         servo ── plant     loops → torque → joint
+//! data sheet ── object_dictionary ── canopen_node ──┬── sdo_server   SDO: expedited, segmented, blocks
+//!                                        │          ├── pdo_engine   RPDO, TPDO, transmission types
+//!                                        │          ├── network      NMT, heartbeat, guarding, SYNC producer
+//!                                        │          └── errors       emergency messages, error history
+//!                                       axis, each: device   CiA 402: controlword → state → statusword
+//!                                             motion, homing     set-points in every mode; profile, units: what objects say
+//!                                             servo ── plant     loops → torque → joint
 //! ```
 //!
 //! Choices where neither the file nor the standards give an answer:
@@ -25,13 +25,10 @@
 //! - The velocity mode (2), 607B, 60C4, 1007 and 1012 have no effect.
 
 mod axis;
-mod defects;
 mod device;
 mod drive;
-mod errors;
 mod homing;
 mod motion;
-mod network;
 mod places;
 mod profile;
 mod units;

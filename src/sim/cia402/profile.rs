@@ -1,5 +1,6 @@
 //! What the objects of one axis say about its motion, in position units: limits, ramps, periods.
 
+use crate::sim::motion::MotionLimits;
 use crate::sim::object_dictionary::SimulatedDictionary;
 
 use super::device::Ramp;
@@ -97,14 +98,15 @@ impl Profile<'_> {
         }
     }
 
-    /// Object 607D; limits that leave no room are off.
-    pub fn software_limits(&self) -> (f64, f64) {
+    /// The velocity limit, and object 607D; software limits that leave no room are off.
+    pub fn limits(&self) -> MotionLimits {
         let low = self.dictionary.real_at(self.places.software_limit_low);
         let high = self.dictionary.real_at(self.places.software_limit_high);
-        match (low, high) {
+        let positions = match (low, high) {
             (Some(low), Some(high)) if low < high => (low, high),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
-        }
+        };
+        MotionLimits { velocity: self.velocity_limit(), positions }
     }
 
     /// The period over which the cyclic modes interpolate: 60C2, otherwise the SYNC period 1006, otherwise 1 ms.

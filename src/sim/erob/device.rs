@@ -2,7 +2,8 @@
 
 use takt_rt::{Command, DriveState, Nanoseconds, controlword, statusword};
 
-use super::dictionary::{ErobDictionary, at};
+use super::objects::at;
+use crate::sim::object_dictionary::SimulatedDictionary;
 
 /// Minimum time for which controlword bit 7 must stay set to reset a fault (field experience: several cycles).
 const FAULT_RESET_NS: Nanoseconds = 3_000_000;
@@ -80,8 +81,13 @@ impl ErobDevice {
 
     /// Evaluates the controlword. The drive does this in every step of its loop and after every write of 6040.
     /// `is_cleared`: the cause of a fault is gone.
-    pub fn evaluate(&mut self, now_ns: Nanoseconds, dictionary: &ErobDictionary, is_cleared: bool) -> Change {
-        let word = dictionary.get(at::CONTROLWORD) as u16;
+    pub fn evaluate(
+        &mut self,
+        now_ns: Nanoseconds,
+        dictionary: &SimulatedDictionary,
+        is_cleared: bool,
+    ) -> Change {
+        let word = dictionary.number(at::CONTROLWORD) as u16;
         let rising = word & !self.controlword;
         self.controlword = word;
         if self.state == DriveState::Fault {
@@ -110,7 +116,7 @@ impl ErobDevice {
         Change::FaultReset
     }
 
-    fn evaluate_command(&mut self, command: Command, dictionary: &ErobDictionary) -> Change {
+    fn evaluate_command(&mut self, command: Command, dictionary: &SimulatedDictionary) -> Change {
         if self.stop.is_some() && command != Command::DisableVoltage {
             return Change::None;
         }
@@ -118,7 +124,7 @@ impl ErobDevice {
         let had_torque = self.state.has_torque();
         if self.state == DriveState::OperationEnabled
             && next == DriveState::ReadyToSwitchOn
-            && dictionary.signed(at::SHUTDOWN_OPTION) == 1
+            && dictionary.number(at::SHUTDOWN_OPTION) == 1
         {
             let deceleration = dictionary.real(at::PROFILE_DECELERATION);
             self.stop = Some(Stop { deceleration, then: next });
@@ -151,11 +157,11 @@ impl ErobDevice {
 
     /// Enters the fault state. Without torque, or when power must be cut, this happens at once. Otherwise the drive
     /// decelerates first, by object 605E.
-    pub fn fault(&mut self, cuts_power: bool, dictionary: &ErobDictionary) {
+    pub fn fault(&mut self, cuts_power: bool, dictionary: &SimulatedDictionary) {
         if self.state.is_faulted() && !(cuts_power && self.state == DriveState::FaultReactionActive) {
             return;
         }
-        let deceleration = match dictionary.signed(at::FAULT_REACTION_OPTION) {
+        let deceleration = match dictionary.number(at::FAULT_REACTION_OPTION) {
             _ if cuts_power || !self.state.has_torque() => None,
             1 => Some(dictionary.real(at::PROFILE_DECELERATION)),
             2 => Some(dictionary.real(at::QUICK_STOP_DECELERATION)),

@@ -2,13 +2,12 @@
 //! dictionary, SDO, NMT, PDO, emergency messages, the CiA 402 state machine, six modes of operation, and the joint.
 //!
 //! ```text
-//! objects ── dictionary ──┬── sdo            SDO server
-//!                         ├── process_data   RPDO, TPDO, SYNC
-//!                         ├── network        NMT, heartbeat, guarding
-//!                         ├── errors         emergency messages, error history
-//!                         ├── defects        defects and their effect on the feedback
-//!                         ├── device         CiA 402: controlword → state → statusword
-//!                         └── motion → servo → plant    set-points → loops → torque → joint
+//! objects ── object_dictionary ── canopen_node ──┬── sdo_server   SDO: expedited, segmented
+//!                                     │          ├── pdo_engine   RPDO, TPDO, SYNC
+//!                                     │          ├── network      NMT, heartbeat, guarding, SYNC producer
+//!                                     │          └── errors       emergency messages, error history
+//!                                   joint ──┬── device            CiA 402: controlword → state → statusword
+//!                                           └── motion → servo → plant    set-points → loops → torque → joint
 //! ```
 //!
 //! Choices where neither the manual nor traces give an answer:
@@ -25,19 +24,13 @@
 //! - 6093, 6080, 607C, 2380 to 2382, 3B60 and the homing and interpolation objects can be read and written, without
 //!   effect.
 
-mod defects;
 mod device;
-mod dictionary;
-mod errors;
 mod joint;
 mod motion;
-mod network;
 mod objects;
-mod process_data;
-mod sdo;
 
 pub use joint::ErobJoint;
-pub use objects::{ErobAccess, ErobDataType, ErobObject, OBJECTS};
+pub use objects::OBJECTS;
 
 use crate::config::{Axis, Control, Simulation, Travel};
 use takt_rt::Nanoseconds;

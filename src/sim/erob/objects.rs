@@ -1,117 +1,34 @@
 //! The object dictionary of the eRob's CANopen firmware by its EDS. Objects that are not in the EDS do not exist here.
 //! Unknown defaults are 0, or as noted.
 
-/// The data type of an object (CiA 301, 7.4.7).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ErobDataType {
-    /// INTEGER8
-    I8,
-    /// INTEGER16
-    I16,
-    /// INTEGER32
-    I32,
-    /// UNSIGNED8
-    U8,
-    /// UNSIGNED16
-    U16,
-    /// UNSIGNED32
-    U32,
-}
+use crate::canopen::eds::{AccessType, DataTypeCode};
+use crate::sim::object_dictionary::table::{I8, I16, I32, ObjectRow, U8, U16, U32, table_places};
 
-impl ErobDataType {
-    /// The size in bytes.
-    pub const fn bytes(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 => 4,
-        }
-    }
-}
-
-/// SDO access to an object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ErobAccess {
-    /// Read only.
-    ReadOnly,
-    /// Read and write.
-    ReadWrite,
-    /// Write only.
-    WriteOnly,
-}
-
-/// One entry of the object dictionary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ErobObject {
-    /// Index.
-    pub index: u16,
-    /// Sub-index.
-    pub subindex: u8,
-    /// Data type.
-    pub data_type: ErobDataType,
-    /// Access by SDO.
-    pub access: ErobAccess,
-    /// Whether a PDO can map it.
-    pub is_mappable: bool,
-    /// Whether "save" (1010:1) saves it.
-    pub is_saved: bool,
-    /// Value after the first power-up.
-    pub default: u32,
-    /// Whether the node ID is added to the default.
-    pub adds_node: bool,
-}
-
-impl ErobObject {
-    const fn new(
-        index: u16,
-        subindex: u8,
-        data_type: ErobDataType,
-        access: ErobAccess,
-        default: i64,
-    ) -> Self {
-        let (is_mappable, is_saved, adds_node) = (false, false, false);
-        Self { index, subindex, data_type, access, is_mappable, is_saved, default: default as u32, adds_node }
-    }
-
-    const fn mappable(self) -> Self {
-        Self { is_mappable: true, ..self }
-    }
-
-    const fn saved(self) -> Self {
-        Self { is_saved: true, ..self }
-    }
-
-    const fn plus_node(self) -> Self {
-        Self { adds_node: true, ..self }
-    }
-}
-
-use ErobAccess::{ReadOnly, ReadWrite, WriteOnly};
-use ErobDataType::{I8, I16, I32, U8, U16, U32};
+use AccessType::{ReadWrite, WriteOnly};
 
 /// Read-only.
-const fn ro(index: u16, subindex: u8, data_type: ErobDataType, default: i64) -> ErobObject {
-    ErobObject::new(index, subindex, data_type, ReadOnly, default)
+const fn ro(index: u16, subindex: u8, data_type: DataTypeCode, default: i64) -> ObjectRow {
+    ObjectRow::read_only(index, subindex, data_type, default)
 }
 
 /// Read-only and mappable.
-const fn ro_pdo(index: u16, data_type: ErobDataType, default: i64) -> ErobObject {
+const fn ro_pdo(index: u16, data_type: DataTypeCode, default: i64) -> ObjectRow {
     ro(index, 0, data_type, default).mappable()
 }
 
 /// A parameter: read, written, saved.
-const fn rw(index: u16, subindex: u8, data_type: ErobDataType, default: i64) -> ErobObject {
-    ErobObject::new(index, subindex, data_type, ReadWrite, default).saved()
+const fn rw(index: u16, subindex: u8, data_type: DataTypeCode, default: i64) -> ObjectRow {
+    ro(index, subindex, data_type, default).with_access(ReadWrite).saved()
 }
 
 /// A parameter that is also mappable.
-const fn rw_pdo(index: u16, subindex: u8, data_type: ErobDataType, default: i64) -> ErobObject {
+const fn rw_pdo(index: u16, subindex: u8, data_type: DataTypeCode, default: i64) -> ObjectRow {
     rw(index, subindex, data_type, default).mappable()
 }
 
 /// A command or set-point: read, written, mappable, never saved.
-const fn command(index: u16, data_type: ErobDataType, default: i64) -> ErobObject {
-    ErobObject::new(index, 0, data_type, ReadWrite, default).mappable()
+const fn command(index: u16, data_type: DataTypeCode, default: i64) -> ObjectRow {
+    ro_pdo(index, data_type, default).with_access(ReadWrite)
 }
 
 const NO_LIMIT: i64 = u32::MAX as i64;
@@ -120,10 +37,10 @@ const MAPS_6040: i64 = 0x6040_0010;
 const MAPS_6041: i64 = 0x6041_0010;
 
 /// Every entry, in ascending order.
-pub const OBJECTS: [ErobObject; 217] = [
+pub const OBJECTS: [ObjectRow; 217] = [
     ro(0x1000, 0, U32, 0x0042_0192),
     ro(0x1001, 0, U8, 0).mappable(),
-    ErobObject::new(0x1003, 0, U8, ReadWrite, 0),
+    ro(0x1003, 0, U8, 0).with_access(ReadWrite),
     ro(0x1003, 1, U32, 0),
     ro(0x1003, 2, U32, 0),
     ro(0x1003, 3, U32, 0),
@@ -133,7 +50,7 @@ pub const OBJECTS: [ErobObject; 217] = [
     rw(0x100C, 0, U16, 0),
     rw(0x100D, 0, U8, 0),
     ro(0x1010, 0, U8, 1),
-    ErobObject::new(0x1010, 1, U32, ReadWrite, 1),
+    ro(0x1010, 1, U32, 1).with_access(ReadWrite),
     ro(0x1014, 0, U32, 0x80).plus_node(),
     ro(0x1016, 0, U8, 1),
     rw(0x1016, 1, U32, 0),
@@ -266,10 +183,10 @@ pub const OBJECTS: [ErobObject; 217] = [
     // Manufacturer's own
     ro_pdo(0x20A0, I32, 0),
     ro_pdo(0x2205, I16, 0),
-    ro_pdo(0x2240, I32, 0),                        // motor encoder
-    ro_pdo(0x2241, I32, 0),                        // encoder difference
-    ErobObject::new(0x2242, 0, U16, WriteOnly, 0), // 1 clears the battery fault; type and access are guesses
-    ro(0x22A2, 0, U16, 0),                         // temperature
+    ro_pdo(0x2240, I32, 0),                       // motor encoder
+    ro_pdo(0x2241, I32, 0),                       // encoder difference
+    ro(0x2242, 0, U16, 0).with_access(WriteOnly), // 1 clears the battery fault; type and access are guesses
+    ro(0x22A2, 0, U16, 0),                        // temperature
     ro(0x2380, 0, U8, 2),
     rw(0x2380, 1, U16, 0), // gains; their scale is not known, and they have no effect here
     rw(0x2380, 2, U16, 0),
@@ -332,8 +249,8 @@ pub const OBJECTS: [ErobObject; 217] = [
     command(0x60B2, I16, 0),
     command(0x60C0, I16, 0),
     ro(0x60C1, 0, U8, 2),
-    ErobObject::new(0x60C1, 1, I16, ReadWrite, 0).mappable(),
-    ErobObject::new(0x60C1, 2, I16, ReadWrite, 0).mappable(),
+    ro(0x60C1, 1, I16, 0).with_access(ReadWrite).mappable(),
+    ro(0x60C1, 2, I16, 0).with_access(ReadWrite).mappable(),
     ro(0x60C2, 0, U8, 2),
     rw_pdo(0x60C2, 1, U8, 1),
     rw(0x60C2, 2, I8, -3),
@@ -346,44 +263,84 @@ pub const OBJECTS: [ErobObject; 217] = [
     ro_pdo(0x6502, U32, 909),
 ];
 
-/// The position of an entry in [`OBJECTS`], for constants: an unknown entry does not compile.
-pub const fn place(index: u16, subindex: u8) -> usize {
-    let mut at = 0;
-    while at < OBJECTS.len() {
-        if OBJECTS[at].index == index && OBJECTS[at].subindex == subindex {
-            return at;
-        }
-        at += 1;
+/// Places of the entries that the drive itself uses.
+pub mod at {
+    use super::{OBJECTS, table_places};
+
+    table_places! {
+        CYCLE_PERIOD = 0x1006:0;
+        ERROR_BEHAVIOUR = 0x1029:1;
+        MOTOR_ENCODER = 0x2240:0;
+        BATTERY_RESET = 0x2242:0;
+        TEMPERATURE = 0x22A2:0;
+        TORQUE_ESTIMATE = 0x3B69:0;
+        ERROR_CODE = 0x603F:0;
+        CONTROLWORD = 0x6040:0;
+        STATUSWORD = 0x6041:0;
+        SHUTDOWN_OPTION = 0x605B:0;
+        FAULT_REACTION_OPTION = 0x605E:0;
+        OPERATION_MODE = 0x6060:0;
+        OPERATION_MODE_DISPLAY = 0x6061:0;
+        POSITION_DEMAND = 0x6062:0;
+        POSITION = 0x6064:0;
+        FOLLOWING_ERROR_WINDOW = 0x6065:0;
+        POSITION_WINDOW = 0x6067:0;
+        POSITION_WINDOW_TIME = 0x6068:0;
+        VELOCITY_DEMAND = 0x606B:0;
+        VELOCITY = 0x606C:0;
+        VELOCITY_WINDOW = 0x606D:0;
+        VELOCITY_WINDOW_TIME = 0x606E:0;
+        TARGET_TORQUE = 0x6071:0;
+        TORQUE_DEMAND = 0x6074:0;
+        RATED_CURRENT = 0x6075:0;
+        RATED_TORQUE = 0x6076:0;
+        TORQUE = 0x6077:0;
+        CURRENT = 0x6078:0;
+        TARGET_POSITION = 0x607A:0;
+        POSITION_MIN = 0x607D:1;
+        POSITION_MAX = 0x607D:2;
+        MAX_PROFILE_VELOCITY = 0x607F:0;
+        PROFILE_VELOCITY = 0x6081:0;
+        PROFILE_ACCELERATION = 0x6083:0;
+        PROFILE_DECELERATION = 0x6084:0;
+        QUICK_STOP_DECELERATION = 0x6085:0;
+        TORQUE_SLOPE = 0x6087:0;
+        POSITION_OFFSET = 0x60B0:0;
+        VELOCITY_OFFSET = 0x60B1:0;
+        TORQUE_OFFSET = 0x60B2:0;
+        INTERPOLATION_PERIOD = 0x60C2:1;
+        INTERPOLATION_EXPONENT = 0x60C2:2;
+        MAX_ACCELERATION = 0x60C5:0;
+        MAX_DECELERATION = 0x60C6:0;
+        FOLLOWING_ERROR = 0x60F4:0;
+        TARGET_VELOCITY = 0x60FF:0;
+        SUPPORTED_MODES = 0x6502:0;
     }
-    panic!("no such object")
 }
 
-/// The position of an entry in [`OBJECTS`].
-pub fn find(index: u16, subindex: u8) -> Result<usize, Missing> {
-    OBJECTS.binary_search_by_key(&(index, subindex), |object| (object.index, object.subindex)).map_err(|at| {
-        // Every index begins with sub-index 0, so a neighbour has it.
-        let is_known = at > 0 && OBJECTS.get(at - 1).is_some_and(|object| object.index == index);
-        if is_known { Missing::Subindex } else { Missing::Index }
-    })
-}
-
-/// What does not exist.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Missing {
-    /// The whole index.
-    Index,
-    /// The sub-index of an index that exists.
-    Subindex,
+/// Whether an object is a measured or demanded value, which changes all the time.
+pub fn is_measured(index: u16) -> bool {
+    matches!(
+        index,
+        0x2240 | 0x2241 | 0x3B69 | 0x6062 | 0x6064 | 0x606B | 0x606C | 0x6074 | 0x6077 | 0x6078 | 0x60F4
+    )
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::canopen::object::ObjectAddress;
+    use crate::sim::object_dictionary::SimulatedDictionary;
+    use crate::sim::sdo_reply::AbortCode;
+
+    fn dictionary() -> SimulatedDictionary {
+        SimulatedDictionary::of_table(&OBJECTS, 5)
+    }
 
     #[test]
     fn the_table_is_in_order_and_every_index_begins_with_subindex_0() {
         for pair in OBJECTS.windows(2) {
-            let key = |object: &ErobObject| (object.index, object.subindex);
+            let key = |object: &ObjectRow| (object.index, object.subindex);
             assert!(key(&pair[0]) < key(&pair[1]), "{:04X}:{}", pair[1].index, pair[1].subindex);
             assert!(pair[0].index == pair[1].index || pair[1].subindex == 0, "{:04X}", pair[1].index);
         }
@@ -391,17 +348,19 @@ mod tests {
 
     #[test]
     fn objects_that_the_firmware_lacks_do_not_exist() {
+        let find = |index, subindex| dictionary().find(ObjectAddress::new(index, subindex));
         for index in [0x1011, 0x1015, 0x1019, 0x605A, 0x605C, 0x605D, 0x6063, 0x6072, 0x607E, 0x60FE, 0x6007]
         {
-            assert_eq!(find(index, 0), Err(Missing::Index), "{index:04X}");
+            assert_eq!(find(index, 0), Err(AbortCode::NoObject), "{index:04X}");
         }
-        assert_eq!(find(0x1018, 4), Err(Missing::Subindex));
-        assert_eq!(find(0x1800, 4), Err(Missing::Subindex));
-        assert_eq!(find(0x1800, 6), Err(Missing::Subindex));
+        assert_eq!(find(0x1018, 4), Err(AbortCode::NoSubindex));
+        assert_eq!(find(0x1800, 4), Err(AbortCode::NoSubindex));
+        assert_eq!(find(0x1800, 6), Err(AbortCode::NoSubindex));
     }
 
     #[test]
     fn default_mappings_contain_mappable_objects_of_the_right_length() {
+        let dictionary = dictionary();
         let mappings = OBJECTS.iter().filter(|object| {
             matches!(object.index, 0x1600..=0x1603 | 0x1A00..=0x1A03)
                 && object.subindex > 0
@@ -410,11 +369,19 @@ mod tests {
         let mut count = 0;
         for mapping in mappings {
             let value = mapping.default;
-            let object = OBJECTS[find((value >> 16) as u16, (value >> 8) as u8).unwrap()];
-            assert!(object.is_mappable);
-            assert_eq!(object.data_type.bytes() * 8, (value & 0xFF) as usize);
+            let place = dictionary.place((value >> 16) as u16, (value >> 8) as u8).unwrap();
+            assert!(OBJECTS[place].is_mappable);
+            assert_eq!(dictionary.entry(place).length * 8, (value & 0xFF) as usize);
             count += 1;
         }
         assert_eq!(count, 10);
+    }
+
+    #[test]
+    fn cob_id_defaults_contain_the_node_id() {
+        let number = |index, subindex| dictionary().number_at(dictionary().place(index, subindex));
+        assert_eq!(number(0x1400, 1), Some(0x205));
+        assert_eq!(number(0x1801, 1), Some(0x8000_0285));
+        assert_eq!(number(0x1014, 0), Some(0x85));
     }
 }

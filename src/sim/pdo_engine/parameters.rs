@@ -75,9 +75,10 @@ fn check_count(dictionary: &SimulatedDictionary, mapping: u16, count: i64) -> Re
         return Err(AbortCode::PdoTooLong);
     }
     let mut bits = 0;
+    let last = ObjectAddress::new(mapping, count as u8);
+    dictionary.find(last).map_err(|_| AbortCode::PdoTooLong)?;
     for subindex in 1..=count as u8 {
-        let entry =
-            dictionary.find(ObjectAddress::new(mapping, subindex)).map_err(|_| AbortCode::PdoTooLong)?;
+        let entry = dictionary.find(ObjectAddress::new(mapping, subindex))?;
         bits += check_mapped(dictionary, dictionary.number(entry), mapping >= 0x1A00)?;
     }
     if bits > MAX_BITS { Err(AbortCode::PdoTooLong) } else { Ok(()) }
@@ -86,9 +87,8 @@ fn check_count(dictionary: &SimulatedDictionary, mapping: u16, count: i64) -> Re
 /// Checks one mapping entry and returns its length in bits. An empty entry is not mappable.
 fn check_mapped(dictionary: &SimulatedDictionary, value: i64, is_outbound: bool) -> Result<u32, AbortCode> {
     let mapped = MappedObject::from_parameter(value as u32);
-    if mapped.is_dummy() {
-        let is_allowed = !is_outbound && dictionary.is_dummy(mapped.index);
-        return if is_allowed { Ok(mapped.bits.into()) } else { Err(AbortCode::NotMappable) };
+    if dictionary.is_dummy(mapped.index) {
+        return if is_outbound { Err(AbortCode::NotMappable) } else { Ok(mapped.bits.into()) };
     }
     let place = dictionary.find(ObjectAddress::new(mapped.index, mapped.subindex))?;
     let entry = dictionary.entry(place);

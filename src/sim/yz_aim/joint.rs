@@ -11,27 +11,33 @@ use takt_rt::{DriveState, Frame, Nanoseconds};
 
 use super::alarms::{Alarms, StoppingAlarm};
 use super::bit_rate::BitRateChange;
-use super::defects::YzAimDefects;
+use super::defects::check_possible;
 use super::device::{Level, YzAimDevice};
-use super::dictionary::YzAimDictionary;
 use super::homing::Homing;
-use super::motion::{YzAimActual, YzAimMotion};
-use super::network::YzAimNetwork;
-use super::objects::at;
+use super::motion::YzAimMotion;
+use super::objects::{OBJECTS, at};
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
-use super::process_data::{YzAimProcessData, report_state_first};
-use super::sdo::LATENCY_NS;
+use super::process_data::{PDO_FEATURES, Transmission, report_state_first};
+use crate::config::PowerUpState;
 use crate::sim::defect::{Defect, Unsupported};
-use crate::sim::drive::{Drive, DriveFault, NodeState, Observation};
+use crate::sim::drive::{Drive, DriveFault, Observation};
+use crate::sim::feedback_defects::{FeedbackDefects, JointDefects};
+use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;
+use crate::sim::motion::Actual;
+use crate::sim::network::Network;
+use crate::sim::object_dictionary::SimulatedDictionary;
+use crate::sim::pdo_engine::PdoEngine;
 use crate::sim::plant::{Gravity, Joint};
 use crate::sim::random::Random;
-use crate::sim::sdo_reply::ReplyBuffer;
+use crate::sim::sdo_server::{SdoFeatures, SdoServer};
 use crate::sim::servo::Servo;
 use load_monitor::LoadMonitor;
 
 /// Longest time between two advances.
 const IDLE_NS: Nanoseconds = 1_000_000;
+/// From an SDO request to its reply, as measured on real units: about 0.3 ms.
+const SDO_LATENCY_NS: std::ops::Range<Nanoseconds> = 270_000..330_000;
 /// Factor by which the loops may exceed the highest speed to catch up.
 const SPEED_RESERVE: f64 = 1.1;
 /// Standstill threshold: r/min.
@@ -40,20 +46,28 @@ const NEVER: Nanoseconds = Nanoseconds::MAX;
 
 /// The modes of operation in 6060h.
 mod mode {
-    pub const PROFILE_POSITION: i64 = 1;
-    pub const VELOCITY: i64 = 3;
-    pub const HOMING: i64 = 6;
-    pub const INTERPOLATION: i64 = 7;
+    use takt_rt::OperationMode;
+
+    pub const PROFILE_POSITION: i64 = OperationMode::ProfilePosition as i64;
+    pub const VELOCITY: i64 = OperationMode::ProfileVelocity as i64;
+    pub const HOMING: i64 = OperationMode::Homing as i64;
+    pub const INTERPOLATION: i64 = OperationMode::InterpolatedPosition as i64;
+    pub const ALL: [i64; 4] = [PROFILE_POSITION, VELOCITY, HOMING, INTERPOLATION];
 }
 
 /// A simulated YZ-AIM integrated servo with CANopen.
 #[derive(Clone, Debug)]
 pub struct YzAimJoint {
     parameters: YzAimParameters,
-    dictionary: YzAimDictionary,
-    network: YzAimNetwork,
-    sdo: ReplyBuffer,
-    process_data: YzAimProcessData,
+    dictionary: SimulatedDictionary,
+    network: Network,
+    /// Whether the next boot sends a boot-up message.
+    is_boot_announced: bool,
+    /// Whether the heartbeat of the master has timed out.
+    is_master_lost: bool,
+    sdo: SdoServer,
+    pdos: PdoEngine,
+    transmission: Transmission,
     device: YzAimDevice,
     alarms: Alarms,
     motion: YzAimMotion,
@@ -83,7 +97,8 @@ pub struct YzAimJoint {
     /// Whether 260Ah = 60006 has been written.
     is_zero_armed: bool,
     injected: Option<DriveFault>,
-    defects: YzAimDefects,
+    defects: FeedbackDefects,
+    joint_defects: JointDefects,
     save_ns: Nanoseconds,
     /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
@@ -94,7 +109,8 @@ pub struct YzAimJoint {
 impl YzAimJoint {
     /// A servo whose supply is switched on at time 0.
     pub fn new(parameters: YzAimParameters) -> Self {
-        let mut dictionary = YzAimDictionary::new(parameters.node);
+        let mut dictionary = SimulatedDictionary::of_table(&OBJECTS, parameters.node);
+        dictionary.set_factory(at::NODE_ADDRESS, parameters.node.into());
         dictionary.set_factory(at::SPECIAL_FUNCTION, parameters.special_function.into());
         dictionary.set_factory(at::ACCELERATION, parameters.acceleration.into());
         dictionary.set_factory(at::TEMPERATURE, 35);
@@ -107,10 +123,13 @@ impl YzAimJoint {
         let joint = Joint::new(parameters.joint, parameters.initial_position).between(parameters.end_stops);
         let mut unit = Self {
             parameters,
+            network: Network::starting(&dictionary, NEVER, PowerUpState::PreOperational),
+            is_boot_announced: false,
+            is_master_lost: false,
+            sdo: SdoServer::new(random, SDO_LATENCY_NS, SdoFeatures::Expedited),
+            pdos: PdoEngine::new(&dictionary, PDO_FEATURES),
+            transmission: Transmission::at_rest(),
             dictionary,
-            network: YzAimNetwork::starting(NEVER, NodeState::PreOperational, false),
-            sdo: ReplyBuffer::new(random, LATENCY_NS),
-            process_data: YzAimProcessData::at_rest(),
             device: YzAimDevice::cold(),
             alarms: Alarms::default(),
             motion: YzAimMotion::new(highest_speed),
@@ -133,7 +152,8 @@ impl YzAimJoint {
             was_energised: false,
             is_zero_armed: false,
             injected: None,
-            defects: YzAimDefects::default(),
+            defects: FeedbackDefects::default(),
+            joint_defects: JointDefects::default(),
             save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
@@ -164,9 +184,9 @@ impl YzAimJoint {
         self.encoder_counts().wrapping_add(self.counts_offset)
     }
 
-    fn actual(&self) -> YzAimActual {
+    fn actual(&self) -> Actual {
         let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
-        YzAimActual { position: self.counts().into(), velocity }
+        Actual { position: self.counts().into(), velocity }
     }
 
     fn velocity_rpm(&self) -> f64 {
@@ -178,7 +198,7 @@ impl YzAimJoint {
     }
 
     fn mode(&self) -> i64 {
-        self.dictionary.get(at::OPERATION_MODE)
+        self.dictionary.number(at::OPERATION_MODE)
     }
 
     fn is_in_mode(&self, mode: i64) -> bool {
@@ -196,19 +216,19 @@ impl YzAimJoint {
             || self.mode() == mode::HOMING && self.homing.is_begun();
         self.has_started
             && is_commanded
-            && self.dictionary.get(at::OUTPUT_ENABLE) == 1
+            && self.dictionary.number(at::OUTPUT_ENABLE) == 1
             && !self.alarms.is_stopped()
     }
 
     /// The alarm code in 260Eh.
     fn alarm_code(&self) -> u16 {
-        self.alarms.code(self.network.is_master_lost())
+        self.alarms.code(self.is_master_lost)
     }
 
     /// Whether heartbeat and statusword report an alarm.
     fn shows_alarm(&self) -> bool {
         self.alarms.is_stopped()
-            || self.network.is_master_lost()
+            || self.is_master_lost
             || self.alarms.has_lost_battery && self.parameters.quirks.shows_battery_alarm
     }
 
@@ -228,35 +248,41 @@ impl YzAimJoint {
     /// Powers up.
     fn power_up(&mut self, now_ns: Nanoseconds) {
         self.alarms = self.alarms.after_power_up();
-        self.node = self.dictionary.stored(at::NODE_ADDRESS) as u8;
-        self.dictionary.address(self.node);
+        self.node = self.dictionary.saved(at::NODE_ADDRESS) as u8;
+        for (place, object) in OBJECTS.iter().enumerate().filter(|(_, object)| object.adds_node) {
+            self.dictionary.set_factory(place, object.default_of(self.node));
+        }
         self.bit_rate = self.next_bit_rate;
-        self.special_function = self.dictionary.stored(at::SPECIAL_FUNCTION);
+        self.special_function = self.dictionary.saved(at::SPECIAL_FUNCTION);
         if !self.parameters.has_battery || self.alarms.has_lost_battery {
             let counts = self.encoder_counts();
             self.counts_offset = counts.rem_euclid(COUNTS_PER_TURN as i32).wrapping_sub(counts);
         }
         let state = if self.parameters.starts_operational {
-            NodeState::Operational
+            PowerUpState::Operational
         } else {
-            NodeState::PreOperational
+            PowerUpState::PreOperational
         };
         self.start(now_ns, state, self.parameters.quirks.announces_power_up);
         self.is_starting_cold = true;
     }
 
     /// Common part of power-up and NMT "reset node": stored values are restored, and the drive is not enabled.
-    fn start(&mut self, now_ns: Nanoseconds, state: NodeState, is_announced: bool) {
+    fn start(&mut self, now_ns: Nanoseconds, state: PowerUpState, is_announced: bool) {
         self.dictionary.restore(0..=u16::MAX);
-        if self.dictionary.get(at::GEAR_NUMERATOR) == 0 {
+        if self.dictionary.number(at::GEAR_NUMERATOR) == 0 {
             self.dictionary.set(at::MODBUS_ENABLE, 1);
         }
         if self.alarms.is_stopped() {
             self.dictionary.set(at::OUTPUT_ENABLE, 0);
         }
-        self.network = YzAimNetwork::starting(now_ns + self.parameters.power_up_ns, state, is_announced);
+        self.network.set_power_up(state);
+        self.network.restart(now_ns + self.parameters.power_up_ns);
+        self.is_boot_announced = is_announced;
+        self.is_master_lost = false;
         self.sdo.reset();
-        self.process_data = YzAimProcessData::at_rest();
+        self.pdos.compile(&self.dictionary);
+        self.transmission = Transmission::at_rest();
         self.device = YzAimDevice::cold();
         self.homing = Homing::idle();
         self.bit_rate_change = BitRateChange::None;
@@ -274,7 +300,8 @@ impl YzAimJoint {
             now_ns + IDLE_NS,
             self.network.due_ns(),
             self.sdo.due_ns().unwrap_or(NEVER),
-            self.process_data.due_ns(),
+            self.pdos.due_ns(),
+            self.transmission.due_ns(),
             self.save_ns,
         ];
         self.wake_ns = due_ns.into_iter().min().unwrap_or(NEVER).max(now_ns + 1);
@@ -301,10 +328,10 @@ impl Drive for YzAimJoint {
         if let Some(fault) = self.injected.take() {
             self.apply_fault(now_ns, fault);
         }
-        self.network.check_master(now_ns);
+        self.is_master_lost |= self.network.has_lost_master(now_ns);
         if now_ns >= self.save_ns {
             self.save_ns = NEVER;
-            self.dictionary.store();
+            self.dictionary.save();
             self.dictionary.set(at::SAVE_FLAG, 2);
         }
         self.send_due(now_ns, mailbox);
@@ -317,7 +344,7 @@ impl Drive for YzAimJoint {
 
     fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
         self.run_loops(now_ns);
-        let is_stopped = self.alarms.is_stopped() || self.network.is_master_lost();
+        let is_stopped = self.alarms.is_stopped() || self.is_master_lost;
         Observation {
             position: self.joint.position(),
             velocity: self.joint.velocity(),
@@ -359,7 +386,9 @@ impl Drive for YzAimJoint {
         is_present: bool,
     ) -> Result<(), Unsupported> {
         self.run_loops(now_ns);
-        self.defects.set(defect, is_present)?;
+        check_possible(defect)?;
+        self.defects.set(defect, is_present);
+        self.joint_defects.set(defect, is_present);
         match defect {
             Defect::EncoderJump { distance } if is_present => {
                 let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;

@@ -3,14 +3,14 @@
 //! velocity, homing and interpolated position, alarms, and the joint behind a gear.
 //!
 //! ```text
-//! objects ── dictionary ──┬── sdo            SDO server
-//!                         ├── process_data   RPDO, TPDO, SYNC
-//!                         ├── network        NMT, heartbeat producer and consumer
-//!                         ├── bit_rate       the procedure that changes the bit rate
-//!                         ├── device         controlword → statusword
-//!                         ├── alarms         260Eh
-//!                         ├── defects        defects that raise no alarm by themselves
-//!                         └── homing, motion → servo → plant
+//! objects ── object_dictionary ──┬── sdo_server     SDO: expedited
+//!                                ├── pdo_engine     RPDO, TPDO; process_data: when a TPDO is sent
+//!                                ├── network        NMT, heartbeat producer and consumer
+//!                                ├── bit_rate       the procedure that changes the bit rate
+//!                                ├── device         controlword → statusword
+//!                                ├── alarms         260Eh
+//!                                ├── defects        defects that such a unit can have
+//!                                └── homing, motion → servo → plant
 //! ```
 //!
 //! Choices where neither the manual nor traces give an answer:
@@ -37,16 +37,13 @@ mod alarms;
 mod bit_rate;
 mod defects;
 mod device;
-mod dictionary;
 mod homing;
 mod joint;
 mod motion;
-mod network;
 mod objects;
 mod parameters;
 mod process_data;
-mod sdo;
 
 pub use joint::YzAimJoint;
-pub use objects::{OBJECTS, YzAimObject};
+pub use objects::OBJECTS;
 pub use parameters::{COUNTS_PER_TURN, Gearing, HomingBehaviour, Model, Quirks, Ratings, YzAimParameters};

@@ -1,13 +1,9 @@
 //! The set-points of the control loops. Units: counts, counts/s.
 
+use crate::sim::motion::{Actual, Demand, Generator};
+
 /// Time in which an interpolated target is reached (manual 5.10.3).
 const INTERPOLATION_S: f64 = 2e-3;
-/// Time constant of the low-pass for the velocity feed-forward, because targets are whole counts.
-const FORWARD_FILTER_S: f64 = 1e-3;
-/// How long the velocity is fed forward, so that a slightly late SYNC does not disturb the joint.
-const FORWARD_S: f64 = 2.0 * INTERPOLATION_S;
-/// Tolerance in counts within which a profile has reached its target.
-const ARRIVED: f64 = 0.01;
 
 /// The command to the motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,88 +18,46 @@ pub enum MotionCommand {
     Interpolate,
 }
 
-/// The set-point of the loops for one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct YzAimDemand {
-    /// counts; `None` for velocity control.
-    pub position: Option<f64>,
-    /// counts/s
-    pub velocity: f64,
-}
-
-/// The measured motion.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct YzAimActual {
-    /// counts
-    pub position: f64,
-    /// counts/s
-    pub velocity: f64,
-}
-
 /// Generates the set-points of the loops.
 #[derive(Clone, Copy, Debug)]
 pub struct YzAimMotion {
     highest_speed: f64,
-    position: f64,
-    velocity: f64,
-    /// The last target; without one, the position of the last stop.
-    target: f64,
+    /// Its target without a command is the position of the last stop.
+    generator: Generator,
     is_moving: bool,
-    left_s: f64,
-    /// Velocity from the difference of the last two interpolated targets, and how long it is still fed forward.
-    wanted_forward: f64,
-    forward_s: f64,
-    forward: f64,
     is_limited: bool,
 }
 
 impl YzAimMotion {
     /// A generator at standstill.
     pub fn new(highest_speed: f64) -> Self {
-        Self {
-            highest_speed,
-            position: 0.0,
-            velocity: 0.0,
-            target: 0.0,
-            is_moving: false,
-            left_s: 0.0,
-            wanted_forward: 0.0,
-            forward_s: 0.0,
-            forward: 0.0,
-            is_limited: false,
-        }
+        Self { highest_speed, generator: Generator::default(), is_moving: false, is_limited: false }
     }
 
     /// Restarts at the actual position without a target.
-    pub fn engage(&mut self, actual: YzAimActual) {
-        let YzAimActual { position, velocity } = actual;
-        *self = Self { position, velocity, target: position, ..Self::new(self.highest_speed) };
+    pub fn engage(&mut self, actual: Actual) {
+        *self = Self { generator: Generator::starting(actual), ..Self::new(self.highest_speed) };
     }
 
     /// Changes the zero of the counts.
     pub fn shift(&mut self, counts: f64) {
-        self.position += counts;
-        self.target += counts;
+        self.generator.shift(counts);
     }
 
     /// Sets the target of a profile. The current position as target starts no move.
     pub fn move_to(&mut self, target: f64) {
-        self.target = target;
-        self.is_moving = self.position != target || self.velocity != 0.0;
+        self.generator.target = target;
+        self.is_moving = self.generator.position != target || self.generator.velocity != 0.0;
     }
 
     /// Sets a target that SYNC activates and that is reached in 2 ms.
     pub fn interpolate_to(&mut self, target: f64) {
-        let velocity = (target - self.target) / INTERPOLATION_S;
-        self.wanted_forward = velocity.clamp(-self.highest_speed, self.highest_speed);
-        self.forward_s = FORWARD_S;
-        self.left_s = INTERPOLATION_S;
-        self.target = target;
+        self.generator.interpolate_to(target, INTERPOLATION_S, self.highest_speed);
     }
 
     /// The last target.
     pub fn target(&self) -> f64 {
-        self.target
+        self.generator.target
     }
 
     /// Whether a profile is running.
@@ -113,7 +67,7 @@ impl YzAimMotion {
 
     /// The demanded velocity.
     pub fn velocity(&self) -> f64 {
-        self.velocity
+        self.generator.velocity
     }
 
     /// Whether the targets need more than the highest speed.
@@ -127,73 +81,33 @@ impl YzAimMotion {
         &mut self,
         command: MotionCommand,
         acceleration: f64,
-        actual: YzAimActual,
+        actual: Actual,
         duration_s: f64,
-    ) -> YzAimDemand {
-        let position = self.position;
+    ) -> Demand {
+        let generator = &mut self.generator;
+        let position = generator.position;
         self.is_limited = false;
         match command {
-            MotionCommand::Stop => {
-                self.ramp(0.0, acceleration, duration_s);
-                YzAimDemand { position: Some(position), velocity: self.velocity }
-            }
+            MotionCommand::Stop => generator.ramp(0.0, acceleration, duration_s),
+            MotionCommand::Profile(_) if !self.is_moving => generator.ramp(0.0, acceleration, duration_s),
             MotionCommand::Profile(speed) => {
-                self.step_profile(speed.min(self.highest_speed), acceleration, duration_s);
-                YzAimDemand { position: Some(position), velocity: self.velocity }
+                let (target, speed) = (generator.target, speed.min(self.highest_speed));
+                let has_arrived =
+                    generator.step_profile(target, speed, acceleration, acceleration, duration_s);
+                self.is_moving = !has_arrived;
             }
             MotionCommand::Velocity(velocity) => {
-                self.position = actual.position;
+                generator.position = actual.position;
                 let wanted = velocity.clamp(-self.highest_speed, self.highest_speed);
-                self.ramp(wanted, acceleration, duration_s);
-                YzAimDemand { position: None, velocity: self.velocity }
+                generator.ramp(wanted, acceleration, duration_s);
+                return Demand::Velocity { velocity: generator.velocity, torque: 0.0 };
             }
             MotionCommand::Interpolate => {
-                self.step_interpolation(duration_s);
-                YzAimDemand { position: Some(position), velocity: self.forward }
+                self.is_limited = generator.step_interpolation(self.highest_speed, duration_s);
+                return Demand::Position { position, velocity: generator.forward, torque: 0.0 };
             }
         }
-    }
-
-    fn step_interpolation(&mut self, duration_s: f64) {
-        let most = self.highest_speed * duration_s;
-        // Without a new target, the last one is reached and held.
-        let share = if self.left_s > duration_s { duration_s / self.left_s } else { 1.0 };
-        let wanted = (self.target - self.position) * share;
-        let step = wanted.clamp(-most, most);
-        self.is_limited = step != wanted;
-        self.position += step;
-        self.velocity = step / duration_s;
-        let forward = if self.forward_s > 0.0 { self.wanted_forward } else { 0.0 };
-        self.forward += (forward - self.forward) * duration_s / (FORWARD_FILTER_S + duration_s);
-        self.left_s = (self.left_s - duration_s).max(0.0);
-        self.forward_s = (self.forward_s - duration_s).max(0.0);
-    }
-
-    fn step_profile(&mut self, speed: f64, acceleration: f64, duration_s: f64) {
-        if !self.is_moving {
-            self.ramp(0.0, acceleration, duration_s);
-            return;
-        }
-        let distance = self.target - self.position;
-        let step = acceleration * duration_s;
-        // The highest velocity from which whole steps of the deceleration end exactly at the target.
-        let highest = if step.is_finite() {
-            step * ((0.25 + 2.0 * distance.abs() / (step * duration_s)).sqrt() - 0.5)
-        } else {
-            distance.abs() / duration_s
-        };
-        self.ramp(highest.min(speed).copysign(distance), acceleration, duration_s);
-        if (self.target - self.position).abs() < ARRIVED && self.velocity.abs() <= 2.0 * step {
-            self.position = self.target;
-            self.velocity = 0.0;
-            self.is_moving = false;
-        }
-    }
-
-    fn ramp(&mut self, wanted: f64, acceleration: f64, duration_s: f64) {
-        let most = acceleration * duration_s;
-        self.velocity += (wanted - self.velocity).clamp(-most, most);
-        self.position += self.velocity * duration_s;
+        Demand::Position { position, velocity: generator.velocity, torque: 0.0 }
     }
 }
 
@@ -202,7 +116,12 @@ mod tests {
     use super::*;
 
     const STEP_S: f64 = 125e-6;
-    const AT_REST: YzAimActual = YzAimActual { position: 0.0, velocity: 0.0 };
+    const AT_REST: Actual = Actual { position: 0.0, velocity: 0.0 };
+
+    fn position_of(demand: Demand) -> f64 {
+        let Demand::Position { position, .. } = demand else { panic!("{demand:?}") };
+        position
+    }
 
     #[test]
     fn an_interpolated_target_is_reached_in_2_ms_on_a_straight_line() {
@@ -210,10 +129,10 @@ mod tests {
         motion.interpolate_to(160.0);
         for k in 0..16 {
             let demand = motion.step(MotionCommand::Interpolate, f64::INFINITY, AT_REST, STEP_S);
-            assert!((demand.position.unwrap() - 10.0 * f64::from(k)).abs() < 1e-9);
+            assert!((position_of(demand) - 10.0 * f64::from(k)).abs() < 1e-9);
         }
         let demand = motion.step(MotionCommand::Interpolate, f64::INFINITY, AT_REST, STEP_S);
-        assert_eq!(demand.position, Some(160.0));
+        assert_eq!(position_of(demand), 160.0);
         assert!(!motion.is_limited());
     }
 
@@ -228,7 +147,7 @@ mod tests {
             }
             for _ in 0..16 {
                 let [first, second] = axes.each_mut().map(|axis| {
-                    axis.step(MotionCommand::Interpolate, f64::INFINITY, AT_REST, STEP_S).position.unwrap()
+                    position_of(axis.step(MotionCommand::Interpolate, f64::INFINITY, AT_REST, STEP_S))
                 });
                 assert!((first * SHARE - second).abs() <= 1.0, "{first} {second}");
             }
@@ -241,10 +160,10 @@ mod tests {
         motion.interpolate_to(50.0);
         for k in 0..40 {
             let demand = motion.step(MotionCommand::Interpolate, f64::INFINITY, AT_REST, STEP_S);
-            assert!((demand.position.unwrap() - 1.25 * f64::from(k)).abs() < 1e-9);
+            assert!((position_of(demand) - 1.25 * f64::from(k)).abs() < 1e-9);
         }
         motion.step(MotionCommand::Interpolate, f64::INFINITY, AT_REST, STEP_S);
-        assert_eq!((motion.position, motion.is_limited()), (50.0, false));
+        assert_eq!((motion.generator.position, motion.is_limited()), (50.0, false));
     }
 
     #[test]
@@ -260,7 +179,7 @@ mod tests {
                 fastest = fastest.max(motion.velocity().abs());
                 steps += 1;
             }
-            assert_eq!((motion.position, motion.velocity(), fastest), (-1_000.0, 0.0, 1_000.0));
+            assert_eq!((motion.generator.position, motion.velocity(), fastest), (-1_000.0, 0.0, 1_000.0));
             let expected_s = if acceleration.is_finite() { 1.25 } else { 1.0 };
             assert!((f64::from(steps) * STEP_S - expected_s).abs() < 0.01);
         }

@@ -1,78 +1,49 @@
 //! The object dictionary by the manual's chapter VI, with the entries that CiA 301 implies. Other objects do not exist
 //! here. The manual gives few defaults outside the communication parameters; the others are from a new unit.
 
-/// One entry of the dictionary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct YzAimObject {
-    /// Index.
-    pub index: u16,
-    /// Sub-index.
-    pub subindex: u8,
-    /// Length in bits: 8, 16 or 32.
-    pub bits: u8,
-    /// Whether SDO can write it.
-    pub is_writable: bool,
-    /// Whether 2614h stores it.
-    pub is_stored: bool,
-    /// The lowest value; negative for signed entries.
-    pub lowest: i64,
-    /// The highest value.
-    pub highest: i64,
-    /// Value of a new unit.
-    pub default: i64,
-    /// Whether the node ID is added to the default.
-    pub adds_node: bool,
-}
-
-impl YzAimObject {
-    const fn plus_node(self) -> Self {
-        Self { adds_node: true, ..self }
-    }
-
-    /// The size in bytes.
-    pub const fn bytes(&self) -> usize {
-        self.bits as usize / 8
-    }
-}
+use crate::canopen::eds::{AccessType, DataTypeCode};
+use crate::sim::object_dictionary::table::{I8, I16, I32, ObjectRow, U8, U16, U32, table_places};
 
 const FULL_8: [i64; 2] = [0, 0xFF];
 const FULL_16: [i64; 2] = [0, 0xFFFF];
 const SIGNED_32: [i64; 2] = [i32::MIN as i64, i32::MAX as i64];
 
-/// Read-only and unsigned.
-const fn ro(index: u16, subindex: u8, bits: u8, default: i64) -> YzAimObject {
-    YzAimObject {
-        index,
-        subindex,
-        bits,
-        is_writable: false,
-        is_stored: false,
-        lowest: 0,
-        highest: (1 << bits) - 1,
-        default,
-        adds_node: false,
+/// The type of a length in bits; a range below 0 makes it signed.
+const fn integer(bits: u8, lowest: i64) -> DataTypeCode {
+    match (bits, lowest < 0) {
+        (8, false) => U8,
+        (16, false) => U16,
+        (32, false) => U32,
+        (8, true) => I8,
+        (16, true) => I16,
+        (32, true) => I32,
+        _ => panic!("not a length of the manual"),
     }
 }
 
+/// Read-only and unsigned.
+const fn ro(index: u16, subindex: u8, bits: u8, default: i64) -> ObjectRow {
+    ObjectRow::read_only(index, subindex, integer(bits, 0), default)
+}
+
 /// A measured value: read-only, within a range.
-const fn measured(index: u16, bits: u8, range: [i64; 2]) -> YzAimObject {
-    let [lowest, highest] = range;
-    YzAimObject { lowest, highest, ..ro(index, 0, bits, 0) }
+const fn measured(index: u16, bits: u8, range: [i64; 2]) -> ObjectRow {
+    ObjectRow::read_only(index, 0, integer(bits, range[0]), 0).within(range)
 }
 
 /// A command, set-point or switch: readable and writable, never stored.
-const fn command(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> YzAimObject {
-    let [lowest, highest] = range;
-    YzAimObject { is_writable: true, lowest, highest, ..ro(index, subindex, bits, default) }
+const fn command(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> ObjectRow {
+    let data_type = integer(bits, range[0]);
+    ObjectRow::read_only(index, subindex, data_type, default).within(range).with_access(AccessType::ReadWrite)
 }
 
 /// A parameter: readable, writable, stored.
-const fn rw(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> YzAimObject {
-    YzAimObject { is_stored: true, ..command(index, subindex, bits, range, default) }
+const fn rw(index: u16, subindex: u8, bits: u8, range: [i64; 2], default: i64) -> ObjectRow {
+    command(index, subindex, bits, range, default).saved()
 }
 
 /// Every entry, in ascending order.
-pub const OBJECTS: [YzAimObject; 109] = [
+pub const OBJECTS: [ObjectRow; 109] = [
     ro(0x1000, 0, 32, 0x0002_0192),
     ro(0x1001, 0, 8, 0),
     ro(0x1005, 0, 32, 0x80),
@@ -184,46 +155,12 @@ pub const OBJECTS: [YzAimObject; 109] = [
     command(0x60FF, 0, 32, [-3000, 3000], 0), // Velocity-mode target speed
 ];
 
-/// The position of an entry in [`OBJECTS`], for constants: an unknown entry does not compile.
-const fn place(index: u16, subindex: u8) -> usize {
-    let mut at = 0;
-    while at < OBJECTS.len() {
-        if OBJECTS[at].index == index && OBJECTS[at].subindex == subindex {
-            return at;
-        }
-        at += 1;
-    }
-    panic!("no such object")
-}
-
-/// The position of an entry in [`OBJECTS`].
-pub fn find(index: u16, subindex: u8) -> Option<usize> {
-    OBJECTS.binary_search_by_key(&(index, subindex), |object| (object.index, object.subindex)).ok()
-}
-
-/// Positions of the entries that the drive itself uses.
+/// Places of the entries that the drive itself uses.
 pub mod at {
-    use super::place;
+    use super::{OBJECTS, table_places};
 
-    macro_rules! places {
-        ($($name:ident = $index:literal : $subindex:literal;)*) => {
-            $(#[doc = concat!("Object ", stringify!($index), ":", stringify!($subindex))]
-            pub const $name: usize = place($index, $subindex);)*
-        };
-    }
-
-    places! {
+    table_places! {
         ERROR_REGISTER = 0x1001:0;
-        CONSUMER_HEARTBEAT = 0x1016:1;
-        PRODUCER_HEARTBEAT = 0x1017:0;
-        RPDO1 = 0x1400:0;
-        RPDO2 = 0x1401:0;
-        RPDO3 = 0x1402:0;
-        RPDO4 = 0x1403:0;
-        TPDO1 = 0x1800:0;
-        TPDO2 = 0x1801:0;
-        TPDO3 = 0x1802:0;
-        TPDO4 = 0x1803:0;
         TPDO1_MAPPING = 0x1A00:0;
         TPDO2_MAPPING = 0x1A01:0;
         TPDO3_MAPPING = 0x1A02:0;
@@ -267,7 +204,7 @@ mod tests {
     #[test]
     fn the_table_is_in_order() {
         for pair in OBJECTS.windows(2) {
-            let key = |object: &YzAimObject| (object.index, object.subindex);
+            let key = |object: &ObjectRow| (object.index, object.subindex);
             assert!(key(&pair[0]) < key(&pair[1]), "{:04X}:{}", pair[1].index, pair[1].subindex);
         }
     }
@@ -275,7 +212,7 @@ mod tests {
     #[test]
     fn objects_that_real_units_lack_do_not_exist() {
         for index in [0x6061, 0x6502, 0x603F, 0x60C2, 0x6065, 0x6071, 0x6077, 0x6084, 0x1003, 0x1010] {
-            assert_eq!(find(index, 0), None, "{index:04X}");
+            assert!(OBJECTS.iter().all(|object| object.index != index), "{index:04X}");
         }
     }
 

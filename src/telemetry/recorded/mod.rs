@@ -18,6 +18,7 @@ use super::black_box;
 use super::history::OnBus;
 use super::machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 use super::messages::{self, MessageType};
+use super::own_errors;
 use super::recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
@@ -344,6 +345,7 @@ impl Decoder {
                     bus: metadata.get("bus").map(|bus| name(bus)),
                     group: text("group").parse().unwrap_or(0),
                     family: family::named(text("drive")).map(|family| family.word().to_owned()),
+                    own_errors: own_errors::read(text(own_errors::OWN_ERRORS), name),
                     unit: if text("unit") == Unit::Metre.symbol() { Unit::Metre } else { Unit::Radian },
                     // Recordings of earlier versions do not have it.
                     plans_own_profile: text("plans_own_profile") == "true",

@@ -150,6 +150,7 @@ mod tests {
             bus: None,
             group: 0,
             family: None,
+            own_errors: vec![],
             unit,
             plans_own_profile: false,
             counts_per_unit: 1.0,

@@ -326,6 +326,13 @@ mod tests {
                 "another master sends on bus left: a frame with identifier 0x080 is not from this controller",
             ),
             (
+                Rule::ForeignMaster,
+                Origin::Bus(0),
+                0x080.into(),
+                29.0,
+                "another master sends on bus left: a frame with identifier 0x00000080 is not from this controller",
+            ),
+            (
                 Rule::TimingUnfit,
                 Origin::Group,
                 250.0,

@@ -189,7 +189,7 @@ fn a_delay_before_the_first_pdo_and_a_start_by_itself_are_quirks() {
 #[test]
 fn every_shipped_quirk_file_is_read_and_names_its_sources() {
     let shipped = shipped();
-    assert!(shipped.len() >= 7);
+    assert!(shipped.len() >= 12);
     for (name, quirks) in shipped {
         assert!(!quirks.drive.sources.is_empty(), "{name}");
         assert_eq!(quirks.drive.confirmation, quirks::Confirmation::DataSheetOnly, "{name}");
@@ -197,12 +197,35 @@ fn every_shipped_quirk_file_is_read_and_names_its_sources() {
 }
 
 #[test]
-fn the_shipped_file_of_the_epos4_tells_of_csp_and_that_of_the_kinco_of_its_unit() {
+fn the_shipped_files_tell_modes_units_counts_and_errors_that_data_sheets_leave_out() {
     let shipped = shipped();
     let find = |name: &str| &shipped.iter().find(|(known, _)| known == name).unwrap().1;
     let modes = find("maxon-epos4").modes.as_ref().unwrap();
     assert!(modes.contains(&OperationMode::CyclicSynchronousPosition));
+    assert_eq!(find("copley").unit(0x6083), Some(MotionUnit::PositionUnits(10.0)));
+    assert_eq!(find("schunk-lwa4p").counts_per_turn, Some(360_000.0));
+    assert_eq!(find("eyou-euservo-ph11").error_words(0x8500), Some("velocity following error"));
     assert_eq!(find("kinco-fd5").unit(0x606C), Some(MotionUnit::PositionUnits(0.06103515625)));
+}
+
+#[test]
+fn the_unit_of_an_acceleration_is_no_unit_of_a_velocity() {
+    let text = |key: &str, unit: &str| {
+        format!(
+            "[drive]\nvendor = \"A\"\nproduct = \"B\"\nstatus = \"tried on hardware\"\nsources = []\n[units]\n{key} = \"{unit}\"\n"
+        )
+    };
+    for (key, right, wrong) in [
+        ("velocity", "0.1 counts/s", "0.1 counts/s²"),
+        ("target_velocity", "r/min", "r/min/s"),
+        ("profile_velocity", "10 r/min", "counts/s^2"),
+        ("acceleration", "10 counts/s²", "10 counts/s"),
+        ("acceleration", "0.1 r/min/s", "0.1 r/min"),
+    ] {
+        assert!(quirks::parse("right.toml", &text(key, right)).is_ok(), "{key} = {right}");
+        let error = format!("{:?}", quirks::parse("wrong.toml", &text(key, wrong)).unwrap_err());
+        assert!(error.contains(key) && error.contains("a unit of"), "{error}");
+    }
 }
 
 #[test]

@@ -45,6 +45,10 @@ mod tests {
     /// Two ports at the ends of a pair of datagram sockets. Own frames that come back and error frames need a CAN
     /// interface: the laboratory tests those.
     fn connected() -> (SocketCanPort, SocketCanPort) {
+        connected_with(Some(5_000_000))
+    }
+
+    fn connected_with(data_bit_rate: Option<u32>) -> (SocketCanPort, SocketCanPort) {
         let mut ends = [0; 2];
         // SAFETY: `ends` has room for both descriptors.
         let made = unsafe { libc::socketpair(libc::AF_UNIX, libc::SOCK_DGRAM, 0, ends.as_mut_ptr()) };
@@ -64,7 +68,7 @@ mod tests {
                 );
                 assert_eq!(set, 0);
             }
-            let port = SocketCanPort::new(end, 1_000_000, None).unwrap();
+            let port = SocketCanPort::new(end, 1_000_000, data_bit_rate).unwrap();
             // SAFETY: as above.
             unsafe { libc::close(end) };
             port
@@ -96,6 +100,21 @@ mod tests {
         assert_eq!(received(&mut right), sent);
         assert_eq!(right.health().rx_frames, 4);
         assert_eq!(received(&mut right), []);
+    }
+
+    #[test]
+    fn can_fd_frames_leave_only_on_a_bus_that_is_set_up_for_them() {
+        let (mut left, mut right) = connected_with(None);
+        let long = Frame::fd(Id::base(0x201).unwrap(), &[7; 16], false).unwrap();
+        assert_eq!(left.send(0, &[frame(1), long, frame(2)]), 1);
+        let mut taken = 0;
+        SocketCanPort::send_together(
+            0,
+            &mut [Outgoing { port: &mut left, frames: &[frame(3), long], taken: &mut taken }],
+        );
+        assert_eq!(taken, 1);
+        assert_eq!(received(&mut right), [frame(1), frame(3)]);
+        assert!(left.health().errors > 0);
     }
 
     #[test]

@@ -31,6 +31,8 @@ pub struct SocketCanPort {
     pub(super) link: Link,
     pub(super) source: SocketSource,
     pub(super) accounting: TxRxAccounting,
+    /// Whether the bus is set up for CAN FD frames.
+    takes_fd: bool,
 }
 
 /// A socket descriptor that cannot be duplicated.
@@ -53,8 +55,9 @@ impl core::error::Error for DescriptorError {}
 impl SocketCanPort {
     /// Makes a port on the socket `descriptor`. The descriptor is duplicated: the caller keeps and closes its own.
     ///
-    /// The bit rates in bit/s say how long a frame occupies the wire; `data_bit_rate` is for the data phase of CAN FD
-    /// frames. Only the bus load depends on them.
+    /// The bit rates in bit/s say how long a frame occupies the wire, for the bus load; `data_bit_rate` is for the data phase
+    /// of CAN FD frames. Without it the bus is a classic one, on which every node would answer a CAN FD frame with an
+    /// error: the port refuses such frames.
     ///
     /// # Errors
     /// [`DescriptorError`] where the descriptor is not an open one, or the process has no more descriptors.
@@ -69,6 +72,7 @@ impl SocketCanPort {
             link: Link::of(own),
             source: SocketSource::new(own),
             accounting: TxRxAccounting::new(bit_rate, data_bit_rate),
+            takes_fd: data_bit_rate.is_some(),
         })
     }
 
@@ -83,8 +87,23 @@ impl SocketCanPort {
         unsafe { libc::ppoll(&mut entry, 1, &timeout, core::ptr::null()) };
     }
 
+    /// The first frames, as far as the bus may carry them: no CAN FD frame on a classic bus, and none behind it.
+    pub(super) fn permitted<'f>(&self, frames: &'f [Frame]) -> &'f [Frame] {
+        let is_refused = |frame: &Frame| frame.is_fd() && !self.takes_fd;
+        frames.split(is_refused).next().unwrap_or_default()
+    }
+
     /// Sends on this socket alone; see [`BusPort::send`](crate::port::BusPort::send).
     pub(super) fn send_alone(&mut self, frames: &[Frame]) -> usize {
+        let permitted = self.permitted(frames);
+        let taken = self.send_permitted(permitted);
+        if taken == permitted.len() && taken < frames.len() {
+            self.accounting.refused(frames.len() - taken, libc::EINVAL);
+        }
+        taken
+    }
+
+    fn send_permitted(&mut self, frames: &[Frame]) -> usize {
         let mut taken = 0;
         for chunk in frames.chunks(SEND_BATCH) {
             let refusal =

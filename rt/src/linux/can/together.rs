@@ -70,6 +70,10 @@ impl<'a> Call<'a> {
     fn join(&mut self, number: usize, entry: &Outgoing<'a, SocketCanPort>) {
         let port = &entry.port;
         let Some(index) = port.link.index().filter(|_| !port.accounting.is_behind()) else { return };
+        // The port itself refuses what its bus may not carry.
+        if port.permitted(entry.frames).len() < entry.frames.len() {
+            return;
+        }
         if self.messages.remaining_capacity() < entry.frames.len() || self.members.try_push(number).is_err() {
             return;
         }

@@ -1,21 +1,17 @@
 //! Homing of an eRob. The known firmware has no homing mode; firmware that declares one can use methods 35 and 37.
 
-use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
+use takt_rt::{Nanoseconds, OperationMode};
 
-use super::motion::with_torque;
-use super::objects::{HOME_OFFSET, HOMING_METHOD};
-use super::state::modes_words;
-use super::{enabling, reading};
 use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
-use crate::family::commission::motion_profile::DriveProfile;
+use crate::family::commission::profile::homing::{self, PRESENT_POSITION};
+use crate::family::commission::profile::motion::with_torque;
+use crate::family::commission::profile::objects::{HOME_OFFSET, HOMING_METHOD};
+use crate::family::commission::profile::words::modes_words;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
-
-/// Homing methods on the current position, without motion. 37 replaces 35 in newer versions of CiA 402.
-const PRESENT_POSITION: [i8; 2] = [35, 37];
 
 /// `home`
 pub async fn home(
@@ -42,28 +38,5 @@ pub async fn home(
                 .to_owned(),
         });
     }
-    let work = async {
-        enabling::prepare(c, s, OperationMode::Homing, &DriveProfile::default()).await?;
-        c.step("homing method");
-        c.write_and_check(&HOMING_METHOD, method.into()).await?;
-        c.write_optional(&HOME_OFFSET, 0).await?;
-        enabling::enable(c, s).await?;
-        c.step("homing");
-        let word = controlword::ENABLE_OPERATION;
-        c.write(&CONTROLWORD, (word | controlword::BIT_4).into()).await?;
-        let is_over = |word: i64| word as u16 & (statusword::BIT_12 | statusword::BIT_13) != 0;
-        let ended = c.wait_for(&STATUSWORD, "the end of homing", within_ns, is_over).await;
-        c.write(&CONTROLWORD, (word | controlword::HALT).into()).await?;
-        if ended? as u16 & statusword::BIT_13 != 0 {
-            return Err(Failure::Homing("the drive reports a homing error (statusword bit 13)"));
-        }
-        let position = c.read(&POSITION_ACTUAL_VALUE).await?;
-        let mut report = Report::new();
-        report.add("method", "method", method, method.to_string());
-        report.add("home_counts", "position after homing", position, format!("{position} counts"));
-        Ok(report)
-    };
-    let mut report = with_torque(c, s, false, work).await?;
-    report.append(reading::summary(c, s).await?);
-    Ok(report)
+    with_torque(c, s, false, homing::run(c, s, method, Some((HOME_OFFSET, 0)), within_ns)).await
 }

@@ -1,110 +1,18 @@
-//! Identity, ratings, condition and errors of an eRob.
+//! What an eRob says of itself, with its temperature.
 
-use takt_rt::DriveState;
-
-use super::objects::*;
-use super::reading;
-use super::state::{modes_words, statusword_words};
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::objects::*;
-use crate::family::commission::contact;
+use super::objects::TEMPERATURE;
 use crate::family::commission::failure::Failure;
+use crate::family::commission::profile;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
-use crate::family::erob_canopen::error_text;
-use serde_json::json;
-use takt_rt::OperationMode;
 
 /// `info`
 pub async fn info(c: &SdoSession, s: &TargetDrive) -> Result<Report, Failure> {
-    contact::connect(c, s).await?;
-    let mut report = Report::new();
-    contact::report_identity(c, s, &mut report).await?;
-    texts(c, &mut report).await?;
-    let rated = ratings(c, s, &mut report).await?;
-    condition(c, s, rated, &mut report).await?;
-    errors(c, &mut report).await?;
-    Ok(report)
-}
-
-async fn texts(c: &SdoSession, report: &mut Report) -> Result<(), Failure> {
-    for (key, label, address) in [
-        ("device_name", "device name", DEVICE_NAME),
-        ("hardware_version", "hardware version", HARDWARE_VERSION),
-        ("software_version", "firmware version", SOFTWARE_VERSION),
-    ] {
-        if let Some(text) = c.read_text(address).await? {
-            report.add(key, label, text.clone(), text);
-        }
-    }
-    Ok(())
-}
-
-async fn ratings(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<Option<f64>, Failure> {
-    c.step("ratings");
-    if let Some(current) = c.read_optional(&MOTOR_RATED_CURRENT).await? {
-        let amperes = current as f64 / 1000.0;
-        report.add("rated_current_a", "rated current", amperes, format!("{amperes} A"));
-    }
-    let rated = reading::rated_torque(c).await?;
-    if let Some(rated) = rated {
-        report.add("rated_torque", "rated torque", rated, s.effort_quantity().show(rated));
-    }
-    let supported = c.read(&SUPPORTED_DRIVE_MODES).await?;
-    report.add("supported_modes", "modes", supported, modes_words(supported as u32));
-    Ok(rated)
-}
-
-async fn condition(
-    c: &SdoSession,
-    s: &TargetDrive,
-    rated: Option<f64>,
-    report: &mut Report,
-) -> Result<(), Failure> {
-    c.step("condition");
-    let reading = reading::read(c, s, rated).await?;
-    let word = reading.statusword;
-    report.add("state", "state", DriveState::decode(word).name(), statusword_words(word));
-    report.add("statusword", "statusword", word, format!("0x{word:04X}"));
-    let mode = c.read(&MODES_OF_OPERATION_DISPLAY).await?;
-    let known = i8::try_from(mode).ok().and_then(OperationMode::from_number);
-    report.add("mode", "mode", mode, known.map_or("none", OperationMode::name));
-    let (position, counts) = (reading.position, reading.position_counts);
-    let shown = format!("{} ({counts} counts)", s.position_quantity().show(position));
-    report.add("position", "position", position, shown);
-    report.add("position_counts", "position counts", counts, counts.to_string());
-    report.add("velocity", "velocity", reading.velocity, s.velocity_quantity().show(reading.velocity));
-    if let Some(torque) = reading.torque {
-        report.add("torque", "torque", torque, s.effort_quantity().show(torque));
-    }
-    if let Some(millivolts) = c.read_optional(&DC_LINK_VOLTAGE).await? {
-        let volts = millivolts as f64 / 1000.0;
-        report.add("voltage_v", "DC link voltage", volts, format!("{volts} V"));
-    }
+    let mut report = profile::info::info(c, s).await?;
+    c.step("temperature");
     if let Some(degrees) = c.read_optional(&TEMPERATURE).await? {
         report.add("temperature_c", "temperature", degrees, format!("{degrees} °C"));
     }
-    Ok(())
-}
-
-async fn errors(c: &SdoSession, report: &mut Report) -> Result<(), Failure> {
-    c.step("errors");
-    let code = ErrorCode(c.read(&ERROR_CODE).await? as u16);
-    report.add("error_code", "error", code.0, error_text(code));
-    if code != ErrorCode::NONE {
-        c.note(reading::cure(code));
-    }
-    let count = c.read_optional(&ERROR_HISTORY_COUNT).await?.unwrap_or(0);
-    let mut history = vec![];
-    for entry in 1..=u8::try_from(count).unwrap_or(0) {
-        if let Some(value) = c.read_optional(&error_history(entry)).await? {
-            history.push(ErrorCode(value as u16));
-        }
-    }
-    let codes: Vec<u16> = history.iter().map(|code| code.0).collect();
-    let words: Vec<String> = history.into_iter().map(error_text).collect();
-    let text = if words.is_empty() { "empty".to_owned() } else { words.join(", ") };
-    report.add("error_history", "error history", json!(codes), text);
-    Ok(())
+    Ok(report)
 }

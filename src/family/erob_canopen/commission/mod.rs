@@ -1,47 +1,31 @@
 //! ZeroErr eRob with CANopen firmware, commissioned by SDO (eRunner manual 1.7, chapter 5, and field experience).
 
-mod enabling;
-mod fault;
 mod homing;
 mod info;
-mod motion;
 mod objects;
-mod reading;
-mod state;
-mod upkeep;
+mod turns;
 
-pub use objects::{OBJECTS, meaning, process_data_words};
+pub use objects::{OBJECTS, process_data_words};
 
 use crate::family::commission::failure::Failure;
+use crate::family::commission::profile;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
-use crate::family::commission::task::{MoveKind, Task};
+use crate::family::commission::task::Task;
 
-/// Carries out a task. AxisReading and writing objects is the same for every family and is done elsewhere.
+/// Carries out a task, other than reading and writing objects.
 pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
     match task {
         Task::Info => info::info(c, s).await,
-        Task::Watch { every_ns, duration_ns } => reading::watch(c, s, every_ns, duration_ns).await,
-        Task::Enable { hold_ns, keeps_enabled } => motion::enable(c, s, hold_ns, keeps_enabled).await,
-        Task::Disable => enabling::disable(c, s).await,
-        Task::Move { kind: MoveKind::Continuous { is_forward, duration_ns }, profile, keeps_enabled } => {
-            motion::continuous(c, s, is_forward, profile, duration_ns, keeps_enabled).await
-        }
-        Task::Move { kind, profile, keeps_enabled } => {
-            motion::position::run(c, s, kind, profile, keeps_enabled).await
-        }
-        Task::Velocity { velocity, profile, duration_ns, keeps_enabled } => {
-            motion::velocity(c, s, velocity, profile, duration_ns, keeps_enabled).await
-        }
-        Task::Torque { torque, velocity_limit, duration_ns } => {
-            motion::torque::run(c, s, torque, velocity_limit, duration_ns).await
-        }
         Task::Home { method, within_ns, .. } => homing::home(c, s, method, within_ns).await,
-        Task::Zero { is_confirmed } => upkeep::zero(c, s, is_confirmed).await,
-        Task::Save => upkeep::save(c, s).await,
-        Task::ClearFault { is_confirmed } => fault::clear(c, s, is_confirmed).await,
-        task => Err(unsupported(&task)),
+        Task::Zero { is_confirmed } => turns::zero(c, s, is_confirmed).await,
+        Task::ClearFault { is_confirmed } => {
+            profile::fault::clear(c, s, async |code| turns::before_fault_reset(c, code, is_confirmed).await)
+                .await
+        }
+        Task::Restore { .. } => Err(unsupported(&task)),
+        task => profile::carry_out(c, s, &task).await.unwrap_or_else(|| Err(unsupported(&task))),
     }
 }
 
@@ -62,6 +46,10 @@ fn unsupported(task: &Task) -> Failure {
         Task::Gear { .. } => (
             "an eRob has no electronic gear",
             "it counts turns of its output; `gear_ratio` in the configuration is for a transmission behind it",
+        ),
+        Task::Restore { .. } => (
+            "the firmware of an eRob has no object that restores its parameters (1011)",
+            "restore them with the vendor's tool",
         ),
         Task::AutoHome { .. } => ("an eRob does not move by itself at power-up", "move it with `move`"),
         _ => (

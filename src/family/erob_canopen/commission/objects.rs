@@ -1,42 +1,19 @@
 //! Object dictionary of an eRob with CANopen firmware, with units (vendor's EDS, CiA 402, field experience).
 
-use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::family::commission::dictionary::{ObjectEntry, ObjectUnit};
+use crate::family::commission::profile::objects::*;
+use crate::family::commission::profile::words::statusword_words;
 use crate::family::commission::target::TargetDrive;
-use crate::family::erob_canopen::error_words;
+use takt_rt::{Frame, Id};
 
-use super::state;
-use takt_rt::{Frame, Id, OperationMode};
-
-/// 1001
-pub const ERROR_REGISTER: Object = Object::new(0x1001, 0, DataType::U8, "error register");
-/// 1003:0
-pub const ERROR_HISTORY_COUNT: Object =
-    Object::new(0x1003, 0, DataType::U8, "error history, number of entries");
-/// 1003:1 and up, the newest first.
-pub const fn error_history(entry: u8) -> Object {
-    Object::new(0x1003, entry, DataType::U32, "error history")
-}
-/// 1010:1
-pub const STORE: Object = Object::new(0x1010, 1, DataType::U32, "store parameters");
 /// 22A2: °C.
 pub const TEMPERATURE: Object = Object::new(0x22A2, 0, DataType::U16, "temperature");
 /// 2242: writing 1 clears the multi-turn battery fault and the turn count.
 pub const MULTI_TURN_RESET: Object = Object::new(0x2242, 0, DataType::U16, "reset of the multi-turn count");
 /// 6065: INTEGER32 on this drive; CiA 402 has UNSIGNED32.
 pub const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::I32, "following error window");
-/// 6077: per mille of the rated torque.
-pub const TORQUE_ACTUAL_VALUE: Object = Object::new(0x6077, 0, DataType::I16, "torque actual value");
-/// 6078: per mille of the rated current.
-pub const CURRENT_ACTUAL_VALUE: Object = Object::new(0x6078, 0, DataType::I16, "current actual value");
-/// 6079: mV.
-pub const DC_LINK_VOLTAGE: Object = Object::new(0x6079, 0, DataType::U32, "DC link circuit voltage");
-/// 607C
-pub const HOME_OFFSET: Object = Object::new(0x607C, 0, DataType::I32, "home offset");
-/// 6098
-pub const HOMING_METHOD: Object = Object::new(0x6098, 0, DataType::I8, "homing method");
 
 const fn i32_at(index: u16, subindex: u8, name: &'static str) -> Object {
     Object::new(index, subindex, DataType::I32, name)
@@ -136,33 +113,11 @@ pub const OBJECTS: &[ObjectEntry] = &[
     ObjectEntry::read(SUPPORTED_DRIVE_MODES, ObjectUnit::None),
 ];
 
-/// The meaning of an object's value in words.
-pub fn meaning(object: &Object, value: i64) -> Option<String> {
-    match object.address.index {
-        0x6040 => Some(state::controlword_words(value as u16)),
-        0x6041 => Some(state::statusword_words(value as u16)),
-        0x6060 | 0x6061 => {
-            let mode = i8::try_from(value).ok().and_then(OperationMode::from_number)?;
-            Some(mode.name().to_owned())
-        }
-        0x6502 => Some(state::modes_words(value as u32)),
-        0x603F => Some(error_words(ErrorCode(value as u16)).to_owned()),
-        0x1003 if object.address.subindex > 0 => Some(error_words(ErrorCode(value as u16)).to_owned()),
-        0x1001 => Some(crate::canopen::emcy::ErrorRegister(value as u8).to_string()),
-        0x1016 if object.address.subindex == 1 => Some(match value & 0xFFFF {
-            0 => "heartbeat watchdog off".to_owned(),
-            time_ms => format!("monitors the heartbeat of node {}, timeout {time_ms} ms", value >> 16 & 0x7F),
-        }),
-        0x1010 if value == state::SAVE_SIGNATURE => Some("\"save\"".to_owned()),
-        _ => None,
-    }
-}
-
 /// Describes TPDO1: with the default mapping and with takt's, the statusword comes first.
 pub fn process_data_words(s: &TargetDrive, frame: &Frame) -> Option<String> {
     let word = u16::from_le_bytes(frame.payload().get(..2)?.try_into().ok()?);
     (frame.id() == Id::canopen(0x180, s.node))
-        .then(|| format!("TPDO1: statusword 0x{word:04X}: {}", state::statusword_words(word)))
+        .then(|| format!("TPDO1: statusword 0x{word:04X}: {}", statusword_words(word)))
 }
 
 #[cfg(test)]
@@ -178,7 +133,8 @@ mod tests {
                 .iter()
                 .find(|object| (object.index, object.subindex) == (address.index, address.subindex));
             let simulated = simulated.unwrap_or_else(|| panic!("{} is unknown", entry.object));
-            assert_eq!(simulated.data_type.bytes(), entry.object.data_type.length(), "{}", entry.object);
+            let bits = simulated.data_type.bits().map(usize::from);
+            assert_eq!(bits, Some(8 * entry.object.data_type.length()), "{}", entry.object);
         }
     }
 }

@@ -45,6 +45,10 @@ pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Re
         Task::Home { method, within_ns, is_forced } => homing::home(c, s, method, within_ns, is_forced).await,
         Task::Zero { is_confirmed } => storing::zero(c, s, is_confirmed).await,
         Task::Save => storing::save(c, s).await,
+        Task::Restore { .. } => Err(Failure::Unsupported {
+            what: "a YZ-AIM has no object that restores its parameters (1011)".to_owned(),
+            instead: "restore them with the vendor's tool".to_owned(),
+        }),
         Task::SetId { node } => storing::set_id(c, s, node).await,
         Task::SetBitRate { bit_rate } => storing::set_bit_rate(c, s, bit_rate).await,
         Task::ClearFault { is_confirmed } => clearing::clear(c, s, is_confirmed).await,

@@ -74,10 +74,10 @@ impl Motion {
             Some(OperationMode::ProfileTorque) => (self.torque == profile.real(places.target_torque), 0.0),
             Some(OperationMode::Homing) => (!self.homing.is_running() && self.stands(actual, profile), 0.0),
             Some(OperationMode::CyclicSynchronousPosition | OperationMode::InterpolatedPosition) => {
-                (is_near(self.interpolation.target), window_time_s)
+                (is_near(self.generator.target), window_time_s)
             }
             Some(OperationMode::ProfilePosition) => {
-                (self.set_points.active.is_none() && is_near(self.position), window_time_s)
+                (self.set_points.active.is_none() && is_near(self.generator.position), window_time_s)
             }
             _ => (false, 0.0),
         };

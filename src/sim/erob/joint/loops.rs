@@ -3,27 +3,14 @@
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::ErobJoint;
-use crate::sim::erob::dictionary::at;
-use crate::sim::erob::errors::ErobError;
-use crate::sim::erob::motion::{ErobActual, ErobDemand};
+use crate::sim::erob::objects::at;
+use crate::sim::errors::DeviceError;
+use crate::sim::loops::ControlLoops;
+use crate::sim::motion::{Actual, Measured};
 
-/// The control loops and the plant run at 8 kHz.
-const STEP_NS: Nanoseconds = 125_000;
-
-impl ErobJoint {
-    /// Runs the loops in steps up to `now_ns`.
-    pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
-        while self.stepped_ns + STEP_NS <= now_ns {
-            self.step(STEP_NS);
-        }
-    }
-
-    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
-    pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
+impl ControlLoops for ErobJoint {
+    fn stepped_ns(&self) -> Nanoseconds {
+        self.stepped_ns
     }
 
     fn step(&mut self, duration_ns: Nanoseconds) {
@@ -37,7 +24,7 @@ impl ErobJoint {
         } else {
             self.torque = 0.0;
         }
-        if self.defects.is_joint_blocked {
+        if self.defects.is_blocked {
             self.joint.halt();
         } else {
             let is_braked = self.is_braked();
@@ -50,14 +37,15 @@ impl ErobJoint {
             self.motion.follow(actual);
         }
         let word = self.device.controlword();
-        let bits = self.motion.status_bits(actual, word, &self.dictionary, duration_s);
-        self.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
+        let bits = self.motion.status_bits(actual, word, &self.canopen.dictionary, duration_s);
+        self.canopen.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
     }
+}
 
+impl ErobJoint {
     /// One step of set-point, loops and torque.
     fn drive(&mut self, duration_s: f64) {
         let actual = self.actual();
-        let velocity = self.joint.velocity() * self.direction();
         let demand = match self.device.stop() {
             Some(stop) => {
                 let (demand, is_at_rest) = self.motion.step_stop(stop.deceleration, duration_s);
@@ -66,31 +54,26 @@ impl ErobJoint {
                 }
                 demand
             }
-            None => self.motion.step(self.device.controlword(), actual, &self.dictionary, duration_s),
+            None => self.motion.step(self.device.controlword(), actual, &self.canopen.dictionary, duration_s),
         };
-        let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
-        let per_mille = self.parameters.rated_torque / 1000.0;
-        self.torque = match demand {
-            ErobDemand::Position { position, velocity: forward, torque } => {
-                let error = (position - actual.position) * unit;
-                self.servo.position(error, forward * unit, velocity, torque * per_mille, duration_s)
-            }
-            ErobDemand::Velocity { velocity: wanted, torque } => {
-                self.servo.velocity(wanted * unit, velocity, torque * per_mille, duration_s)
-            }
-            ErobDemand::Torque(torque) => self.servo.torque(torque * per_mille, velocity),
+        let measured = Measured {
+            count: 1.0 / self.parameters.encoder.counts_per_unit.abs(),
+            per_mille: self.parameters.rated_torque / 1000.0,
+            position: actual.position,
+            velocity: self.joint.velocity() * self.direction(),
         };
+        self.torque = demand.torque(&mut self.servo, measured, duration_s);
         if !self.device.state().has_torque() {
             self.torque = 0.0;
         }
     }
 
-    fn check_following_error(&mut self, actual: ErobActual) {
-        let window = self.dictionary.signed_real(at::FOLLOWING_ERROR_WINDOW);
+    fn check_following_error(&mut self, actual: Actual) {
+        let window = self.canopen.dictionary.real(at::FOLLOWING_ERROR_WINDOW);
         let error = self.motion.position() - actual.position;
         let is_watched = window >= 0.0 && self.motion.follows_position() && self.device.stop().is_none();
         if is_watched && error.abs() > window {
-            self.fail(ErobError::PositionLost);
+            self.fail(DeviceError::FollowingError);
         }
     }
 }

@@ -2,16 +2,18 @@
 
 use takt_rt::{OperationMode, controlword, statusword};
 
-use super::{ARRIVED, ErobActual, ErobMotion};
-use crate::sim::erob::dictionary::{ErobDictionary, at};
+use super::ErobMotion;
+use crate::sim::erob::objects::at;
+use crate::sim::motion::{ARRIVED, Actual};
+use crate::sim::object_dictionary::SimulatedDictionary;
 
 impl ErobMotion {
     /// Statusword bits 10 to 13 of an enabled drive, after a step of `duration_s`.
     pub fn status_bits(
         &mut self,
-        actual: ErobActual,
+        actual: Actual,
         word: u16,
-        dictionary: &ErobDictionary,
+        dictionary: &SimulatedDictionary,
         duration_s: f64,
     ) -> u16 {
         let is_reached = self.is_target_reached(actual, word, dictionary, duration_s);
@@ -35,32 +37,30 @@ impl ErobMotion {
 
     fn is_target_reached(
         &mut self,
-        actual: ErobActual,
+        actual: Actual,
         word: u16,
-        dictionary: &ErobDictionary,
+        dictionary: &SimulatedDictionary,
         duration_s: f64,
     ) -> bool {
-        let milliseconds = |at| dictionary.signed_real(at) * 1e-3;
-        let position_window = dictionary.real(at::POSITION_WINDOW);
+        let milliseconds = |at| dictionary.real(at) * 1e-3;
+        let position_window = f64::from(dictionary.number(at::POSITION_WINDOW) as u32);
         let (is_within, time_s) = match self.mode {
             _ if word & controlword::HALT != 0 && !self.is_cyclic() => (actual.velocity.abs() < 100.0, 0.0),
             Some(OperationMode::ProfileVelocity) => {
-                let distance = dictionary.signed_real(at::TARGET_VELOCITY) - actual.velocity;
+                let distance = dictionary.real(at::TARGET_VELOCITY) - actual.velocity;
                 (
-                    distance.abs() <= dictionary.real(at::VELOCITY_WINDOW),
+                    distance.abs() <= f64::from(dictionary.number(at::VELOCITY_WINDOW) as u16),
                     milliseconds(at::VELOCITY_WINDOW_TIME),
                 )
             }
-            Some(OperationMode::ProfileTorque) => {
-                (self.torque == dictionary.signed_real(at::TARGET_TORQUE), 0.0)
-            }
+            Some(OperationMode::ProfileTorque) => (self.torque == dictionary.real(at::TARGET_TORQUE), 0.0),
             Some(OperationMode::CyclicSynchronousPosition) => {
-                let distance = self.interpolation.target - actual.position;
+                let distance = self.generator.target - actual.position;
                 (distance.abs() <= position_window, milliseconds(at::POSITION_WINDOW_TIME))
             }
             Some(OperationMode::ProfilePosition | OperationMode::InterpolatedPosition) => {
                 let is_done = self.set_points.active.is_none();
-                let distance = self.position - actual.position;
+                let distance = self.generator.position - actual.position;
                 (is_done && distance.abs() <= position_window, milliseconds(at::POSITION_WINDOW_TIME))
             }
             _ => (false, 0.0),

@@ -2,106 +2,94 @@
 
 use takt_rt::{Nanoseconds, controlword};
 
-use super::YzAimJoint;
+use super::{YzAimJoint, mode};
+use crate::canopen::object::ObjectAddress;
+use crate::sim::object_dictionary::SimulatedDictionary;
+use crate::sim::pdo_engine::is_parameter;
 use crate::sim::sdo_reply::AbortCode;
-use crate::sim::yz_aim::dictionary::decode;
-use crate::sim::yz_aim::objects::{OBJECTS, YzAimObject, at, find};
-use crate::sim::yz_aim::process_data::{PDO4, RPDO_MAPPING, YzAimProcessData};
-use crate::sim::yz_aim::sdo::{Addressed, YzAimRequest};
+use crate::sim::sdo_server::ObjectAccess;
+use crate::sim::yz_aim::objects::at;
+use crate::sim::yz_aim::process_data::PDO4;
 
-/// Whether an entry accepts a value.
-fn is_in_range(at: usize, value: i64) -> bool {
-    let object = OBJECTS[at];
-    (object.lowest..=object.highest).contains(&value)
-        && match at {
-            at::OPERATION_MODE => matches!(value, 1 | 3 | 6 | 7),
-            at::MODBUS_ENABLE => matches!(value, 0 | 1 | 506),
-            _ => true,
-        }
+/// Writes an entry from an RPDO; a value out of range is ignored.
+pub(super) fn write_field(dictionary: &mut SimulatedDictionary, place: usize, bits: u64) {
+    if let Some(number) = dictionary.accepted(place, bits)
+        && check_meaning(place, number).is_ok()
+    {
+        dictionary.set(place, number);
+    }
 }
 
-impl YzAimJoint {
-    /// Processes an SDO request. It is lost while another one is being processed.
-    pub(super) fn take_request(&mut self, now_ns: Nanoseconds, payload: &[u8]) {
-        if self.sdo.is_busy() {
-            return;
-        }
-        let Some(addressed) = Addressed::decode(payload) else { return };
-        let answer = match (addressed.request, find(addressed.index, addressed.subindex)) {
-            (YzAimRequest::Abort, _) => return,
-            (YzAimRequest::Other, _) => Some(addressed.refused(AbortCode::Command)),
-            (_, None) => {
-                let is_silent = self.parameters.quirks.is_silent_on_unknown_objects;
-                (!is_silent).then(|| addressed.refused(AbortCode::NoObject))
-            }
-            (YzAimRequest::Read, Some(at)) => {
-                self.measure();
-                let (value, size) = self.dictionary.encode(at);
-                Some(addressed.value(value, size))
-            }
-            (YzAimRequest::Write { data, size }, Some(at)) => {
-                let written = self.write(now_ns, at, data, size);
-                Some(written.map_or_else(|code| addressed.refused(code), |()| addressed.written()))
-            }
-        };
-        self.sdo.put(now_ns, answer);
-    }
+/// Checks what the range of an entry cannot say.
+fn check_meaning(place: usize, number: i64) -> Result<(), AbortCode> {
+    let is_right = match place {
+        at::OPERATION_MODE => mode::ALL.contains(&number),
+        at::MODBUS_ENABLE => matches!(number, 0 | 1 | 506),
+        _ => true,
+    };
+    if is_right { Ok(()) } else { Err(AbortCode::Value) }
+}
 
-    fn write(
-        &mut self,
-        now_ns: Nanoseconds,
-        at: usize,
-        data: [u8; 4],
-        size: Option<usize>,
-    ) -> Result<(), AbortCode> {
-        let object = OBJECTS[at];
-        if !self.is_writable(object) {
-            return Err(AbortCode::ReadOnly);
-        }
-        if size.is_some_and(|size| size != object.bytes()) {
-            return Err(AbortCode::Length);
-        }
-        let value = decode(at, data);
-        if !is_in_range(at, value) {
-            return Err(AbortCode::Value);
-        }
-        let before = self.dictionary.get(at);
-        self.dictionary.set(at, value);
-        self.written(at, before, now_ns);
+/// The object dictionary as the SDO server accesses it. The manual names no abort codes.
+pub(super) struct Objects<'a> {
+    pub(super) unit: &'a mut YzAimJoint,
+    pub(super) now_ns: Nanoseconds,
+}
+
+impl ObjectAccess for Objects<'_> {
+    fn read(&mut self, address: ObjectAddress, value: &mut Vec<u8>) -> Result<(), AbortCode> {
+        let place = self.unit.dictionary.find(address)?;
+        self.unit.measure();
+        self.unit.dictionary.append(place, value);
         Ok(())
     }
 
-    fn is_writable(&self, object: YzAimObject) -> bool {
-        let is_pdo_parameter = matches!(object.index, 0x1400..=0x1403 | 0x1800..=0x1803);
-        object.is_writable && (!is_pdo_parameter || self.parameters.quirks.has_settable_pdos)
+    fn check_write(&mut self, address: ObjectAddress) -> Result<Option<usize>, AbortCode> {
+        let entry = self.unit.dictionary.entry(self.unit.dictionary.find(address)?);
+        let is_fixed = is_parameter(address.index) && !self.unit.parameters.quirks.has_settable_pdos;
+        if entry.is_writable && !is_fixed { Ok(Some(entry.length)) } else { Err(AbortCode::ReadOnly) }
     }
 
-    /// Applies the data of an RPDO. The controlword takes effect last, except for a target that it activates at once.
-    pub(super) fn apply(&mut self, now_ns: Nanoseconds, number: usize, data: [u8; 8]) {
-        let mode = self.mode();
-        let mut rest = &data[..];
-        for at in RPDO_MAPPING[number] {
-            let (field, after) = rest.split_at(OBJECTS[*at].bytes());
-            rest = after;
-            let mut bytes = [0; 4];
-            bytes[..field.len()].copy_from_slice(field);
-            let value = decode(*at, bytes);
-            if is_in_range(*at, value) {
-                self.dictionary.set(*at, value);
+    fn write(&mut self, address: ObjectAddress, value: &[u8]) -> Result<(), AbortCode> {
+        let dictionary = &mut self.unit.dictionary;
+        let place = dictionary.find(address)?;
+        let number = dictionary.decode(place, value)?;
+        check_meaning(place, number)?;
+        let before = dictionary.number(place);
+        dictionary.set(place, number);
+        self.unit.written(address, place, before, self.now_ns);
+        Ok(())
+    }
+
+    fn refusal(&self, code: AbortCode) -> Option<AbortCode> {
+        match code {
+            AbortCode::NoObject | AbortCode::NoSubindex => {
+                let is_silent = self.unit.parameters.quirks.is_silent_on_unknown_objects;
+                (!is_silent).then_some(AbortCode::NoObject)
             }
+            AbortCode::LengthTooHigh | AbortCode::LengthTooLow => Some(AbortCode::Length),
+            AbortCode::ValueTooHigh | AbortCode::ValueTooLow => Some(AbortCode::Value),
+            _ => Some(code),
         }
-        let carries = |at| RPDO_MAPPING[number].contains(&at);
-        if carries(at::OPERATION_MODE) {
+    }
+}
+
+impl YzAimJoint {
+    /// Applies the effects of an RPDO, whose data stands in the dictionary; `mode` is the one before. The controlword takes
+    /// effect last, except for a target that it activates at once.
+    pub(super) fn apply(&mut self, now_ns: Nanoseconds, number: usize, mode: i64, is_by_sync: bool) {
+        let word = self.dictionary.number(at::CONTROLWORD) as u16;
+        if self.pdos.carries(number, at::OPERATION_MODE) {
             self.change_mode(mode);
         }
-        let word = self.dictionary.get(at::CONTROLWORD) as u16;
-        if carries(at::CONTROLWORD) {
+        let has_controlword = self.pdos.carries(number, at::CONTROLWORD);
+        if has_controlword {
             self.take_controlword(now_ns);
         }
-        let has_started = carries(at::CONTROLWORD) && word & controlword::BIT_4 != 0;
-        if number == PDO4 && YzAimProcessData::waits_for_sync(number, &self.dictionary) {
+        let has_started = has_controlword && word & controlword::BIT_4 != 0;
+        if number == PDO4 && is_by_sync {
             self.interpolate();
-        } else if carries(at::TARGET_POSITION) && !has_started {
+        } else if self.pdos.carries(number, at::TARGET_POSITION) && !has_started {
             self.take_target();
         }
     }

@@ -3,7 +3,9 @@
 use takt_rt::{Nanoseconds, controlword};
 
 use super::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimJoint, mode};
+use crate::canopen::object::ObjectAddress;
 use crate::sim::drive::NodeState;
+use crate::sim::pdo_engine::is_parameter;
 use crate::sim::yz_aim::device::Level;
 use crate::sim::yz_aim::homing::Homing;
 use crate::sim::yz_aim::objects::at;
@@ -19,7 +21,7 @@ const RETURN_TO_ZERO: i64 = 6;
 impl YzAimJoint {
     /// Applies the controlword in the dictionary.
     pub(super) fn take_controlword(&mut self, now_ns: Nanoseconds) {
-        let word = self.dictionary.get(at::CONTROLWORD) as u16;
+        let word = self.dictionary.number(at::CONTROLWORD) as u16;
         // The drive clears bit 4 by itself.
         self.dictionary.set(at::CONTROLWORD, (word & !controlword::BIT_4).into());
         if word & controlword::FAULT_RESET != 0 {
@@ -54,7 +56,7 @@ impl YzAimJoint {
 
     fn begin_homing(&mut self) {
         let has_undescribed_methods = self.parameters.homing.has_undescribed_methods;
-        self.homing = Homing::start(self.dictionary.get(at::HOMING_METHOD), has_undescribed_methods);
+        self.homing = Homing::start(self.dictionary.number(at::HOMING_METHOD), has_undescribed_methods);
     }
 
     /// Applies a target in 607Ah that bit 5 activates at once.
@@ -83,26 +85,37 @@ impl YzAimJoint {
     }
 
     /// Applies the effects of a value that was written by SDO.
-    pub(super) fn written(&mut self, at: usize, before: i64, now_ns: Nanoseconds) {
-        let value = self.dictionary.get(at);
-        if let Some(bit_rate) = self.bit_rate_change.written(at, value) {
+    pub(super) fn written(&mut self, address: ObjectAddress, place: usize, before: i64, now_ns: Nanoseconds) {
+        let value = self.dictionary.number(place);
+        if let Some(bit_rate) = self.bit_rate_change.written(place, value) {
             self.next_bit_rate = bit_rate;
         }
-        match at {
+        match place {
             at::CONTROLWORD => self.take_controlword(now_ns),
             at::OPERATION_MODE => self.change_mode(before),
             at::TARGET_POSITION => self.take_target(),
-            at::PRODUCER_HEARTBEAT => self.network.schedule_heartbeat(now_ns, &self.dictionary),
-            at::CONSUMER_HEARTBEAT => self.network.stop_master_monitor(),
             at::OUTPUT_ENABLE if value == 1 => self.clear_alarms(now_ns),
             at::INCREMENTAL_POSITION => self.travel(value as f64),
             at::GEAR_NUMERATOR => self.take_gear_numerator(value),
             at::SAVE_FLAG if value == 1 => self.save_ns = now_ns + SAVE_NS,
-            // Event timers run in NMT operational only; they start when the node enters it.
-            _ if (at::TPDO1..=at::TPDO4 + 5).contains(&at)
-                && self.network.state() == NodeState::Operational =>
-            {
-                self.process_data.schedule_events(now_ns, &self.dictionary);
+            _ => self.written_parameter(address.index, now_ns),
+        }
+    }
+
+    /// Applies the effects of a communication parameter.
+    fn written_parameter(&mut self, index: u16, now_ns: Nanoseconds) {
+        match index {
+            0x1016 => {
+                self.network.stop_master_monitor();
+                self.is_master_lost = false;
+            }
+            0x1017 => self.network.schedule_heartbeat(now_ns, &self.dictionary),
+            index if is_parameter(index) => {
+                self.pdos.update(&self.dictionary);
+                // Event timers run in NMT operational only; they start when the node enters it.
+                if index >= 0x1800 && self.network.state() == NodeState::Operational {
+                    self.transmission.schedule_events(now_ns, &self.pdos);
+                }
             }
             _ => {}
         }
@@ -140,7 +153,7 @@ impl YzAimJoint {
         let counts = self.random.within(0..10) as i32;
         self.set_counts(counts);
         self.alarms.has_lost_battery = false;
-        self.dictionary.set(at::GEAR_NUMERATOR, self.dictionary.stored(at::GEAR_NUMERATOR));
+        self.dictionary.set(at::GEAR_NUMERATOR, self.dictionary.saved(at::GEAR_NUMERATOR));
     }
 
     /// Starts the move of the special function at power-up (manual V.3.B).
@@ -152,7 +165,7 @@ impl YzAimJoint {
             _ => return,
         };
         // The last digit of 6083h: 0 to 9 for 100 to 1000 r/min.
-        let digit = self.dictionary.get(at::ACCELERATION) % 10;
+        let digit = self.dictionary.number(at::ACCELERATION) % 10;
         self.power_up_speed = Some((digit + 1) as f64 * 100.0 * COUNTS_PER_SECOND_PER_RPM);
         self.engage();
         self.was_energised = true;

@@ -3,13 +3,19 @@
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::YzAimJoint;
+use super::access::{Objects, write_field};
+use crate::config::PowerUpState;
 use crate::sim::drive::NodeState;
+use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;
-use crate::sim::yz_aim::network::YzAimReset;
-use crate::sim::yz_aim::objects::OBJECTS;
-use crate::sim::yz_aim::process_data::{PDOS, RPDO_MAPPING, YzAimProcessData};
+use crate::sim::network::NmtReset;
+use crate::sim::pdo_engine::RpdoReception;
+use crate::sim::sdo_server::SdoServer;
+use crate::sim::yz_aim::process_data::{PDOS, Transmission};
 
 const SYNC: u32 = 0x080;
+/// The code of a heartbeat during an alarm.
+const ALARM: u8 = 0x04;
 
 impl YzAimJoint {
     pub(super) fn receive_frame(&mut self, now_ns: Nanoseconds, frame: &Frame) {
@@ -19,10 +25,15 @@ impl YzAimJoint {
         }
         match frame.id().value() {
             0x000 => self.take_nmt(now_ns, frame.payload()),
-            id @ 0x701..=0x77F => self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary),
+            id @ 0x701..=0x77F => {
+                // A heartbeat after a loss ends the alarm.
+                if self.network.receive_heartbeat(now_ns, (id & 0x7F) as u8, &self.dictionary) {
+                    self.is_master_lost = false;
+                }
+            }
             _ if frame.id() == Id::canopen(0x600, self.node) => {
                 if self.network.has_services() && !self.defects.is_sdo_silent {
-                    self.take_request(now_ns, frame.payload());
+                    self.take_request(now_ns, frame);
                 }
             }
             _ if self.network.state() != NodeState::Operational => {}
@@ -38,19 +49,43 @@ impl YzAimJoint {
         }
         let before = self.network.state();
         match self.network.command(now_ns, command) {
-            Some(YzAimReset::Node) => self.start(now_ns, NodeState::PreOperational, true),
-            Some(YzAimReset::Communication) => self.dictionary.restore(0x1005..=0x1FFF),
+            Some(NmtReset::Node) => self.start(now_ns, PowerUpState::PreOperational, true),
+            Some(NmtReset::Communication) => {
+                self.network.set_power_up(PowerUpState::PreOperational);
+                self.is_boot_announced = true;
+                self.is_master_lost = false;
+                self.dictionary.restore(0x1005..=0x1FFF);
+                self.pdos.compile(&self.dictionary);
+            }
             None => {}
         }
         let state = self.network.state();
         if state == NodeState::Operational && before != state {
-            self.process_data.start(now_ns, &self.dictionary);
+            self.start_pdos(now_ns);
         } else if state != NodeState::Operational {
-            self.process_data = YzAimProcessData::at_rest();
+            self.pdos.stop();
+            self.transmission = Transmission::at_rest();
         }
         if !self.network.has_services() {
             self.sdo.reset();
         }
+    }
+
+    fn start_pdos(&mut self, now_ns: Nanoseconds) {
+        self.pdos.stop();
+        self.transmission.start(now_ns, &self.pdos);
+    }
+
+    /// Processes an SDO request. Frames of four bytes and more are accepted without padding, because published masters send
+    /// them so.
+    fn take_request(&mut self, now_ns: Nanoseconds, frame: &Frame) {
+        if frame.payload().len() < 4 {
+            return;
+        }
+        // The server is taken out for the call, because it accesses the rest of the drive.
+        let mut server = std::mem::replace(&mut self.sdo, SdoServer::taken());
+        server.request(now_ns, frame.first_word().to_le_bytes(), &mut Objects { unit: self, now_ns });
+        self.sdo = server;
     }
 
     fn take_sync(&mut self, now_ns: Nanoseconds) {
@@ -58,28 +93,27 @@ impl YzAimJoint {
             self.lock_loops(now_ns);
         }
         for number in 0..PDOS {
-            if let Some(data) = self.process_data.release(number) {
-                self.apply(now_ns, number, data);
+            let mode = self.mode();
+            if self.pdos.apply_latched_of(number, &mut self.dictionary, &mut write_field) {
+                self.apply(now_ns, number, mode, true);
             }
         }
-        let (feedback, latency_ns) = (self.feedback(), self.parameters.feedback_delay_ns);
-        self.process_data.sync(now_ns, latency_ns, feedback, &self.dictionary);
+        let latency_ns = self.parameters.feedback_delay_ns;
+        self.report(|transmission, pdos, dictionary| transmission.sync(now_ns, latency_ns, pdos, dictionary));
     }
 
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
-        let Some(number) = YzAimProcessData::number(frame.id(), self.node) else { return };
-        let mapped: usize = RPDO_MAPPING[number].iter().map(|at| OBJECTS[*at].bytes()).sum();
-        if frame.payload().len() < mapped {
-            return;
-        }
-        let data = frame.first_word().to_le_bytes();
-        if YzAimProcessData::waits_for_sync(number, &self.dictionary) {
-            self.process_data.hold(number, data);
-        } else {
-            self.apply(now_ns, number, data);
-        }
-        let feedback = self.feedback();
-        self.process_data.answer(number, now_ns, self.parameters.feedback_delay_ns, feedback);
+        let mode = self.mode();
+        let number = match self.pdos.receive(now_ns, frame, &mut self.dictionary, &mut write_field) {
+            RpdoReception::NotMine | RpdoReception::TooShort => return,
+            RpdoReception::Latched(number) => number,
+            RpdoReception::Applied(number) => {
+                self.apply(now_ns, number, mode, false);
+                number
+            }
+        };
+        let latency_ns = self.parameters.feedback_delay_ns;
+        self.report(|_, pdos, dictionary| pdos.trigger(number, now_ns, latency_ns, dictionary));
     }
 
     /// Sends the frames that are due. At a wrong bit rate nothing is sent.
@@ -87,22 +121,28 @@ impl YzAimJoint {
         let is_on_bus = self.is_on_bus();
         let mut send = |frame| is_on_bus && mailbox.push(frame);
         let has_alarm = self.shows_alarm();
-        if let Some(boot_up) = self.network.boot_if_due(now_ns, &self.dictionary) {
-            if boot_up.is_announced {
+        if self.network.boot_if_due(now_ns, &self.dictionary) {
+            if self.is_boot_announced {
                 send(Frame::of(Id::canopen(0x700, self.node), [0]));
             }
             self.boot(now_ns);
         }
-        if let Some(byte) = self.network.heartbeat(now_ns, &self.dictionary, has_alarm) {
-            send(Frame::of(Id::canopen(0x700, self.node), [byte]));
+        // A stopped node sends no heartbeat.
+        if let Some(byte) = self.network.heartbeat(now_ns, &self.dictionary)
+            && self.network.has_services()
+        {
+            send(Frame::of(Id::canopen(0x700, self.node), [if has_alarm { ALARM } else { byte }]));
         }
-        if let Some(answer) = self.sdo.take(now_ns) {
+        while let Some(answer) = self.sdo.answer(now_ns) {
             send(Frame::of(Id::canopen(0x580, self.node), answer));
         }
         if self.network.state() == NodeState::Operational {
-            let feedback = self.feedback();
-            self.process_data.run_events(now_ns, feedback, &self.dictionary);
-            while let Some(frame) = self.process_data.next(now_ns, self.node, &self.dictionary) {
+            if self.transmission.has_event(now_ns) {
+                self.report(|transmission, pdos, dictionary| {
+                    transmission.run_events(now_ns, pdos, dictionary)
+                });
+            }
+            while let Some(frame) = self.pdos.next(now_ns) {
                 if is_on_bus {
                     mailbox.put(self.defects.sent(frame));
                 }
@@ -117,7 +157,7 @@ impl YzAimJoint {
             self.move_after_power_up();
         }
         if self.network.state() == NodeState::Operational {
-            self.process_data.start(now_ns, &self.dictionary);
+            self.start_pdos(now_ns);
         }
     }
 }

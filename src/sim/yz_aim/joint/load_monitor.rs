@@ -57,8 +57,8 @@ impl YzAimJoint {
             behind_s: after(self.load_monitor.behind_s, is_behind || self.motion.is_limited()),
         };
         let now_ns = self.stepped_ns;
-        let is_blocked = is_over(self.load_monitor.blocked_s, self.dictionary.get(at::STANDSTILL_OUTPUT))
-            || is_over(self.load_monitor.at_current_limit_s, self.dictionary.get(at::MAXIMUM_CURRENT));
+        let is_blocked = is_over(self.load_monitor.blocked_s, self.dictionary.number(at::STANDSTILL_OUTPUT))
+            || is_over(self.load_monitor.at_current_limit_s, self.dictionary.number(at::MAXIMUM_CURRENT));
         if is_blocked {
             self.fail(now_ns, StoppingAlarm::BlockedRotor);
         } else if self.load_monitor.behind_s >= STALL_S {
@@ -91,7 +91,10 @@ impl YzAimJoint {
     pub(super) fn raise(&mut self, now_ns: Nanoseconds, code: u16) -> Result<(), Unsupported> {
         match code {
             BATTERY if self.parameters.has_battery => self.alarms.has_lost_battery = true,
-            COMMUNICATION_LOST => self.network.lose_master(),
+            COMMUNICATION_LOST => {
+                self.network.stop_master_monitor();
+                self.is_master_lost = true;
+            }
             _ => {
                 let reason = match code {
                     BATTERY => "this YZ-AIM has no battery",

@@ -4,30 +4,19 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::load_monitor::LoadMonitor;
 use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
+use crate::sim::loops::ControlLoops;
+use crate::sim::motion::Measured;
 use crate::sim::yz_aim::device::Level;
 use crate::sim::yz_aim::homing::Input;
 use crate::sim::yz_aim::motion::MotionCommand;
 use crate::sim::yz_aim::objects::at;
 
-/// The control loops and the plant run at 8 kHz.
-const STEP_NS: Nanoseconds = 125_000;
 /// 6083h: at this value and above there is no ramp (manual IV.1).
 const NO_RAMP: i64 = 60_000;
 
-impl YzAimJoint {
-    /// Runs the loops in steps up to `now_ns`.
-    pub(super) fn run_loops(&mut self, now_ns: Nanoseconds) {
-        while self.stepped_ns + STEP_NS <= now_ns {
-            self.step(STEP_NS);
-        }
-    }
-
-    /// Runs the loops exactly up to `now_ns`, so that their steps are locked to SYNC.
-    pub(super) fn lock_loops(&mut self, now_ns: Nanoseconds) {
-        self.run_loops(now_ns);
-        if now_ns > self.stepped_ns {
-            self.step(now_ns - self.stepped_ns);
-        }
+impl ControlLoops for YzAimJoint {
+    fn stepped_ns(&self) -> Nanoseconds {
+        self.stepped_ns
     }
 
     fn step(&mut self, duration_ns: Nanoseconds) {
@@ -45,7 +34,7 @@ impl YzAimJoint {
             self.homing.fail();
             self.torque = 0.0;
         }
-        if self.defects.is_joint_blocked {
+        if self.joint_defects.is_blocked {
             self.joint.halt();
         } else {
             self.joint.step(duration_s, self.torque * self.direction(), false);
@@ -56,7 +45,9 @@ impl YzAimJoint {
             self.motion.engage(self.actual());
         }
     }
+}
 
+impl YzAimJoint {
     /// Restarts the motion at the actual position, when torque comes on or the command changes.
     pub(super) fn engage(&mut self) {
         if !self.was_energised {
@@ -67,7 +58,7 @@ impl YzAimJoint {
     }
 
     fn motion_command(&self) -> MotionCommand {
-        if self.network.is_master_lost() || self.device.is_halted() {
+        if self.is_master_lost || self.device.is_halted() {
             return MotionCommand::Stop;
         }
         if let Some(speed) = self.homing.speed() {
@@ -89,7 +80,7 @@ impl YzAimJoint {
 
     /// The acceleration ramp: counts/s².
     fn acceleration(&self) -> f64 {
-        match self.dictionary.get(at::ACCELERATION) {
+        match self.dictionary.number(at::ACCELERATION) {
             NO_RAMP.. => f64::INFINITY,
             // At least 1: a ramp of 0 would never stop the motor.
             slope => slope.max(1) as f64 * COUNTS_PER_SECOND_PER_RPM,
@@ -100,16 +91,15 @@ impl YzAimJoint {
     fn drive(&mut self, duration_s: f64) {
         let actual = self.actual();
         let demand = self.motion.step(self.motion_command(), self.acceleration(), actual, duration_s);
-        let unit = 1.0 / self.parameters.encoder.counts_per_unit.abs();
-        let velocity = self.joint.velocity() * self.direction();
         self.servo.set_torque_limit(self.torque_limit());
-        self.torque = match demand.position {
-            Some(position) => {
-                let error = (position - actual.position) * unit;
-                self.servo.position(error, demand.velocity * unit, velocity, 0.0, duration_s)
-            }
-            None => self.servo.velocity(demand.velocity * unit, velocity, 0.0, duration_s),
+        let measured = Measured {
+            count: 1.0 / self.parameters.encoder.counts_per_unit.abs(),
+            // No torque is fed forward.
+            per_mille: 0.0,
+            position: actual.position,
+            velocity: self.joint.velocity() * self.direction(),
         };
+        self.torque = demand.torque(&mut self.servo, measured, duration_s);
     }
 
     fn step_homing(&mut self, duration_s: f64) {

@@ -1,9 +1,12 @@
 //! The measured values in the object dictionary and the TPDOs.
 
 use super::{COUNTS_PER_SECOND_PER_RPM, YzAimJoint, mode};
+use crate::sim::feedback_defects::ShownObjects;
+use crate::sim::object_dictionary::SimulatedDictionary;
+use crate::sim::pdo_engine::PdoEngine;
 use crate::sim::yz_aim::device::{Conditions, Level};
 use crate::sim::yz_aim::objects::at;
-use crate::sim::yz_aim::process_data::YzAimFeedback;
+use crate::sim::yz_aim::process_data::Transmission;
 
 /// Counts of 6079h for one volt.
 const VOLTAGE_SCALE: f64 = 327.0;
@@ -16,6 +19,13 @@ const POSITION_WINDOW: f64 = 10.0;
 /// Speed window of "target reached": r/min.
 const SPEED_WINDOW_RPM: f64 = 5.0;
 const FULL_BATTERY: i64 = 10;
+/// The objects that a defect can change in the TPDOs. No TPDO has a mode, and their mapping is fixed.
+const SHOWN: ShownObjects = ShownObjects {
+    statusword: Some(at::STATUSWORD),
+    mode_display: None,
+    position: Some(at::POSITION),
+    instead_of_position: None,
+};
 
 impl YzAimJoint {
     pub(super) fn statusword(&self) -> u16 {
@@ -46,14 +56,20 @@ impl YzAimJoint {
         }
     }
 
-    /// The current values for the TPDOs.
-    pub(super) fn feedback(&self) -> YzAimFeedback {
+    /// Writes the values of the TPDOs to the dictionary with the effect of the defects, and lets the PDOs take them. TPDO3 has
+    /// the velocity in a scale of its own.
+    pub(super) fn report(
+        &mut self,
+        take: impl FnOnce(&mut Transmission, &mut PdoEngine, &SimulatedDictionary),
+    ) {
         let scale = if self.parameters.quirks.has_fine_velocity_in_tpdo3 { 10.0 } else { 1.0 };
-        YzAimFeedback {
-            position: self.counts(),
-            statusword: self.defects.shown(self.statusword()),
-            velocity: (scale * self.velocity_rpm()).round_ties_even() as i32,
-        }
+        let (position, statusword, velocity) = (self.counts(), self.statusword(), self.velocity_rpm());
+        self.dictionary.set(at::POSITION, position.into());
+        self.dictionary.set(at::STATUSWORD, statusword.into());
+        self.dictionary.set_within(at::VELOCITY, scale * velocity);
+        let truth = self.defects.falsify(SHOWN, &mut self.dictionary);
+        take(&mut self.transmission, &mut self.pdos, &self.dictionary);
+        truth.restore(&mut self.dictionary);
     }
 
     /// Writes the measured values to the dictionary.
@@ -74,14 +90,14 @@ impl YzAimJoint {
         let dictionary = &mut self.dictionary;
         dictionary.set(at::ERROR_REGISTER, shows_alarm.into());
         dictionary.set(at::ALARM_CODE, alarm.into());
-        dictionary.set_real(at::OUTPUT, 32_767.0 * output);
+        dictionary.set_within(at::OUTPUT, 32_767.0 * output);
         dictionary.set(at::BATTERY_LEVEL, if has_battery { FULL_BATTERY } else { 0 });
         dictionary.set(at::STATUSWORD, statusword.into());
         dictionary.set(at::POSITION_INTERNAL, position);
         dictionary.set(at::POSITION, position);
-        dictionary.set_real(at::VELOCITY, 10.0 * velocity / COUNTS_PER_SECOND_PER_RPM);
-        dictionary.set_real(at::CURRENT, CURRENT_SCALE * amperes);
-        dictionary.set_real(at::VOLTAGE, VOLTAGE_SCALE * volts);
+        dictionary.set_within(at::VELOCITY, 10.0 * velocity / COUNTS_PER_SECOND_PER_RPM);
+        dictionary.set_within(at::CURRENT, CURRENT_SCALE * amperes);
+        dictionary.set_within(at::VOLTAGE, VOLTAGE_SCALE * volts);
         dictionary.set(at::INPUTS, inputs.into());
     }
 }

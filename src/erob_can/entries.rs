@@ -1,0 +1,536 @@
+//! The parameters, variables and commands of a drive (eRunner manual 7.5, tables 7-13 and 7-14; where the print is damaged, the
+//! reading that is argued in the text of each entry).
+
+use std::fmt;
+
+use super::frame::EntryAddress;
+
+/// An entry of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Where it is.
+    pub address: EntryAddress,
+    /// Its name.
+    pub name: &'static str,
+    /// What may be done with it.
+    pub access: EntryAccess,
+    /// The unit of its number on the wire.
+    pub unit: Unit,
+    /// Which numbers it takes, or shows.
+    pub values: Values,
+    /// What else must be known of it; empty if nothing.
+    pub note: &'static str,
+}
+
+/// What may be done with an entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EntryAccess {
+    /// It is read.
+    Read,
+    /// It is read and written.
+    ReadWrite,
+    /// It is written; whether it can be read is not known.
+    Write,
+    /// It is a command without an argument.
+    Command,
+    /// It is a command with an argument.
+    CommandWithArgument,
+}
+
+impl EntryAccess {
+    /// Whether the entry can be read.
+    pub const fn can_read(self) -> bool {
+        matches!(self, Self::Read | Self::ReadWrite)
+    }
+
+    /// Whether a value can be sent to the entry.
+    pub const fn can_write(self) -> bool {
+        matches!(self, Self::ReadWrite | Self::Write | Self::CommandWithArgument)
+    }
+}
+
+/// The unit of a number on the wire.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// None: a plain number.
+    None,
+    /// Counts at the output: 524288 are a turn.
+    Counts,
+    /// Counts per second.
+    CountsPerSecond,
+    /// Counts per second squared.
+    CountsPerSecondSquared,
+    /// Milliamperes.
+    Milliamperes,
+    /// Millivolts.
+    Millivolts,
+    /// Milliseconds, as printed. The Modbus manual has the same quantities in units of 0.05 ms: try it on hardware.
+    Milliseconds,
+    /// Degrees Celsius.
+    Celsius,
+    /// Bits per second.
+    BitsPerSecond,
+    /// Thousandths of the continuous current.
+    PerMille,
+    /// Millinewton-metres.
+    MillinewtonMetres,
+}
+
+impl Unit {
+    /// The unit as it is written behind a number; empty for a plain number.
+    pub const fn symbol(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Counts => "count",
+            Self::CountsPerSecond => "count/s",
+            Self::CountsPerSecondSquared => "count/s²",
+            Self::Milliamperes => "mA",
+            Self::Millivolts => "mV",
+            Self::Milliseconds => "ms",
+            Self::Celsius => "°C",
+            Self::BitsPerSecond => "bit/s",
+            Self::PerMille => "‰",
+            Self::MillinewtonMetres => "mN·m",
+        }
+    }
+}
+
+/// The numbers that an entry takes or shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Values {
+    /// Any.
+    Any,
+    /// Those from here to there.
+    Range(i32, i32),
+    /// These, with their meanings.
+    Named(&'static [(i32, &'static str)]),
+}
+
+/// A value that an entry does not take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ValueError {
+    /// The entry.
+    pub entry: Entry,
+    /// The value.
+    pub value: i32,
+}
+
+impl std::error::Error for ValueError {}
+
+impl fmt::Display for ValueError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} cannot be {}: it takes ", self.entry, self.value)?;
+        match self.entry.values {
+            Values::Any => write!(f, "any number"),
+            Values::Range(lowest, highest) => write!(f, "{lowest} to {highest}"),
+            Values::Named(names) => {
+                for (place, (value, name)) in names.iter().enumerate() {
+                    write!(f, "{}{value} ({name})", if place > 0 { ", " } else { "" })?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl Entry {
+    /// Checks that the entry takes a value.
+    ///
+    /// # Errors
+    /// It does not.
+    pub fn check(&self, value: i32) -> Result<(), ValueError> {
+        let is_taken = match self.values {
+            Values::Any => true,
+            Values::Range(lowest, highest) => (lowest..=highest).contains(&value),
+            Values::Named(names) => names.iter().any(|(known, _)| *known == value),
+        };
+        if is_taken { Ok(()) } else { Err(ValueError { entry: *self, value }) }
+    }
+
+    /// A value in words: with its unit, or its meaning.
+    pub fn show(&self, value: i32) -> String {
+        let meaning = match self.values {
+            Values::Named(names) => names.iter().find(|(known, _)| *known == value),
+            Values::Any | Values::Range(..) => None,
+        };
+        match (meaning, self.unit.symbol()) {
+            (Some((_, meaning)), _) => format!("{value} ({meaning})"),
+            (None, "") => value.to_string(),
+            (None, unit) => format!("{value} {unit}"),
+        }
+    }
+}
+
+impl fmt::Display for Entry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} ({})", self.name, self.address)
+    }
+}
+
+/// The entry at an address, if the table has it.
+pub fn find(address: EntryAddress) -> Option<&'static Entry> {
+    ALL.iter().find(|entry| entry.address == address)
+}
+
+/// The entry at an address with its name, or the address alone.
+pub fn describe(address: EntryAddress) -> String {
+    find(address).map_or_else(|| address.to_string(), Entry::to_string)
+}
+
+const YES_NO: Values = Values::Named(&[(0, "no"), (1, "yes")]);
+const NOT_NEGATIVE: Values = Values::Range(0, i32::MAX);
+
+const fn read(index: u16, name: &'static str, unit: Unit) -> Entry {
+    Entry {
+        address: EntryAddress::new(index),
+        name,
+        access: EntryAccess::Read,
+        unit,
+        values: Values::Any,
+        note: "",
+    }
+}
+
+const fn read_sub(index: u16, sub_index: u16, name: &'static str) -> Entry {
+    Entry { address: EntryAddress::sub(index, sub_index), ..read(index, name, Unit::None) }
+}
+
+const fn set(index: u16, name: &'static str, unit: Unit) -> Entry {
+    Entry { access: EntryAccess::ReadWrite, ..read(index, name, unit) }
+}
+
+const fn command(index: u16, name: &'static str) -> Entry {
+    Entry { access: EntryAccess::Command, ..read(index, name, Unit::None) }
+}
+
+impl Entry {
+    const fn note(self, note: &'static str) -> Self {
+        Self { note, ..self }
+    }
+
+    const fn values(self, values: Values) -> Self {
+        Self { values, ..self }
+    }
+
+    const fn access(self, access: EntryAccess) -> Self {
+        Self { access, ..self }
+    }
+}
+
+/// Hardware version.
+pub const HARDWARE_VERSION: Entry = read_sub(0x0001, 3, "hardware version");
+/// Firmware version.
+pub const FIRMWARE_VERSION: Entry = read_sub(0x0001, 4, "firmware version");
+/// Actual position.
+pub const ACTUAL_POSITION: Entry =
+    read(0x0002, "actual position", Unit::Counts).note("at the output; it may lie beyond one turn");
+/// Actual velocity.
+pub const ACTUAL_VELOCITY: Entry =
+    Entry { unit: Unit::CountsPerSecond, ..read_sub(0x0005, 1, "actual velocity") };
+/// Actual motor current.
+pub const MOTOR_CURRENT: Entry = read(0x0008, "actual motor current", Unit::Milliamperes);
+/// Phase U current.
+pub const PHASE_U_CURRENT: Entry = read(0x0009, "phase U current", Unit::Milliamperes);
+/// Phase V current.
+pub const PHASE_V_CURRENT: Entry = read(0x000A, "phase V current", Unit::Milliamperes);
+/// Phase U voltage.
+pub const PHASE_U_VOLTAGE: Entry =
+    read(0x000D, "phase U voltage", Unit::Millivolts).note("printed in mA, as no other voltage is");
+/// Phase V voltage.
+pub const PHASE_V_VOLTAGE: Entry = read(0x000E, "phase V voltage", Unit::Millivolts);
+/// Phase W voltage.
+pub const PHASE_W_VOLTAGE: Entry = read(0x000F, "phase W voltage", Unit::Millivolts);
+/// Error code.
+pub const ERROR_CODE: Entry = read(0x001F, "error code", Unit::None)
+    .note("0 is ready; the others stand in appendix 2 of the eRob user manual");
+/// Running state.
+pub const RUNNING_STATE: Entry = read(0x0020, "running state", Unit::None)
+    .values(Values::Named(&[(0, "stopped"), (1, "moving"), (3, "stopping reciprocation")]))
+    .note("the numbers are those of the Modbus manual; try them on hardware");
+/// Digital inputs.
+pub const DIGITAL_INPUTS: Entry = read(0x0022, "digital inputs", Unit::None)
+    .note("bits 0 to 5 are IN1 to IN6; joint modules have IN1 and IN2");
+/// Analogue input.
+pub const ANALOGUE_INPUT: Entry = read(0x0023, "analogue input", Unit::Millivolts);
+/// DC bus voltage.
+pub const BUS_VOLTAGE: Entry = read(0x0024, "DC bus voltage", Unit::Millivolts);
+/// Power stage temperature.
+pub const TEMPERATURE: Entry = read(0x0026, "power stage temperature", Unit::Celsius);
+/// Continuous current.
+pub const CONTINUOUS_CURRENT: Entry =
+    read(0x0033, "continuous current", Unit::Milliamperes).note("eTunner, page safety power supply");
+/// Peak current.
+pub const PEAK_CURRENT: Entry =
+    read(0x0034, "peak current", Unit::Milliamperes).note("eTunner, page safety power supply");
+/// Peak current duration.
+pub const PEAK_CURRENT_DURATION: Entry =
+    read(0x0035, "peak current duration", Unit::Milliseconds).note("for so long the peak current may flow");
+/// CAN address.
+pub const CAN_ADDRESS: Entry =
+    set(0x0043, "CAN address", Unit::None).values(Values::Range(1, 64)).note("the node ID of the joint");
+/// CAN bit rate.
+pub const BIT_RATE: Entry =
+    read(0x0044, "CAN bit rate", Unit::BitsPerSecond).note("1 Mbit/s, which cannot be changed");
+/// Operating mode.
+pub const OPERATING_MODE: Entry = set(0x004E, "operating mode", Unit::None)
+    .values(Values::Named(&[(1, "torque control"), (2, "velocity control"), (3, "position control")]))
+    .note("disable before a change; 4 is printed too, with a meaning that nobody can read");
+/// Maximum velocity.
+pub const MAXIMUM_VELOCITY: Entry =
+    set(0x0050, "maximum velocity", Unit::CountsPerSecond).values(NOT_NEGATIVE);
+/// Position limit minimum.
+pub const POSITION_LIMIT_MINIMUM: Entry = set(0x0052, "position limit minimum", Unit::Counts);
+/// Position limit maximum.
+pub const POSITION_LIMIT_MAXIMUM: Entry = set(0x0053, "position limit maximum", Unit::Counts);
+/// Maximum position error.
+pub const MAXIMUM_POSITION_ERROR: Entry = set(0x0054, "maximum position error", Unit::Counts)
+    .values(NOT_NEGATIVE)
+    .note("a fault beyond it; from the factory 5242 to 10484, of the eRob142 1800 to 4320");
+/// Maximum velocity error.
+pub const MAXIMUM_VELOCITY_ERROR: Entry = set(0x0055, "maximum velocity error", Unit::CountsPerSecond)
+    .values(NOT_NEGATIVE)
+    .note("a fault beyond it; from the factory 42000 to 84000");
+/// Stall current.
+pub const STALL_CURRENT: Entry = set(0x0056, "stall current", Unit::Milliamperes)
+    .values(NOT_NEGATIVE)
+    .note("from the factory 120 % of the continuous current, of the eRob110 and eRob142 110 %");
+/// Stall velocity.
+pub const STALL_VELOCITY: Entry = set(0x0057, "stall velocity", Unit::CountsPerSecond)
+    .values(NOT_NEGATIVE)
+    .note("a fault below it, with more than the stall current for the stall time");
+/// Stall time.
+pub const STALL_TIME: Entry = set(0x0058, "stall time", Unit::Milliseconds).values(NOT_NEGATIVE);
+/// Maximum phase current.
+pub const MAXIMUM_PHASE_CURRENT: Entry = set(0x0062, "maximum phase current", Unit::Milliamperes)
+    .values(NOT_NEGATIVE)
+    .note("the drive shuts off beyond it");
+/// Maximum motor current.
+pub const MAXIMUM_MOTOR_CURRENT: Entry = set(0x0063, "maximum motor current", Unit::Milliamperes)
+    .values(NOT_NEGATIVE)
+    .note("the drive shuts off beyond it");
+/// Position loop gain.
+pub const POSITION_LOOP_GAIN: Entry = set(0x0064, "position loop gain", Unit::None)
+    .values(NOT_NEGATIVE)
+    .note("the factory value suits most uses");
+/// Velocity loop gain.
+pub const VELOCITY_LOOP_GAIN: Entry = set(0x0066, "velocity loop gain", Unit::None)
+    .values(NOT_NEGATIVE)
+    .note("the factory value suits most uses");
+/// Velocity loop integral.
+pub const VELOCITY_LOOP_INTEGRAL: Entry = set(0x0067, "velocity loop integral", Unit::None)
+    .values(NOT_NEGATIVE)
+    .note("the factory value suits most uses");
+/// Start motion.
+pub const START_MOTION: Entry = command(0x0083, "start motion");
+/// Stop motion.
+pub const STOP_MOTION: Entry = command(0x0084, "stop motion").note("with the profile deceleration");
+/// Absolute target position.
+pub const TARGET_POSITION: Entry =
+    set(0x0086, "absolute target position", Unit::Counts).note("the relative position must be 0");
+/// Relative position.
+pub const RELATIVE_POSITION: Entry =
+    set(0x0087, "relative position", Unit::Counts).note("0 for an absolute move; the sign is the direction");
+/// Profile acceleration.
+pub const PROFILE_ACCELERATION: Entry = set(0x0088, "profile acceleration", Unit::CountsPerSecondSquared)
+    .values(NOT_NEGATIVE)
+    .note("at most three times the profile velocity is advised");
+/// Profile deceleration.
+pub const PROFILE_DECELERATION: Entry = set(0x0089, "profile deceleration", Unit::CountsPerSecondSquared)
+    .values(NOT_NEGATIVE)
+    .note("at most three times the profile velocity is advised");
+/// Profile velocity.
+pub const PROFILE_VELOCITY: Entry = set(0x008A, "profile velocity", Unit::CountsPerSecond)
+    .note("its sign is the direction of continuous motion, in which it may be changed");
+/// Jerk setting.
+pub const JERK_SETTING: Entry = set(0x008B, "jerk setting", Unit::None).values(Values::Named(&[
+    (0, "50 µs"),
+    (1, "100 µs"),
+    (2, "200 µs"),
+    (3, "400 µs"),
+    (4, "800 µs"),
+    (5, "1600 µs"),
+    (6, "3200 µs"),
+    (7, "6400 µs"),
+    (8, "12800 µs"),
+    (9, "25600 µs"),
+]));
+/// Quick-stop deceleration.
+pub const QUICK_STOP_DECELERATION: Entry =
+    set(0x008C, "quick-stop deceleration", Unit::CountsPerSecondSquared)
+        .values(NOT_NEGATIVE)
+        .note("at a temperature alarm, and at a position limit");
+/// Motion mode.
+pub const MOTION_MODE: Entry = set(0x008D, "motion mode", Unit::None)
+    .values(Values::Named(&[(0, "continuous"), (1, "target position"), (2, "reciprocating")]))
+    .note("stop before a change");
+/// Dwell time.
+pub const DWELL_TIME: Entry = set(0x0093, "dwell time", Unit::Milliseconds)
+    .values(NOT_NEGATIVE)
+    .note("at each reversal of reciprocating motion");
+/// Motor angle.
+pub const MOTOR_ANGLE: Entry =
+    read(0x009C, "motor angle", Unit::Counts).note("of the encoder on the motor's side");
+/// Apply acceleration limits to all motion.
+pub const LIMITS_APPLY: Entry =
+    set(0x009E, "apply acceleration limits to all motion", Unit::None).values(YES_NO);
+/// Load angle.
+pub const LOAD_ANGLE: Entry =
+    read(0x009F, "load angle", Unit::Counts).note("of the single-turn encoder on the load's side");
+/// Save parameters.
+pub const SAVE: Entry = command(0x00E8, "save parameters").note("leave the power on for 3 s");
+/// Three-phase current sum error.
+pub const PHASE_CURRENT_SUM_ERROR: Entry =
+    set(0x00FD, "three-phase current sum error", Unit::Milliamperes).values(NOT_NEGATIVE);
+/// Phase W current.
+pub const PHASE_W_CURRENT: Entry = read(0x00FE, "phase W current", Unit::Milliamperes);
+/// COM number.
+pub const COM_NUMBER: Entry =
+    set(0x00FF, "COM number", Unit::None).values(NOT_NEGATIVE).note("the ID on the RS-485 line");
+/// Motor enable.
+pub const MOTOR_ENABLE: Entry = command(0x0100, "motor enable")
+    .access(EntryAccess::CommandWithArgument)
+    .values(Values::Named(&[(0, "disable"), (1, "enable")]));
+/// Positioning-complete threshold.
+pub const POSITIONED_THRESHOLD: Entry =
+    set(0x0109, "positioning-complete threshold", Unit::Counts).values(NOT_NEGATIVE);
+/// Positioning-complete time.
+pub const POSITIONED_TIME: Entry =
+    set(0x010A, "positioning-complete time", Unit::Milliseconds).values(NOT_NEGATIVE);
+/// Target-reached state.
+pub const TARGET_REACHED_STATE: Entry = read(0x010C, "target-reached state", Unit::None)
+    .values(Values::Named(&[
+        (0, "motor off"),
+        (1, "motor on"),
+        (2, "running"),
+        (3, "settling"),
+        (4, "target reached"),
+    ]))
+    .note("2 is that of the Modbus manual");
+/// Control source.
+pub const CONTROL_SOURCE: Entry = set(0x0112, "control source", Unit::None)
+    .values(Values::Named(&[(0, "not used"), (1, "EtherCAT")]))
+    .note("16 is printed too, with a meaning that nobody can read");
+/// Reset load-side encoder.
+pub const RESET_LOAD_ENCODER: Entry = command(0x0114, "reset load-side encoder")
+    .access(EntryAccess::CommandWithArgument)
+    .values(Values::Range(1, 1))
+    .note(
+        "WIPES THE MULTI-TURN COUNT: home the joint again; only after a battery alarm of a multi-turn model",
+    );
+/// Encoder difference.
+pub const ENCODER_DIFFERENCE: Entry = read(0x0119, "encoder difference", Unit::Counts)
+    .note("between the two encoders, a measure of the torque; in no table of the manual, read by a program of the vendor");
+/// Allow loop changes over the bus.
+pub const LOOP_CHANGES: Entry = set(0x0124, "allow loop changes over the bus", Unit::None).values(YES_NO);
+/// Maximum output torque.
+pub const MAXIMUM_TORQUE: Entry = set(0x0129, "maximum output torque", Unit::PerMille)
+    .values(NOT_NEGATIVE)
+    .note("of the continuous current: sets the peak current");
+/// Release brake.
+pub const RELEASE_BRAKE: Entry = command(0x014F, "release brake").note("nothing holds the joint then");
+/// Analogue quantity type.
+pub const ANALOGUE_TYPE: Entry = set(0x01FD, "analogue quantity type", Unit::None)
+    .access(EntryAccess::Write)
+    .values(Values::Named(&[(0, "internal")]))
+    .note("not in the table of the manual, and used in its procedures");
+/// Analogue quantity: the set-point of velocity and torque control.
+pub const SET_POINT: Entry = set(0x01FE, "analogue quantity", Unit::None)
+    .access(EntryAccess::Write)
+    .note("the set-point: count/s in velocity control, mA in torque control; not in the table of the manual");
+/// Torque-mode velocity limit.
+pub const TORQUE_VELOCITY_LIMIT: Entry = set(0x0204, "torque-mode velocity limit", Unit::CountsPerSecond)
+    .values(NOT_NEGATIVE)
+    .note("may be changed only while disabled");
+/// Torque sensor value.
+pub const TORQUE_SENSOR: Entry =
+    read(0x020D, "torque sensor value", Unit::MillinewtonMetres).note("of models with a torque sensor");
+/// Module serial counter.
+pub const SERIAL_COUNTER: Entry = read_sub(0x0232, 1, "module serial counter");
+/// Module model information A.
+pub const MODEL_A: Entry = read_sub(0x0232, 2, "module model information A");
+/// Module model information B.
+pub const MODEL_B: Entry = read_sub(0x0232, 5, "module model information B");
+/// Hardware change identifier.
+pub const HARDWARE_CHANGE: Entry = read_sub(0x0232, 6, "hardware change identifier");
+/// IO function identifier.
+pub const IO_IDENTIFIER: Entry = read_sub(0x0232, 7, "IO function identifier")
+    .note("modules with EtherCAT always have inputs and outputs, and show 0");
+/// Module version.
+pub const MODULE_VERSION: Entry = read_sub(0x0232, 8, "module version");
+
+/// Every entry, in the order of their addresses.
+pub static ALL: [Entry; 73] = [
+    HARDWARE_VERSION,
+    FIRMWARE_VERSION,
+    ACTUAL_POSITION,
+    ACTUAL_VELOCITY,
+    MOTOR_CURRENT,
+    PHASE_U_CURRENT,
+    PHASE_V_CURRENT,
+    PHASE_U_VOLTAGE,
+    PHASE_V_VOLTAGE,
+    PHASE_W_VOLTAGE,
+    ERROR_CODE,
+    RUNNING_STATE,
+    DIGITAL_INPUTS,
+    ANALOGUE_INPUT,
+    BUS_VOLTAGE,
+    TEMPERATURE,
+    CONTINUOUS_CURRENT,
+    PEAK_CURRENT,
+    PEAK_CURRENT_DURATION,
+    CAN_ADDRESS,
+    BIT_RATE,
+    OPERATING_MODE,
+    MAXIMUM_VELOCITY,
+    POSITION_LIMIT_MINIMUM,
+    POSITION_LIMIT_MAXIMUM,
+    MAXIMUM_POSITION_ERROR,
+    MAXIMUM_VELOCITY_ERROR,
+    STALL_CURRENT,
+    STALL_VELOCITY,
+    STALL_TIME,
+    MAXIMUM_PHASE_CURRENT,
+    MAXIMUM_MOTOR_CURRENT,
+    POSITION_LOOP_GAIN,
+    VELOCITY_LOOP_GAIN,
+    VELOCITY_LOOP_INTEGRAL,
+    START_MOTION,
+    STOP_MOTION,
+    TARGET_POSITION,
+    RELATIVE_POSITION,
+    PROFILE_ACCELERATION,
+    PROFILE_DECELERATION,
+    PROFILE_VELOCITY,
+    JERK_SETTING,
+    QUICK_STOP_DECELERATION,
+    MOTION_MODE,
+    DWELL_TIME,
+    MOTOR_ANGLE,
+    LIMITS_APPLY,
+    LOAD_ANGLE,
+    SAVE,
+    PHASE_CURRENT_SUM_ERROR,
+    PHASE_W_CURRENT,
+    COM_NUMBER,
+    MOTOR_ENABLE,
+    POSITIONED_THRESHOLD,
+    POSITIONED_TIME,
+    TARGET_REACHED_STATE,
+    CONTROL_SOURCE,
+    RESET_LOAD_ENCODER,
+    ENCODER_DIFFERENCE,
+    LOOP_CHANGES,
+    MAXIMUM_TORQUE,
+    RELEASE_BRAKE,
+    ANALOGUE_TYPE,
+    SET_POINT,
+    TORQUE_VELOCITY_LIMIT,
+    TORQUE_SENSOR,
+    SERIAL_COUNTER,
+    MODEL_A,
+    MODEL_B,
+    HARDWARE_CHANGE,
+    IO_IDENTIFIER,
+    MODULE_VERSION,
+];

@@ -1,0 +1,48 @@
+//! Commissioning of a drive by its data sheet: the tasks of the drive profile. What only a vendor's own objects can do is
+//! refused with what to do instead.
+
+use crate::family::commission::failure::Failure;
+use crate::family::commission::profile;
+use crate::family::commission::report::Report;
+use crate::family::commission::sdo_session::SdoSession;
+use crate::family::commission::target::TargetDrive;
+use crate::family::commission::task::Task;
+
+/// Carries out a task, other than reading and writing objects.
+pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
+    if let Some(done) = profile::carry_out(c, s, &task).await {
+        return done;
+    }
+    match task {
+        Task::Home { method, within_ns, is_forced } => {
+            profile::homing::home(c, s, method, within_ns, is_forced).await
+        }
+        Task::ClearFault { .. } => profile::fault::clear(c, s, async |_| Ok(())).await,
+        task => Err(unsupported(&task)),
+    }
+}
+
+fn unsupported(task: &Task) -> Failure {
+    let (what, instead) = match task {
+        Task::Zero { .. } => (
+            "how an encoder is zeroed is not part of the drive profile",
+            "`home --method 37` (or 35) makes the present position the zero; or set `zero_counts` in the configuration",
+        ),
+        Task::SetId { .. } => (
+            "the node ID is not part of the drive profile",
+            "`takt lss` sets it where the drive has layer setting services; otherwise switches or the vendor's tool",
+        ),
+        Task::SetBitRate { .. } => (
+            "the bit rate is not part of the drive profile",
+            "`takt lss` sets it where the drive has layer setting services; otherwise switches or the vendor's tool",
+        ),
+        Task::Gains { .. } => {
+            ("the gains are the vendor's own objects", "`read` and `write` them by index:subindex")
+        }
+        _ => (
+            "this is done with a YZ-AIM only",
+            "`read` and `write` the objects of this drive by index:subindex",
+        ),
+    };
+    Failure::Unsupported { what: what.to_owned(), instead: instead.to_owned() }
+}

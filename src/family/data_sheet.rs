@@ -1,0 +1,29 @@
+//! What the data sheet of one drive says, where the drives of a family differ.
+
+use takt_rt::{Nanoseconds, OperationMode};
+
+use crate::canopen::object::{DataType, ObjectAddress};
+
+/// The data sheet of one drive, as far as its commissioning and its error codes need it.
+pub trait DataSheet {
+    /// Whether the drive has an object.
+    fn has(&self, address: ObjectAddress) -> bool;
+
+    /// Whether the drive lets an object be written.
+    fn is_writable(&self, address: ObjectAddress) -> bool;
+
+    /// The type of an object that holds a whole number of at most 32 bits.
+    fn data_type(&self, address: ObjectAddress) -> Option<DataType>;
+
+    /// Whether the drive has a mode that its object 6502 may leave out.
+    fn adds_mode(&self, mode: OperationMode) -> bool;
+
+    /// The drive's own error codes in words, where they deviate from the standard.
+    fn own_errors(&self) -> &[(u16, String)];
+
+    /// How long the drive takes to store its parameters, if it is known.
+    fn storing_ns(&self) -> Option<Nanoseconds>;
+
+    /// How long the drive takes to answer an SDO request, at most, if it is known.
+    fn sdo_reply_ns(&self) -> Option<Nanoseconds>;
+}
