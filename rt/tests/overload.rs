@@ -146,7 +146,7 @@ fn frames_that_do_not_fit_into_one_batch_are_refused_at_set_up() {
         Engine::<MAX_AXES, 16>::new(wanted).err()
     };
     assert_eq!(with(15), None);
-    assert_eq!(with(20), Some(SetUpError::TooManyFrames { bus: 0, frames: 83, limit: 64 }));
+    assert_eq!(with(20), Some(SetUpError::TooManyFrames { bus: 0, frames: 84, limit: 64 }));
 }
 
 #[test]
