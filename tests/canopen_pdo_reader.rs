@@ -95,7 +95,7 @@ impl Bench {
 fn the_drive_reports_the_configuration_of_its_eds() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
     let described = eds::load(&path).unwrap().dictionary.pdos(Some(NODE));
-    let reported = Bench::new().ask(NODE, PdoReader::of_first_four()).unwrap();
+    let reported = Bench::new().ask(NODE, PdoReader::of_four(1)).unwrap();
     assert_eq!(reported.len(), 8);
     for (reported, described) in reported.iter().zip(&described) {
         // The EDS leaves these open.
@@ -135,7 +135,7 @@ fn missing_pdos_are_left_out_and_a_missing_reply_is_an_error() {
     let pdos = [(PdoDirection::Receive, 5), (PdoDirection::Receive, 2)];
     let reported = bench.ask(NODE, PdoReader::new(pdos)).unwrap();
     assert_eq!(reported.iter().map(|pdo| pdo.number).collect::<Vec<_>>(), [2]);
-    let failure = bench.ask(9, PdoReader::of_first_four()).unwrap_err();
+    let failure = bench.ask(9, PdoReader::of_four(1)).unwrap_err();
     assert_eq!(failure.object.to_string(), "1400:00");
     assert!(matches!(failure.error, SdoError::NoReply { .. }));
 }

@@ -117,7 +117,7 @@ fn interpolated_position_has_the_same_target_in_a_written_and_in_a_stored_mappin
     let sheet = repository().join("tests/eds/vendors/schunk-lwa4p.eds");
     let eds = format!("eds = {:?}\ncounts_per_turn = 65536\nmode = \"ip\"", sheet.display().to_string());
     let config = Config::parse("one.toml", &configuration(&eds)).unwrap();
-    let written = ProcessData::of(&config.axes[0]);
+    let written = ProcessData::of(&config.axes[0], &config);
     let carried = |data: &ProcessData| {
         data.commands
             .iter()
@@ -131,7 +131,7 @@ fn interpolated_position_has_the_same_target_in_a_written_and_in_a_stored_mappin
             transmission_type: Some(plan.transmission_type),
             objects: plan.objects.clone(),
             direction,
-            number: plan.number.into(),
+            number: plan.number,
             is_valid: true,
             inhibit_time_100us: None,
             event_timer_ms: None,
@@ -142,7 +142,7 @@ fn interpolated_position_has_the_same_target_in_a_written_and_in_a_stored_mappin
         reported(PdoDirection::Receive, &written.commands),
         reported(PdoDirection::Transmit, &written.feedback),
     ];
-    let stored = ProcessData::as_reported(&config.axes[0], &all.concat()).unwrap();
+    let stored = ProcessData::as_reported(&config.axes[0], &config, &all.concat()).unwrap();
     assert!(carried(&stored));
 }
 

@@ -323,7 +323,7 @@ fn what_is_fed_forward_goes_into_the_process_data() {
     let lengths = |mode: &str, feed_forward: &str| -> Vec<usize> {
         let keys = format!("mode = {mode:?}\nfeed_forward = {feed_forward:?}");
         let config = with(&keys);
-        ProcessData::of(&config.axes[0]).commands.iter().map(|pdo| pdo.length()).collect()
+        ProcessData::of(&config.axes[0], &config).commands.iter().map(|pdo| pdo.length()).collect()
     };
     assert_eq!(lengths("csp", "none"), [6]);
     assert_eq!(lengths("csp", "torque"), [8]);

@@ -465,7 +465,8 @@ Error:
  69 │ limits = { position = [-1, 1], velocity = 1.0, acceleration = 5, torque = 20 }
     ╰────
   help: give each node of a bus a node ID of its own, 1 to 127; on every bus, [master] node is the
-        ID of the controller
+        ID of the controller. Axes of one drive have one node ID, one `eds`, and each another
+        `node_axis`
 "#;
     assert_eq!(rendered(&error_of(&text)), expected);
 }

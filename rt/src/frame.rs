@@ -175,6 +175,15 @@ impl Frame {
         Self { id, kind: format.kind(), length: length as u8, data }
     }
 
+    /// This frame with the bits of the first eight bytes of another one set, too.
+    pub(crate) fn with_bits_of(&self, other: &Self) -> Self {
+        let mut data = self.data;
+        if let Some(first) = data.first_chunk_mut() {
+            *first = (self.first_word() | other.first_word()).to_le_bytes();
+        }
+        Self { data, ..*self }
+    }
+
     /// A classic data frame of 0 to 8 bytes. The compiler checks the length.
     #[inline]
     pub fn of<const N: usize>(id: Id, bytes: [u8; N]) -> Self {

@@ -69,7 +69,7 @@ mod wire;
 pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
-    ModeCondition, Pdo, SenderByte, TorqueLimits,
+    ModeCondition, Pdo, SenderByte, Supervision, TorqueLimits,
 };
 pub use bit_fields::{
     BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits, FieldDrive,
@@ -94,8 +94,8 @@ pub use guard::{AxisLimits, LimitError, braking_distance};
 pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
 pub use motion_reports::{MotionReport, MotionReports, MotionState};
 pub use pdo::{
-    CommandSlot, FeedbackSlot, MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError, ProcessImage,
-    TooShort, TransmissionType,
+    CommandSlot, FeedbackSlot, MAX_NODE_AXES, MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError,
+    ProcessImage, TooShort, TransmissionType,
 };
 pub use phase::Phase;
 pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};

@@ -15,6 +15,17 @@ pub enum TransmissionType {
     OnControlword,
 }
 
+/// The most axes of a node (CiA 402-2, multi-axis devices).
+pub const MAX_NODE_AXES: u8 = 8;
+/// The distance between the objects of two axes of a node.
+const AXIS_OFFSET: u16 = 0x800;
+
+/// How many axes a node has before this one, as a factor that no index overflows by.
+const fn axes_before(node_axis: u8) -> u16 {
+    let before = node_axis.saturating_sub(1);
+    if before < MAX_NODE_AXES { before as u16 } else { MAX_NODE_AXES as u16 - 1 }
+}
+
 /// The most objects one PDO maps here (byte-wise mapping of classic frames).
 pub const MAX_OBJECTS: usize = 8;
 
@@ -43,6 +54,26 @@ impl MappedObject {
     /// Whether this is no object but a gap in a mapping: data types map as dummies (CiA 301, 7.4.7.1).
     pub const fn is_dummy(self) -> bool {
         matches!(self.index, 0x0001..=0x001F)
+    }
+
+    /// The object of axis number `node_axis` of a node, counted from 1, that this one is of the first axis (CiA 402-2, multi-axis
+    /// devices). What is no object of the drive profile is the same for every axis.
+    pub const fn of_node_axis(self, node_axis: u8) -> Self {
+        match self.index {
+            0x6000..=0x67FF => Self { index: self.index + AXIS_OFFSET * axes_before(node_axis), ..self },
+            _ => self,
+        }
+    }
+
+    /// The object of the first axis of a node that corresponds to this one of axis number `node_axis`. One of another axis
+    /// corresponds to none, and becomes an object that nobody knows.
+    pub const fn as_of_first_axis(self, node_axis: u8) -> Self {
+        match self.index {
+            0x6000..=0x9FFF => {
+                Self { index: self.index.saturating_sub(AXIS_OFFSET * axes_before(node_axis)), ..self }
+            }
+            _ => self,
+        }
     }
 
     /// The value of a mapping parameter sub-entry.
@@ -273,6 +304,12 @@ impl Mapping {
             let slot = FeedbackSlot::of(object);
             Ok((slot as u8, slot.is_signed()))
         })
+    }
+
+    /// The bits of the payload that carry a number, and not a gap.
+    pub(crate) fn own_bits(&self) -> u64 {
+        let fields = self.fields.iter().filter(|field| field.slot != CommandSlot::Zero as u8);
+        fields.fold(0, |bits, field| bits | u64::from(field.mask) << field.shift)
     }
 
     fn compile(

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 use fixture::{PERIOD_NS, Rig, flexible, parameters, scale};
 use takt_rt::{
     DriveState, Engine, EngineParameters, Fault, FeedbackSince, Frame, Id, MAX_AXES, MAX_BUSES, Phase,
-    Request, Rule, SetUpError, StopCause, nmt_command,
+    Request, Rule, SetUpError, StopCause, Supervision, nmt_command,
 };
 
 /// Three axes on a CANopen bus, three on one that is none, whose drives answer set-points. The drives are told the time of day.
@@ -146,7 +146,10 @@ fn error_of(change: impl Fn(&mut EngineParameters)) -> Option<SetUpError> {
 fn an_axis_that_needs_sync_or_heartbeats_is_refused_where_there_are_none() {
     let no_canopen = Some(SetUpError::NotCanopen { axis: 4 });
     assert_eq!(error_of(|own| own.axes[4].feedback_since = FeedbackSince::Sync), no_canopen);
-    assert_eq!(error_of(|own| own.axes[4].heartbeat_timeout_cycles = Some(100)), no_canopen);
+    assert_eq!(
+        error_of(|own| own.axes[4].supervision = Supervision::Heartbeat { timeout_cycles: 100 }),
+        no_canopen
+    );
     assert_eq!(error_of(|_| {}), None);
 }
 

@@ -6,7 +6,7 @@ mod fixture;
 use fixture::{PERIOD_NS, Rig, parameters};
 use takt_rt::{
     BusState, EventKind, Frame, Id, MappedObject, Mapping, Origin, Phase, RejectReason, Request, Rule,
-    StopCategory, TimingLevel,
+    StopCategory, Supervision, TimingLevel,
 };
 
 fn moving() -> Rig {
@@ -67,7 +67,7 @@ fn a_node_that_leaves_operational_or_whose_heartbeat_ceases_stops_the_group() {
     assert_eq!(reason(&rig), (Rule::NodeNotOperational, Origin::Axis(2), 127.0));
 
     let mut watched = parameters(3);
-    watched.axes[1].heartbeat_timeout_cycles = Some(50);
+    watched.axes[1].supervision = Supervision::Heartbeat { timeout_cycles: 50 };
     let mut rig = Rig::of(watched).enable();
     for _ in 0..5 {
         rig.buses[0].inject(Frame::of(Id::canopen(0x700, 2), [5]));

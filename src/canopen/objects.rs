@@ -9,6 +9,10 @@ pub const SYNC_COB_ID: Object = Object::new(0x1005, 0, DataType::U32, "COB-ID SY
 /// 1006: the period of SYNC in µs.
 pub const COMMUNICATION_CYCLE_PERIOD: Object =
     Object::new(0x1006, 0, DataType::U32, "communication cycle period");
+/// 100C: the time in ms from one request of node guarding to the next.
+pub const GUARD_TIME: Object = Object::new(0x100C, 0, DataType::U16, "guard time");
+/// 100D: the life time of node guarding in guard times.
+pub const LIFE_TIME_FACTOR: Object = Object::new(0x100D, 0, DataType::U8, "life time factor");
 /// 1016:1: node ID (bits 16 to 22) and timeout in ms (bits 0 to 15) of the heartbeat that the device consumes.
 pub const CONSUMER_HEARTBEAT_TIME: Object = Object::new(0x1016, 1, DataType::U32, "consumer heartbeat time");
 /// 1017: the period of the device's own heartbeat in ms.

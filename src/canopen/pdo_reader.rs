@@ -49,11 +49,12 @@ impl PdoReader {
         Self { pdos, questions, answers: BTreeMap::new(), failure: None }
     }
 
-    /// Reads the first four PDOs of each direction.
-    pub fn of_first_four() -> Self {
+    /// Reads four PDOs of each direction, from this number on, which is 1 for those of a drive's first axis.
+    pub fn of_four(first: u16) -> Self {
         let directions = [PdoDirection::Receive, PdoDirection::Transmit];
+        let numbers = || first..first.saturating_add(4);
         let pdos =
-            directions.into_iter().flat_map(|direction| (1..=4).map(move |number| (direction, number)));
+            directions.into_iter().flat_map(|direction| numbers().map(move |number| (direction, number)));
         Self::new(pdos)
     }
 

@@ -1,5 +1,6 @@
 //! `takt check`: everything that can be known before motion.
 
+mod supervision;
 mod text;
 mod unattended;
 
@@ -14,6 +15,7 @@ use takt::schedule::{self, BusSchedule};
 use super::exit::Exit;
 use super::print;
 use super::usage_error::UsageError;
+use supervision::SupervisionCheck;
 use unattended::Unattended;
 
 /// Check a configuration: limits, units, bus load, and the worst-case response time of every message
@@ -87,6 +89,8 @@ struct AxisCheck {
     name: String,
     bus: String,
     node: u8,
+    /// Its number among the axes of its node.
+    node_axis: u8,
     mode: &'static str,
     /// The modes that it may be changed to at run time.
     other_modes: Vec<&'static str>,
@@ -109,6 +113,8 @@ struct AxisCheck {
     compliance: Option<ComplianceCheck>,
     /// How far off its target a program may leave it.
     target_tolerance: f64,
+    /// How drive and controller see that the other one is there.
+    supervision: SupervisionCheck,
     /// What it does when the controller is gone.
     without_controller: Unattended,
     counts_per_unit: f64,
@@ -170,6 +176,7 @@ impl AxisCheck {
             name: axis.name.clone(),
             bus: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
             node: axis.node,
+            node_axis: axis.drive.node_axis,
             mode: mode_word(axis.control.operation_mode()),
             other_modes: axis.other_modes.iter().map(|control| mode_word(control.operation_mode())).collect(),
             mode_change: (!axis.other_modes.is_empty())
@@ -197,6 +204,7 @@ impl AxisCheck {
             },
             compliance: ComplianceCheck::of(axis),
             target_tolerance: axis.target_tolerance,
+            supervision: SupervisionCheck::of(axis, config),
             without_controller: Unattended::of(axis, config),
             counts_per_unit,
             resolution: 1.0 / counts_per_unit,

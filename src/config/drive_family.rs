@@ -12,7 +12,9 @@ use std::sync::Arc;
 use takt_rt::{Cia402Codec, MappedObject, ModeCondition, OperationMode};
 
 use super::model::{Control, Identity};
+use super::ranges;
 use super::read::section::Section;
+use super::supervision::ErrorControl;
 
 /// A family of drives: the word for it in a configuration, and what is known of its drives.
 #[derive(Clone)]
@@ -70,6 +72,12 @@ pub struct DriveFacts {
     pub reports_mode: bool,
     /// Whether the drives can be told to answer set-points alone, and not SYNC (`answers_sync`).
     pub may_ignore_sync: bool,
+    /// The number of this axis among those of its drive, 1 where a drive has one axis. See [`Axis::node`](super::model::Axis::node).
+    pub node_axis: u8,
+    /// How the drives show that they live, beside their feedback.
+    pub error_control: ErrorControl,
+    /// Whether the drives can watch the heartbeat of the controller (object 1016).
+    pub consumes_heartbeat: bool,
     /// Whether the drives have emergency objects.
     pub sends_emergencies: bool,
     /// Whether the drives may be operational after power-up, without an NMT command.
@@ -183,6 +191,9 @@ impl DriveFacts {
             has_fixed_process_data: false,
             reports_mode: true,
             may_ignore_sync: false,
+            node_axis: 1,
+            error_control: ErrorControl::Heartbeat { fixed_ms: None },
+            consumes_heartbeat: true,
             sends_emergencies: true,
             may_power_up_operational: false,
             codec: Cia402Codec::STANDARD,
@@ -287,6 +298,15 @@ impl<'s, 'a> FamilyKeys<'s, 'a> {
     /// A text. `None` if the key is not there, or is something else, which is reported.
     pub fn text(&mut self, key: &'static str) -> Option<String> {
         self.section.get(key).and_then(|entry| entry.text().map(str::to_owned))
+    }
+
+    /// The number of the axis among those of its node, `node_axis`; 1 where the key is not there. `None` if it is no such number,
+    /// which is reported.
+    pub fn node_axis(&mut self) -> Option<u8> {
+        match self.section.get("node_axis") {
+            None => Some(1),
+            Some(entry) => entry.integer(ranges::NODE_AXIS).and_then(|number| u8::try_from(number).ok()),
+        }
     }
 
     /// Reports that the key, for which `says` tells what it is, is missing, unless it is there.

@@ -29,8 +29,8 @@ use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 use super::defaults;
 use super::drive_family::DriveFamily;
 use super::model::{
-    Axis, Bus, Config, Control, Cycle, FollowingError, Interface, Joint, Limits, Master, MissedSlots,
-    PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
+    Axis, Bus, CommandFrames, Config, Control, Cycle, FollowingError, Interface, Joint, Limits, Master,
+    MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
 };
 
 impl Config {
@@ -122,6 +122,7 @@ impl Bus {
             restart_ms: defaults::RESTART_MS,
             service_frames_per_cycle: defaults::SERVICE_FRAMES_PER_CYCLE,
             sdo_while_enabled: defaults::SDO_WHILE_ENABLED,
+            command_frames: CommandFrames::default(),
         }
     }
 }

@@ -24,6 +24,7 @@ mod rules;
 mod scale;
 mod spelling;
 pub(crate) mod spot;
+mod supervision;
 
 use std::fmt;
 use std::path::Path;
@@ -37,7 +38,8 @@ pub use mode_words::{MODES, mode_word};
 pub use model::*;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
-pub(crate) use read::{Knowledge, parse};
+pub(crate) use read::{Knowledge, PhaseChoice, parse};
+pub use supervision::{ErrorControl, Supervision};
 
 use thiserror::Error;
 

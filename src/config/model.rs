@@ -155,6 +155,19 @@ pub struct Bus {
     /// Whether SDO transfers go on while the axes are enabled. A request and its answer then need room in the
     /// worst cycle; else they wait until the axes are disabled. Default `false`.
     pub sdo_while_enabled: bool,
+    /// Whether axes share command frames. Default: each has its own. A file may leave it to the schedule; this is what that finds.
+    pub command_frames: CommandFrames,
+}
+
+/// Whose commands a frame carries.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CommandFrames {
+    /// Each axis has frames of its own.
+    #[default]
+    OnePerAxis,
+    /// Axes of one group share frames, as far as the data sheets of their drives allow it (dummy mapping) and it makes the frames
+    /// of a cycle shorter.
+    Shared,
 }
 
 /// What a bus is connected to.
@@ -184,7 +197,8 @@ pub struct Axis {
     pub name: String,
     /// Its bus, an index into [`Config::buses`].
     pub bus: usize,
-    /// Its CANopen node ID, 1 to 127.
+    /// The CANopen node ID of its drive, 1 to 127. Axes of one drive with several axes have the same bus and node ID, and each
+    /// another [`node_axis`](super::DriveFacts::node_axis).
     pub node: u8,
     /// The family of the drive.
     pub drive: DriveFamily,
@@ -235,7 +249,8 @@ pub struct Axis {
     /// The longest time from SYNC until the drive has its feedback ready to be sent. Default 20 µs.
     pub feedback_delay_ns: u64,
     /// Period of the drive's own heartbeat (object 1017); `None`, the default, leaves it off: feedback in every cycle
-    /// proves the drive alive without loading the bus.
+    /// proves the drive alive without loading the bus. A drive without a heartbeat is asked at this period instead, by default at
+    /// that of the controller's heartbeat: node guarding, see [`Axis::supervision`].
     pub heartbeat_ns: Option<u64>,
     /// What is known of the drive beforehand and compared at bring-up. Default: the family's, any revision.
     pub identity: Identity,

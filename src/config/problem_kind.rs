@@ -332,7 +332,8 @@ impl ProblemKind {
             Self::DuplicateName { what, .. } => format!("give each {what} a name of its own"),
             Self::DuplicateNode { .. } => {
                 "give each node of a bus a node ID of its own, 1 to 127; on every bus, \
-                                           [master] node is the ID of the controller"
+                 [master] node is the ID of the controller. Axes of one drive have one node ID, one `eds`, and each another \
+                 `node_axis`"
                     .into()
             }
             Self::DuplicateInterface { .. } => "give each bus an interface of its own".into(),

@@ -6,12 +6,12 @@ use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
     FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
-    Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, ScaleError, SetUpError, SlotPlan,
-    TimingLadder, TorqueLimits,
+    MappedObject, Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, ScaleError, SetUpError,
+    SlotPlan, Supervision, TimingLadder, TorqueLimits,
 };
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
-use crate::config::{Axis, Compliance, Config, ConfigError, Interface};
+use crate::config::{self, Axis, Compliance, Config, ConfigError, Interface};
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -140,16 +140,17 @@ fn axis_parameters(
     config: &Config,
     cycles: &impl Fn(u64) -> u32,
 ) -> Result<AxisParameters, AssembleError> {
-    let data = ProcessData::of(axis);
+    let data = ProcessData::of(axis, config);
     let wrong_mapping = |error| AssembleError::Mapping { axis: index, error };
     let command = |plan: &PdoPlan| -> Result<CommandPdo, MappingError> {
-        let pdo = Pdo::classic(plan.id, Mapping::commands(&plan.objects)?);
-        Ok(CommandPdo { pdo, transmission: plan.transmission })
+        let pdo = Pdo::classic(plan.id, Mapping::commands(&of_first_axis(plan, axis))?);
+        Ok(CommandPdo { pdo, transmission: plan.transmission, axes: plan.axes })
     };
-    let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&plan.objects)?));
+    let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&of_first_axis(plan, axis))?));
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,
+        node_axis: axis.drive.node_axis,
         commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
         feedback_since: feedback_since(&data.feedback),
@@ -171,12 +172,33 @@ fn axis_parameters(
         feed_forward: axis.feed_forward,
         start_tolerance: axis.start_tolerance,
         follow: axis.follow,
-        // A heartbeat that is a little late is not lost.
-        heartbeat_timeout_cycles: axis.heartbeat_ns.map(|period_ns| cycles(3 * period_ns)),
+        supervision: supervision(axis, config, cycles),
         following_error_limit: axis.following_error.limit,
         following_error_cycles: cycles(axis.following_error.time_ns),
         missed_feedback_cycles: axis.missed_feedback_cycles,
     })
+}
+
+/// The objects of a PDO by the numbers that those of the first axis of a node have.
+fn of_first_axis(plan: &PdoPlan, axis: &Axis) -> Vec<MappedObject> {
+    plan.objects.iter().map(|object| object.as_of_first_axis(axis.drive.node_axis)).collect()
+}
+
+fn supervision(axis: &Axis, config: &Config, cycles: &impl Fn(u64) -> u32) -> Supervision {
+    let supervision = axis.supervision(&config.master);
+    // A heartbeat or a reply that is a little late is not lost.
+    let timeout_cycles = supervision.timeout_ns().map_or(0, cycles);
+    match supervision {
+        config::Supervision::Feedback => Supervision::Feedback,
+        config::Supervision::Heartbeat { .. } => Supervision::Heartbeat { timeout_cycles },
+        // Rounded down: the drive waits for no longer than the guard time.
+        config::Supervision::Guarding { guard_time_ns, .. } => Supervision::Guarding {
+            guard_cycles: u32::try_from(guard_time_ns / config.cycle.period_ns.max(1))
+                .unwrap_or(u32::MAX)
+                .max(1),
+            life_cycles: timeout_cycles,
+        },
+    }
 }
 
 fn torque_limits(axis: &Axis) -> TorqueLimits {

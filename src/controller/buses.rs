@@ -19,14 +19,24 @@ const SERVICE_FRAMES: usize = 8;
 /// bus use, in both directions.
 pub(super) fn socket_options(config: &Config, bus: usize) -> SocketCanOptions {
     let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-    let of_drives = axes.flat_map(|axis| identifiers(&axis.drive, axis.node));
+    // Axes of one node have most of theirs in common.
+    let mut of_drives: Vec<Id> = vec![];
+    for axis in axes {
+        let data = ProcessData::of(axis, config);
+        let ids = identifiers(&axis.drive, axis.node).into_iter().chain(data.all().map(|pdo| pdo.id));
+        for id in ids {
+            if !of_drives.contains(&id) {
+                of_drives.push(id);
+            }
+        }
+    }
     let broadcast = [function_code::NMT, function_code::SYNC, function_code::TIME];
     let broadcast = broadcast.map(|function| Id::canopen(function, 0));
     let own = Id::canopen(function_code::ERROR_CONTROL, config.master.node);
     let settings = config.buses.get(bus);
     let usual = SocketCanOptions::default();
     SocketCanOptions {
-        identifiers: of_drives.chain(broadcast).chain([own]).collect(),
+        identifiers: of_drives.into_iter().chain(broadcast).chain([own]).collect(),
         bit_rate: settings.map_or(usual.bit_rate, |bus| bus.bit_rate),
         data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
         // The frames of all buses: the kernel may charge one socket with frames that others send in the same call, and
@@ -40,7 +50,7 @@ impl MasterTraffic {
     /// Of bus number `bus` of a configuration.
     pub fn of(config: &Config, bus: usize) -> Self {
         let drives = config.axes.iter().filter(|axis| axis.bus == bus).map(|axis| {
-            let data = ProcessData::of(axis);
+            let data = ProcessData::of(axis, config);
             CommandedDrive {
                 node: axis.node,
                 commands: data.commands.iter().map(|pdo| pdo.id).collect(),

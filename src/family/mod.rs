@@ -18,7 +18,7 @@ pub mod yz_aim;
 
 use std::pin::Pin;
 
-use takt_rt::{Frame, Id};
+use takt_rt::{Frame, Id, MappedObject};
 
 pub use data_sheet::DataSheet;
 pub use error_words::{drive_error_words, error_cure, error_words, own_error_words, own_errors};
@@ -28,6 +28,7 @@ pub use warning::{Warning, WarningKind, is_rounded};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
+use crate::canopen::objects::PdoDirection;
 use crate::canopen::sdo::SdoTiming;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
@@ -57,6 +58,23 @@ pub trait Family: ConfiguredFamily {
     fn process_data(&self, axis: &Axis) -> ProcessData {
         let written = ProcessData::mapped_freely(axis);
         if axis.mapping == PdoMapping::AsStored { written.padded() } else { written }
+    }
+
+    /// The identifier that a PDO (counted from 1) of the drive of an axis has by its data sheet, where that gives one. It is asked for the
+    /// PDOs of further axes of a node, for which the pre-defined connection set has none.
+    fn pdo_id(&self, _axis: &Axis, _direction: PdoDirection, _number: u16) -> Option<Id> {
+        None
+    }
+
+    /// How many objects an RPDO (counted from 1) of the drive of an axis can map, beside or in place of its own, where several axes are to
+    /// share a command; 0 where they cannot.
+    fn mappable_objects(&self, _axis: &Axis, _number: u8) -> usize {
+        0
+    }
+
+    /// Whether the drive of an axis can pass over a part of a frame by this dummy object.
+    fn can_pass_over(&self, _axis: &Axis, _dummy: MappedObject) -> bool {
+        false
     }
 
     /// How the PDOs that a drive reports are matched with those that its axis needs.
@@ -126,7 +144,7 @@ pub trait Family: ConfiguredFamily {
         task: Task,
     ) -> CarryingOut<'a>;
 
-    /// The drive that stands in for an axis on a simulated bus.
+    /// The drive that stands in for an axis on a simulated bus, and for the other axes of its node, where the drive has several.
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive>;
 }
 

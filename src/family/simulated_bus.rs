@@ -4,20 +4,28 @@ use super::registry;
 use crate::config::{Axis, Config, Travel};
 use crate::sim::{Drive, Gravity, SimulatedBus, WireBitRates};
 
-/// The drive that simulates an axis, under its gravity.
+/// The drive that simulates an axis, the first of its node, under its gravity.
 fn simulated(axis: &Axis, config: &Config) -> Box<dyn Drive> {
     let mut drive = registry::of(&axis.drive).simulated(axis, config);
-    drive.set_gravity(match axis.travel {
-        Travel::Rotary => Gravity::Pendulum(axis.simulated.gravity),
-        Travel::Linear { .. } => Gravity::Weight(axis.simulated.gravity),
-    });
+    drive.set_gravity(gravity(axis));
     drive
 }
 
-/// The drives that simulate the axes of a bus.
+/// What gravity does to the joint of an axis.
+pub(super) fn gravity(axis: &Axis) -> Gravity {
+    match axis.travel {
+        Travel::Rotary => Gravity::Pendulum(axis.simulated.gravity),
+        Travel::Linear { .. } => Gravity::Weight(axis.simulated.gravity),
+    }
+}
+
+/// The drives that simulate the axes of a bus, one for each node, with all of its axes.
 pub fn simulated_drives(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
-    let axes = config.axes.iter().filter(|axis| axis.bus == bus);
-    axes.map(|axis| simulated(axis, config)).collect()
+    let axes = || config.axes.iter().filter(|axis| axis.bus == bus);
+    let is_first = |axis: &&Axis| {
+        axes().all(|other| other.node != axis.node || other.drive.node_axis >= axis.drive.node_axis)
+    };
+    axes().filter(is_first).map(|axis| simulated(axis, config)).collect()
 }
 
 impl SimulatedBus {

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use super::automatic_command_phase;
+use super::remedy::needs_shared_frames;
 use crate::config::{self, Config, ConfigError, ConfiguredFamily, Knowledge};
 use crate::family;
 
@@ -29,7 +30,7 @@ impl Config {
 fn with_knowledge<T>(read: impl FnOnce(&Knowledge<'_>) -> T) -> T {
     let families: Vec<&'static dyn ConfiguredFamily> =
         family::all().into_iter().map(|family| -> &'static dyn ConfiguredFamily { family }).collect();
-    read(&Knowledge { command_phase, families: &families })
+    read(&Knowledge { command_phase, needs_shared_frames, families: &families })
 }
 
 fn command_phase(config: &Config) -> Result<u64, String> {

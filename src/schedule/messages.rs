@@ -1,10 +1,12 @@
 //! Every message that a configuration puts on a bus.
 
+use std::collections::HashSet;
+
 use serde::Serialize;
-use takt_rt::{Id, TIME_ID, TransmissionType};
+use takt_rt::{FrameKind, Id, TIME_ID, TransmissionType};
 
 use crate::canopen::function_code;
-use crate::config::{Axis, Config, Master};
+use crate::config::{Axis, Config, Master, Supervision};
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 use crate::frame_time::FrameShape;
 
@@ -28,6 +30,10 @@ pub enum MessageKind {
     SdoRequest,
     /// Heartbeat of a drive (7.2.8).
     DriveHeartbeat,
+    /// Request of the controller for the state of a drive: node guarding.
+    GuardRequest,
+    /// Reply of a drive to that.
+    GuardReply,
     /// Heartbeat of the controller.
     MasterHeartbeat,
     /// TIME of the controller (7.2.6).
@@ -42,6 +48,8 @@ impl MessageKind {
             Self::SdoResponse
             | Self::SdoRequest
             | Self::DriveHeartbeat
+            | Self::GuardRequest
+            | Self::GuardReply
             | Self::MasterHeartbeat
             | Self::Time => true,
             Self::Sync | Self::Emergency | Self::Feedback | Self::SetPoint | Self::Answer => false,
@@ -50,7 +58,20 @@ impl MessageKind {
 
     /// Sent by the controller, so that it stands in the controller's own queue.
     pub(super) fn is_ours(self) -> bool {
-        matches!(self, Self::Sync | Self::SetPoint | Self::SdoRequest | Self::MasterHeartbeat | Self::Time)
+        matches!(
+            self,
+            Self::Sync
+                | Self::SetPoint
+                | Self::SdoRequest
+                | Self::GuardRequest
+                | Self::MasterHeartbeat
+                | Self::Time
+        )
+    }
+
+    /// Request or reply of node guarding: the controller sends one request on a bus in each of its cycles at most.
+    pub(super) fn is_guarding(self) -> bool {
+        matches!(self, Self::GuardRequest | Self::GuardReply)
     }
 
     pub(super) fn is_sdo(self) -> bool {
@@ -106,12 +127,28 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     let own = heartbeat.into_iter().chain(time);
     messages.extend(own.map(|message| BusMessage { jitter_ns: config.cycle.period_ns, ..message }));
     let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
+    let is_guarded = |axis: &Axis| matches!(axis.supervision(&config.master), Supervision::Guarding { .. });
+    // What a node sends for all of its axes counts once, with the first of them.
+    let nodes = || {
+        axes().filter(|(index, axis)| {
+            let is_its = |(_, other): &(usize, &Axis)| other.node == axis.node;
+            axes().find(is_its).is_some_and(|(first, _)| first == *index)
+        })
+    };
+    let guarded = nodes().filter(|(_, axis)| is_guarded(axis)).count();
     for (index, axis) in axes() {
-        messages.extend(axis_messages(index, axis, period_ns));
+        messages.extend(axis_messages(index, axis, config, period_ns));
+    }
+    for (index, axis) in nodes() {
+        messages.extend(emergency(index, axis));
+        messages.extend(error_control(index, axis, config, guarded));
     }
     messages.extend(
-        axes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
+        nodes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
     );
+    // A frame that axes share counts once, with the first of them.
+    let mut set_points = HashSet::new();
+    messages.retain(|message| message.kind != MessageKind::SetPoint || set_points.insert(message.id));
     messages.sort_by_key(|message| message.id.arbitration_key());
     messages
 }
@@ -129,15 +166,11 @@ fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period
     }
 }
 
-fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
-    let data = ProcessData::of(axis);
+fn axis_messages(index: usize, axis: &Axis, config: &Config, period_ns: u64) -> Vec<BusMessage> {
+    let data = ProcessData::of(axis, config);
     let of_axis =
         |kind, pdo: &PdoPlan, period_ns| message(kind, Some(index), pdo.id, pdo.length(), period_ns);
     let mut messages = vec![];
-    if axis.drive.sends_emergencies {
-        let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
-        messages.push(message(kind, Some(index), id, EMERGENCY_BYTES, EMERGENCY_INTERVAL_NS));
-    }
     messages.extend(data.feedback.iter().map(|pdo| {
         let is_asynchronous = pdo.transmission_type > LAST_SYNCHRONOUS_TYPE;
         let answers_set_points = pdo.reply != Reply::No && is_asynchronous;
@@ -159,11 +192,32 @@ fn axis_messages(index: usize, axis: &Axis, period_ns: u64) -> Vec<BusMessage> {
     // stands still then: its delay does no harm, and it is not part of the sums.
     let every_cycle = data.commands.iter().filter(|pdo| pdo.transmission == TransmissionType::EveryCycle);
     messages.extend(every_cycle.map(|pdo| of_axis(MessageKind::SetPoint, pdo, period_ns)));
-    messages.extend(axis.heartbeat_ns.map(|heartbeat_ns| {
-        let id = Id::canopen(function_code::ERROR_CONTROL, axis.node);
-        message(MessageKind::DriveHeartbeat, Some(index), id, HEARTBEAT_BYTES, heartbeat_ns)
-    }));
     messages
+}
+
+fn emergency(index: usize, axis: &Axis) -> Option<BusMessage> {
+    let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
+    axis.drive
+        .sends_emergencies
+        .then(|| message(kind, Some(index), id, EMERGENCY_BYTES, EMERGENCY_INTERVAL_NS))
+}
+
+/// Heartbeats of a drive, or the requests and replies of node guarding. A request is sent in a cycle of the controller, and may
+/// wait there for those to the other nodes, one in each cycle.
+fn error_control(index: usize, axis: &Axis, config: &Config, guarded: usize) -> Vec<BusMessage> {
+    let id = Id::canopen(function_code::ERROR_CONTROL, axis.node);
+    let of_axis = |kind, period_ns| message(kind, Some(index), id, HEARTBEAT_BYTES, period_ns);
+    match axis.supervision(&config.master) {
+        Supervision::Feedback => vec![],
+        Supervision::Heartbeat { period_ns } => vec![of_axis(MessageKind::DriveHeartbeat, period_ns)],
+        Supervision::Guarding { guard_time_ns, .. } => {
+            let jitter_ns = config.cycle.period_ns.saturating_mul(guarded as u64);
+            let request = of_axis(MessageKind::GuardRequest, guard_time_ns);
+            let shape = FrameShape { kind: FrameKind::Remote, ..request.shape };
+            let reply = of_axis(MessageKind::GuardReply, guard_time_ns);
+            vec![BusMessage { jitter_ns, shape, ..request }, BusMessage { jitter_ns, ..reply }]
+        }
+    }
 }
 
 /// One transfer at a time for each node, at most one request in a cycle for each service frame that the bus allows;

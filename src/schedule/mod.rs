@@ -205,6 +205,7 @@ pub fn verify(config: &Config) -> Result<Vec<BusSchedule>, ScheduleError> {
 fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
     let bus = config.buses.get(index);
     let cycle = config.bus_cycle(index);
+    let cycles = bus.map_or(1, |bus| u64::from(bus.divider.max(1)));
     let bit_rate = bus.map_or(0, |bus| bus.bit_rate);
     let rates =
         BitRates { nominal: bit_rate, data: bus.and_then(|bus| bus.data_bit_rate).unwrap_or(bit_rate) };
@@ -215,7 +216,7 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
 
     let on_bus = config.axes.iter().filter(|axis| axis.bus == index);
     let feedback_delay_ns = on_bus.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
-    let slot = slot::worst_slot(&enabled, feedback_delay_ns, cycle, rates);
+    let slot = slot::worst_slot(&enabled, feedback_delay_ns, cycle, cycles, rates);
     let is_queue_empty_at_sync = slot.is_queue_empty_at_sync;
     let response_ns = |at: usize| {
         let (messages, place) = beside(&enabled, at);

@@ -8,7 +8,7 @@
 use serde::Serialize;
 
 use super::{BusSchedule, analyse_bus, command_phase};
-use crate::config::{Axis, Config, Feedback};
+use crate::config::{Axis, CommandFrames, Config, Feedback, PhaseChoice};
 
 /// One change that makes a bus fit without any other.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -33,6 +33,8 @@ pub enum Remedy {
     DriveHeartbeatsOff,
     /// No time of day.
     TimeOff,
+    /// Command frames that several axes share.
+    SharedCommandFrames,
     /// No answers to SYNC: the drives' answers to set-points are feedback enough, a cycle older.
     NoAnswersToSync,
     /// Less feedback.
@@ -85,6 +87,12 @@ fn analyse_at_own_phase(config: &Config, bus: usize) -> Option<BusSchedule> {
     Some(analyse_bus(&config, bus))
 }
 
+/// Whether a bus carries its traffic only if its axes share command frames.
+pub(super) fn needs_shared_frames(config: &Config, bus: usize, phase: PhaseChoice) -> bool {
+    let trial = Trial { config, bus, is_at_any_phase: phase == PhaseChoice::Any };
+    !trial.fits_with(|_| ()) && trial.shared_command_frames().is_some()
+}
+
 /// A configuration and the bus in it that does not fit.
 #[derive(Clone, Copy)]
 struct Trial<'a> {
@@ -100,6 +108,7 @@ impl Trial<'_> {
             self.sdo_while_disabled(),
             self.time_off(),
             self.drive_heartbeats_off(),
+            self.shared_command_frames(),
             self.no_answers_to_sync(),
             self.smaller_feedback(),
             self.master_heartbeat_off(),
@@ -150,6 +159,16 @@ impl Trial<'_> {
         let fits =
             || self.fits_with(|config| config.axes.iter_mut().for_each(|axis| axis.heartbeat_ns = None));
         (has_any && fits()).then_some(Remedy::DriveHeartbeatsOff)
+    }
+
+    fn shared_command_frames(self) -> Option<Remedy> {
+        let is_own = self.config.buses.get(self.bus)?.command_frames == CommandFrames::OnePerAxis;
+        let share = |config: &mut Config| {
+            if let Some(bus) = config.buses.get_mut(self.bus) {
+                bus.command_frames = CommandFrames::Shared;
+            }
+        };
+        (is_own && self.fits_with(share)).then_some(Remedy::SharedCommandFrames)
     }
 
     fn no_answers_to_sync(self) -> Option<Remedy> {

@@ -71,17 +71,24 @@ struct Background {
 }
 
 impl Background {
-    fn of(messages: &[&BusMessage], period_ns: u64, rates: BitRates) -> Self {
+    /// Of a slot that is so many cycles of the controller long.
+    fn of(messages: &[&BusMessage], period_ns: u64, cycles: u64, rates: BitRates) -> Self {
         let frames = |is_ours: bool| -> Vec<u64> {
             let of_sender = messages
                 .iter()
                 .filter(|message| message.kind.is_background() && message.kind.is_ours() == is_ours);
-            let mut frames: Vec<u64> = of_sender
-                .flat_map(|message| {
-                    let instances = (period_ns + message.jitter_ns).div_ceil(message.period_ns);
-                    (0..instances).map(|_| time(message, rates))
-                })
-                .collect();
+            let instances = |message: &BusMessage| {
+                let instances = (period_ns + message.jitter_ns).div_ceil(message.period_ns);
+                (0..instances).map(|_| time(message, rates)).collect::<Vec<u64>>()
+            };
+            let (guarding, others): (Vec<&BusMessage>, Vec<&BusMessage>) =
+                of_sender.partition(|message| message.kind.is_guarding());
+            // One request in each cycle of the controller; one more reply, which may belong to the slot before.
+            let guard_frames = usize::try_from(cycles).unwrap_or(usize::MAX) + usize::from(!is_ours);
+            let mut guard_times: Vec<u64> = guarding.into_iter().flat_map(instances).collect();
+            guard_times.sort_unstable_by(|a, b| b.cmp(a));
+            guard_times.truncate(guard_frames);
+            let mut frames: Vec<u64> = others.into_iter().flat_map(instances).chain(guard_times).collect();
             frames.sort_unstable_by(|a, b| b.cmp(a));
             frames
         };
@@ -119,11 +126,12 @@ impl Timeline {
     }
 }
 
-/// The worst slot, given the messages that are sent while the axes are enabled.
+/// The worst slot, given the messages that are sent while the axes are enabled. It is so many cycles of the controller long.
 pub(super) fn worst_slot(
     messages: &[&BusMessage],
     feedback_delay_ns: u64,
     cycle: Cycle,
+    cycles: u64,
     rates: BitRates,
 ) -> Slot {
     let times = |selects: &dyn Fn(&BusMessage) -> bool| -> Vec<u64> {
@@ -135,7 +143,7 @@ pub(super) fn worst_slot(
     let set_points_ns = total(MessageKind::SetPoint) + total(MessageKind::Answer);
     let emergency_ns =
         times(&|message| message.kind == MessageKind::Emergency).into_iter().max().unwrap_or(0);
-    let background = Background::of(messages, cycle.period_ns, rates);
+    let background = Background::of(messages, cycle.period_ns, cycles, rates);
 
     // Feedback that comes on events of the drives has precedence over set-points by its identifier.
     let asynchronous = times(&|message| message.kind == MessageKind::Feedback && message.is_asynchronous);

@@ -22,6 +22,8 @@ pub fn message_name(kind: MessageKind) -> &'static str {
         MessageKind::SdoResponse => "SDO answer",
         MessageKind::SdoRequest => "SDO request",
         MessageKind::DriveHeartbeat => "heartbeat",
+        MessageKind::GuardRequest => "guard request",
+        MessageKind::GuardReply => "guard reply",
         MessageKind::MasterHeartbeat => "master heartbeat",
         MessageKind::Time => "TIME",
     }
@@ -154,6 +156,9 @@ pub fn remedy(remedy: &Remedy) -> String {
         }
         Remedy::ServiceFrames { frames } => {
             format!("fewer service frames: service_frames_per_cycle = {frames}")
+        }
+        Remedy::SharedCommandFrames => {
+            "command frames that axes share: [[bus]] command_frames = \"shared\"".to_owned()
         }
         Remedy::NoAnswersToSync => {
             "no answers to SYNC, at the price of feedback that is a cycle older: answers_sync = false"

@@ -250,6 +250,11 @@ impl Network {
         self.watched.iter_mut().for_each(|watched| watched.deadline_ns = NEVER);
     }
 
+    /// Stops to wait for node guarding requests until the next one, as after a write of object 100C or 100D.
+    pub fn stop_life_guarding(&mut self) {
+        self.guard_deadline_ns = NEVER;
+    }
+
     /// Answers a node guarding request, if the node has objects 100C and 100D, and produces no heartbeat.
     pub fn guarded(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) -> Option<u8> {
         let guard_time_ms = dictionary.number_at(self.places.guard_time)? as Nanoseconds;

@@ -135,6 +135,7 @@ fn bus(number: usize) -> Bus {
         restart_ms: 100,
         service_frames_per_cycle: FRAMES_PER_STEP,
         sdo_while_enabled: false,
+        command_frames: takt::config::CommandFrames::OnePerAxis,
     }
 }
 

@@ -36,7 +36,7 @@ impl Wire {
     pub fn new(config: &Config) -> Self {
         let of_axis = |(number, axis): (usize, &takt::config::Axis)| {
             let bus = axis.bus;
-            ProcessData::of(axis).commands.into_iter().map(move |pdo| {
+            ProcessData::of(axis, config).commands.into_iter().map(move |pdo| {
                 let mut shift = 0;
                 let objects = pdo.objects.into_iter().map(|object| {
                     let begins = shift;

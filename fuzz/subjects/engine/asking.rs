@@ -39,7 +39,7 @@ pub fn request(config: &Config, now_ns: u64, input: &mut Input<'_>) -> Request {
 fn process_data(config: &Config, input: &mut Input<'_>) -> Request {
     let number = input.byte();
     let axis = &config.axes[usize::from(number) % config.axes.len()];
-    let mut data = ProcessData::of(axis);
+    let mut data = ProcessData::of(axis, config);
     let change = input.byte();
     let plans = if change & 8 == 0 { &mut data.commands } else { &mut data.feedback };
     match change % 8 {

@@ -36,11 +36,11 @@ pub struct ObedientDrive {
 }
 
 impl ObedientDrive {
-    pub fn new(axis: &'static Axis) -> Self {
+    pub fn new(axis: &'static Axis, config: &Config) -> Self {
         Self {
             axis,
             scale: axis.scale().expect("the example is sound"),
-            data: ProcessData::of(axis),
+            data: ProcessData::of(axis, config),
             state: DriveState::SwitchOnDisabled,
             is_silent: false,
             is_late: false,
@@ -215,5 +215,5 @@ impl ObedientDrive {
 
 /// The drives of a configuration.
 pub fn drives(config: &'static Config) -> Vec<ObedientDrive> {
-    config.axes.iter().map(ObedientDrive::new).collect()
+    config.axes.iter().map(|axis| ObedientDrive::new(axis, config)).collect()
 }

@@ -167,7 +167,8 @@ impl Axis {
     }
 
     /// The frames of this cycle's command; none while the position of the joint is not known.
-    pub fn frames(&self) -> impl Iterator<Item = Frame> {
+    /// Each with the number of axes whose parts it is to have.
+    pub fn frames(&self) -> impl Iterator<Item = (Frame, u8)> {
         let is_due = |command: &CommandPdo| {
             self.joint.is_known()
                 && match command.transmission {
@@ -176,6 +177,6 @@ impl Axis {
                 }
         };
         let due = self.parameters.commands.iter().filter(move |command| is_due(command));
-        due.map(|command| command.pdo.frame(&self.command))
+        due.map(|command| (command.pdo.frame(&self.command), command.axes))
     }
 }

@@ -220,7 +220,7 @@ impl Axis {
     /// What is wrong with the node, by its error control messages.
     #[inline]
     pub fn node_fault(&self) -> Option<NodeFault> {
-        self.node_monitor.fault(self.parameters.heartbeat_timeout_cycles)
+        self.node_monitor.fault(self.parameters.supervision.timeout_cycles())
     }
 
     /// Whether another node answers with the same node ID.

@@ -66,7 +66,7 @@ use torque_loop::TorqueLoop;
 pub use feedback::Jump;
 pub use parameters::{
     AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, ModeChanges, ModeCondition,
-    Pdo, SenderByte, TorqueLimits,
+    Pdo, SenderByte, Supervision, TorqueLimits,
 };
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
@@ -201,7 +201,9 @@ impl Axis {
     #[inline]
     pub fn watch(&mut self) {
         self.watch_stall();
-        self.node_monitor.pass();
+        if self.parameters.supervision.guard_cycles().is_none() {
+            self.node_monitor.pass();
+        }
         self.duplicate_node.pass();
         self.report.pass();
         if self.torque_loop.is_compliant() {
@@ -209,6 +211,11 @@ impl Axis {
         } else if self.feedback_age() == 0 {
             self.following.pass();
         }
+    }
+
+    /// Lets a slot pass in which the node has still to reply to node guarding.
+    pub fn note_unanswered_guarding(&mut self) {
+        self.node_monitor.pass();
     }
 
     /// Takes the power from the drive for good: it has left operation enabled by itself, or cannot be reached. It is not led

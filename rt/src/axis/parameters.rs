@@ -7,7 +7,7 @@ use crate::cia402_codec::Cia402Codec;
 use crate::control::{ControlLaw, GainError};
 use crate::frame::{Frame, FrameFormat, Id};
 use crate::guard::{AxisLimits, LimitError};
-use crate::pdo::{MAX_PDOS, Mapping, ProcessImage, TransmissionType};
+use crate::pdo::{MAX_NODE_AXES, MAX_PDOS, Mapping, ProcessImage, TransmissionType};
 use crate::source::Follow;
 use crate::units::Scale;
 
@@ -53,12 +53,15 @@ pub struct CommandPdo {
     pub pdo: Pdo,
     /// When.
     pub transmission: TransmissionType,
+    /// For how many axes its frame is: 1 as a rule. Where it is for several, the drive of each takes its own part and passes over that
+    /// of the others (dummy mapping, CiA 301, 7.4.7.1), and the frame leaves when each of them has its part in it.
+    pub axes: u8,
 }
 
 impl CommandPdo {
     /// One that is sent in every cycle of its bus.
     pub const fn every_cycle(pdo: Pdo) -> Self {
-        Self { pdo, transmission: TransmissionType::EveryCycle }
+        Self { pdo, transmission: TransmissionType::EveryCycle, axes: 1 }
     }
 }
 
@@ -162,6 +165,45 @@ impl ModeChanges {
     }
 }
 
+/// How it is seen that the node of an axis lives, beside its feedback (CiA 301, 7.2.8).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Supervision {
+    /// Its feedback alone shows it.
+    #[default]
+    Feedback,
+    /// The node sends heartbeats.
+    Heartbeat {
+        /// Slots without one that are allowed.
+        timeout_cycles: u32,
+    },
+    /// The controller asks the node for its state: node guarding.
+    Guarding {
+        /// Slots from one request to the next: the guard time.
+        guard_cycles: u32,
+        /// Slots without a reply that are allowed, from the first request without one on: the life time.
+        life_cycles: u32,
+    },
+}
+
+impl Supervision {
+    /// Slots without a sign of life that are allowed; `None` where none is expected.
+    pub const fn timeout_cycles(self) -> Option<u32> {
+        match self {
+            Self::Feedback => None,
+            Self::Heartbeat { timeout_cycles } => Some(timeout_cycles),
+            Self::Guarding { life_cycles, .. } => Some(life_cycles),
+        }
+    }
+
+    /// Slots from one request to the next, where the node is asked.
+    pub const fn guard_cycles(self) -> Option<u32> {
+        match self {
+            Self::Guarding { guard_cycles, .. } => Some(guard_cycles),
+            Self::Feedback | Self::Heartbeat { .. } => None,
+        }
+    }
+}
+
 /// Everything about an axis that does not change while it runs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AxisParameters {
@@ -169,6 +211,9 @@ pub struct AxisParameters {
     pub bus: u8,
     /// The node ID, 1 to 127.
     pub node: u8,
+    /// Its number among the axes of the node, 1 to 8: 1 where the node has one axis. The objects of axis n stand 0x800 · (n − 1) higher
+    /// than those of the first one.
+    pub node_axis: u8,
     /// What is sent, in order.
     pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
     /// What is expected each cycle of the bus.
@@ -198,8 +243,8 @@ pub struct AxisParameters {
     pub start_tolerance: f64,
     /// What is done with a stream that asks for more than the limits allow.
     pub follow: Follow,
-    /// Slots without a heartbeat of the node that are allowed; `None` where it sends none.
-    pub heartbeat_timeout_cycles: Option<u32>,
+    /// How it is seen that its node lives. Axes of one node have the same.
+    pub supervision: Supervision,
     /// Following error that is allowed at any time (rad or m).
     pub following_error_limit: f64,
     /// Cycles in a row that the following error may be larger.
@@ -218,6 +263,11 @@ pub enum AxisParametersError {
     NodeId {
         /// What it is.
         node: u8,
+    },
+    /// The number of the axis in its node is not one from 1 to 8.
+    NodeAxis {
+        /// What it is.
+        node_axis: u8,
     },
     /// There is no PDO in one of the directions.
     NoPdo,
@@ -253,6 +303,9 @@ impl core::fmt::Display for AxisParametersError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             Self::NodeId { node } => write!(f, "{node} is no node ID: those are 1 to 127"),
+            Self::NodeAxis { node_axis } => {
+                write!(f, "{node_axis} is no number of an axis in its node: those are 1 to 8")
+            }
             Self::NoPdo => f.write_str("there must be a PDO to the drive and one from it"),
             Self::Limit(error) => error.fmt(f),
             Self::Gain(error) => error.fmt(f),
@@ -278,6 +331,9 @@ impl AxisParameters {
     pub fn validate(&self) -> Result<(), AxisParametersError> {
         if !NODE_IDS.contains(&self.node) {
             return Err(AxisParametersError::NodeId { node: self.node });
+        }
+        if !(1..=MAX_NODE_AXES).contains(&self.node_axis) {
+            return Err(AxisParametersError::NodeAxis { node_axis: self.node_axis });
         }
         if self.commands.is_empty() || self.feedback.is_empty() {
             return Err(AxisParametersError::NoPdo);
@@ -320,6 +376,7 @@ pub(super) mod tests {
         AxisParameters {
             bus: 0,
             node: 5,
+            node_axis: 1,
             commands: [CommandPdo::every_cycle(command)].into_iter().collect(),
             feedback: [feedback].into_iter().collect(),
             feedback_since: FeedbackSince::Sync,
@@ -351,7 +408,7 @@ pub(super) mod tests {
             feed_forward: FeedForward::None,
             start_tolerance: 0.01,
             follow: Follow::Smooth,
-            heartbeat_timeout_cycles: None,
+            supervision: Supervision::Feedback,
             following_error_limit: 0.1,
             following_error_cycles: 10,
             missed_feedback_cycles: 3,
@@ -369,6 +426,12 @@ pub(super) mod tests {
         assert_eq!(parameters().validate(), Ok(()));
         for node in [0, 128, 129, 255] {
             assert_eq!(error_of(|axis| axis.node = node), AxisParametersError::NodeId { node });
+        }
+        for node_axis in [0, 9, 255] {
+            assert_eq!(
+                error_of(|axis| axis.node_axis = node_axis),
+                AxisParametersError::NodeAxis { node_axis }
+            );
         }
         assert_eq!(error_of(|axis| axis.feedback.clear()), AxisParametersError::NoPdo);
         let error = error_of(|axis| axis.limits.velocity = -1.0);

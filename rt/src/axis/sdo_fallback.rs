@@ -9,9 +9,23 @@ use crate::watch::{NmtState, nmt_command, node_state};
 /// Function codes of an SDO request and of its answer (CiA 301, 7.3.3).
 const SDO_REQUEST: u16 = 0x600;
 const SDO_ANSWER: u16 = 0x580;
-/// Download of two bytes to 6040:00 in one frame, and its confirmation (CiA 301, 7.2.4.3.3).
-const DOWNLOAD_CONTROLWORD: [u8; 4] = [0x2B, 0x40, 0x60, 0x00];
-const CONTROLWORD_DOWNLOADED: [u8; 4] = [0x60, 0x40, 0x60, 0x00];
+/// Download of two bytes in one frame, and its confirmation (CiA 301, 7.2.4.3.3).
+const DOWNLOAD: u8 = 0x2B;
+const DOWNLOADED: u8 = 0x60;
+
+/// A request to the controlword of one axis of a node, or the confirmation: command, index and sub-index.
+fn controlword_of(node_axis: u8, command: u8) -> [u8; 4] {
+    let object = CommandSlot::Controlword.object().of_node_axis(node_axis);
+    let [low, high] = object.index.to_le_bytes();
+    [command, low, high, object.subindex]
+}
+
+/// Where the controlword of an axis is.
+#[derive(Clone, Copy)]
+struct Address {
+    node: u8,
+    node_axis: u8,
+}
 
 /// The controlword that a drive is to have by SDO.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -62,7 +76,8 @@ impl SdoFallback {
     }
 
     /// The frame that is due, if one is. It is due again after so many slots, unless it is confirmed before.
-    fn frame(&mut self, node: u8, nmt_state: NmtState, repeat_slots: u32) -> Option<Frame> {
+    fn frame(&mut self, to: Address, nmt_state: NmtState, repeat_slots: u32) -> Option<Frame> {
+        let Address { node, node_axis } = to;
         let Self::Writing { word, wait_slots: wait_slots @ 0, is_woken } = self else { return None };
         // A stopped node has no SDO server.
         if nmt_state == NmtState::Stopped && !*is_woken {
@@ -71,20 +86,25 @@ impl SdoFallback {
         }
         *is_woken = false;
         *wait_slots = repeat_slots;
-        let [command, index_low, index_high, subindex] = DOWNLOAD_CONTROLWORD;
+        let [command, index_low, index_high, subindex] = controlword_of(node_axis, DOWNLOAD);
         let [low, high] = word.to_le_bytes();
         let request = [command, index_low, index_high, subindex, low, high, 0, 0];
         Some(Frame::of(Id::canopen(SDO_REQUEST, node), request))
     }
 
     /// Takes a frame that may be the confirmation.
-    fn receive(&mut self, node: u8, frame: &Frame) {
+    fn receive(&mut self, from: Address, frame: &Frame) {
         if let Self::Writing { word, .. } = *self
-            && frame.id() == Id::canopen(SDO_ANSWER, node)
-            && frame.payload().starts_with(&CONTROLWORD_DOWNLOADED)
+            && frame.id() == Id::canopen(SDO_ANSWER, from.node)
+            && frame.payload().starts_with(&controlword_of(from.node_axis, DOWNLOADED))
         {
             *self = Self::Confirmed { word };
         }
+    }
+
+    /// Whether the node may still be about to answer: so many slots are left until the controlword is written again.
+    fn is_asked(self, left_slots: u32) -> bool {
+        matches!(self, Self::Writing { wait_slots, .. } if wait_slots > left_slots)
     }
 
     /// Whether the drive has confirmed that its power is to be off.
@@ -129,7 +149,7 @@ impl Axis {
     /// The frame that is due to write that controlword, if one is. It is due again after so many slots, unless the drive
     /// confirms it before.
     pub fn service_frame(&mut self, repeat_slots: u32) -> Option<Frame> {
-        self.sdo_fallback.frame(self.parameters.node, self.node_monitor.nmt_state(), repeat_slots)
+        self.sdo_fallback.frame(self.sdo_address(), self.node_monitor.nmt_state(), repeat_slots)
     }
 
     /// The frame with that controlword, if it is due, for a drive that has no SDO.
@@ -143,7 +163,16 @@ impl Axis {
 
     /// Takes a frame that may confirm a controlword that was written by SDO.
     pub fn receive_service(&mut self, frame: &Frame) {
-        self.sdo_fallback.receive(self.parameters.node, frame);
+        self.sdo_fallback.receive(self.sdo_address(), frame);
+    }
+
+    /// Whether the node may still be about to answer such a frame, of which so many slots are left until it is sent again.
+    pub fn is_asked_by_service(&self, left_slots: u32) -> bool {
+        self.sdo_fallback.is_asked(left_slots)
+    }
+
+    fn sdo_address(&self) -> Address {
+        Address { node: self.parameters.node, node_axis: self.parameters.node_axis }
     }
 
     /// Whether the drive has torque, as far as it can be known: an SDO confirmation is newer than the last statusword.
@@ -164,10 +193,10 @@ impl Axis {
 mod tests {
     use super::*;
 
-    const NODE: u8 = 5;
+    const NODE: Address = Address { node: 5, node_axis: 1 };
 
     fn confirmation() -> Frame {
-        Frame::of(Id::canopen(SDO_ANSWER, NODE), [0x60, 0x40, 0x60, 0, 0, 0, 0, 0])
+        Frame::of(Id::canopen(SDO_ANSWER, NODE.node), [0x60, 0x40, 0x60, 0, 0, 0, 0, 0])
     }
 
     #[test]
@@ -189,6 +218,20 @@ mod tests {
         assert!(fallback.is_switched_off());
         fallback.pass(None);
         assert_eq!(fallback, SdoFallback::Unused);
+    }
+
+    #[test]
+    fn the_controlword_of_a_further_axis_of_a_node_is_another_object() {
+        let second = Address { node_axis: 2, ..NODE };
+        let mut fallback = SdoFallback::default();
+        fallback.pass(Some(0));
+        let frame = fallback.frame(second, NmtState::PreOperational, 2).unwrap();
+        assert_eq!(frame.payload()[..4], [0x2B, 0x40, 0x68, 0]);
+        fallback.receive(second, &confirmation());
+        assert!(!fallback.is_switched_off(), "that was the first axis");
+        let confirmation = Frame::of(Id::canopen(SDO_ANSWER, NODE.node), [0x60, 0x40, 0x68, 0, 0, 0, 0, 0]);
+        fallback.receive(second, &confirmation);
+        assert!(fallback.is_switched_off());
     }
 
     #[test]

@@ -1,11 +1,13 @@
-//! What leaves in a cycle: SYNC, controlwords and set-points, the heartbeat, TIME, service frames.
+//! What leaves in a cycle: SYNC, controlwords and set-points, the heartbeat, TIME, a request of node guarding, service frames.
 //!
 //! One rule decides, in one place ([`Engine::may_leave`]): after its deadline, or behind a backlog, nothing leaves except what
 //! stops the drives.
 
 use super::group::{Commands, Group};
+use super::heartbeat::HeartbeatProducer;
 use super::parameters::CanopenNetwork;
 use super::shared::Shared;
+use super::shared_frames::SharedFrames;
 use super::state::{GroupState, PowerRemoval};
 use super::{Deadline, Engine, SendBatch, has_cycle};
 use crate::axis::{Axis, FeedbackSince};
@@ -86,6 +88,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 group.encode_set_points(bus, axes, &mut self.shared, batch);
             }
             self.encode_heartbeat_and_time(bus, batch);
+            if let Some(request) = self.shared.guards.take_request(bus) {
+                self.push(request, batch);
+            }
         }
         self.encode_services(bus, deadline, host, batch);
     }
@@ -152,6 +157,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             return;
         }
         self.unsent.clear(bus);
+        let mut shared_frames = SharedFrames::default();
         for place in shared.places_on(bus).iter() {
             let own_place = place.checked_sub(self.places.start);
             let Some(axis) = own_place.and_then(|place| axes.get_mut(place)) else { continue };
@@ -161,10 +167,16 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             if self.has_other_modes {
                 axis.command_other_modes();
             }
-            for frame in axis.frames() {
-                shared.dropped += u64::from(batch.try_push(frame).is_err());
+            for (frame, axes) in axis.frames() {
+                let is_taken = if axes == 1 {
+                    batch.try_push(frame).is_ok()
+                } else {
+                    shared_frames.add(&frame, axes, batch)
+                };
+                shared.dropped += u64::from(!is_taken);
             }
         }
+        shared_frames.leave_out_incomplete(batch);
     }
 
     /// Where a drive is led in this cycle.
@@ -193,14 +205,15 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     }
 
     /// Whether a drive may be led to operation enabled, or is there already. One that has been told to switch on has watched the
-    /// heartbeat before: what another group on its bus begins does not concern it.
+    /// heartbeat before, or has replied to node guarding: what another group on its bus begins does not concern it.
     fn may_switch_on(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> bool {
-        let watches_heartbeat = || {
-            let bus = axis.parameters().bus.into();
-            shared.heartbeat.as_ref().is_none_or(|heartbeat| heartbeat.allows_enabling(bus))
+        let watches_controller = || {
+            let (bus, node) = (axis.parameters().bus, axis.parameters().node);
+            let allows = |heartbeat: &HeartbeatProducer<BUSES>| heartbeat.allows_enabling(bus.into());
+            shared.heartbeat.as_ref().is_none_or(allows) && shared.guards.allows_enabling(bus, node)
         };
         axis.is_enabled()
-            || axis.is_on_joint(shared.period_s) && (axis.may_be_switching_on() || watches_heartbeat())
+            || axis.is_on_joint(shared.period_s) && (axis.may_be_switching_on() || watches_controller())
     }
 
     /// The controlword of a fault reset, for the drives that are at fault. Bit 7 is low first, so that what follows is an edge

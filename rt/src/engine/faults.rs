@@ -345,7 +345,7 @@ impl Expectation {
             return Some(Fault::DriveFault { error_code: axis.error_code() });
         }
         if let Some(fault) = axis.node_fault() {
-            let limit = axis.parameters().heartbeat_timeout_cycles.unwrap_or(0);
+            let limit = axis.parameters().supervision.timeout_cycles().unwrap_or(0);
             return Some(match fault {
                 NodeFault::BootUp => Fault::UnexpectedBootUp,
                 NodeFault::NotOperational { state } => Fault::NodeNotOperational { state },

@@ -24,6 +24,7 @@ mod executing;
 mod faults;
 mod group;
 mod group_requests;
+mod guarding;
 mod heartbeat;
 mod in_loop;
 mod outbox;
@@ -33,6 +34,7 @@ mod requests;
 mod sdo_fallback;
 mod sense;
 mod shared;
+mod shared_frames;
 mod slots;
 mod state;
 mod step;
@@ -129,6 +131,7 @@ pub enum Deadline {
 /// let axis = AxisParameters {
 ///     bus: 0,
 ///     node: 1,
+///     node_axis: 1,
 ///     commands: [CommandPdo::every_cycle(pdo(0x200, commands))].into_iter().collect(),
 ///     feedback: [pdo(0x180, feedback)].into_iter().collect(),
 ///     feedback_since: FeedbackSince::Sync,
@@ -160,7 +163,7 @@ pub enum Deadline {
 ///     feed_forward: FeedForward::None,
 ///     start_tolerance: 0.02,
 ///     follow: Follow::Smooth,
-///     heartbeat_timeout_cycles: None,
+///     supervision: Supervision::Feedback,
 ///     following_error_limit: 0.1,
 ///     following_error_cycles: 50,
 ///     missed_feedback_cycles: 5,

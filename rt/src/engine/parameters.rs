@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::SEND_BATCH;
-use crate::axis::{Axis, AxisParameters, AxisParametersError, FeedbackSince};
+use crate::axis::{Axis, AxisParameters, AxisParametersError, FeedbackSince, Supervision};
 use crate::bit_set::BitSet;
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::{FrameFormat, Id};
@@ -110,7 +110,7 @@ pub enum SetUpError {
         /// The reason.
         error: AxisParametersError,
     },
-    /// An axis waits for SYNC, or for a heartbeat of its node, on a bus that is no CANopen network.
+    /// An axis waits for SYNC, or for a heartbeat of its node or its replies to node guarding, on a bus that is no CANopen network.
     NotCanopen {
         /// The axis.
         axis: usize,
@@ -120,9 +120,23 @@ pub enum SetUpError {
         /// The node ID.
         node: u8,
     },
-    /// Two nodes have one node ID: two axes of a bus, or an axis and the controller.
+    /// Two nodes have one node ID: an axis and the controller, or two axes of a bus that have the same number in their node.
     DuplicateNodeId {
         /// The axis that came second, or that has the node ID of the controller.
+        axis: usize,
+        /// The node ID.
+        node: u8,
+    },
+    /// A command frame for several axes is not alike for all of them, or they are not of one group on one bus.
+    SharedCommand {
+        /// One of them.
+        axis: usize,
+        /// The identifier.
+        id: Id,
+    },
+    /// Axes of one node are to be supervised in different ways.
+    NodeSupervision {
+        /// One of them.
         axis: usize,
         /// The node ID.
         node: u8,
@@ -183,6 +197,8 @@ pub enum CycleCount {
     Heartbeat,
     /// Until the drives stop for want of a heartbeat.
     HeartbeatTimeout,
+    /// From one request of node guarding to the next.
+    Guard,
     /// From one TIME message to the next.
     Time,
     /// Until every drive must be enabled.
@@ -216,6 +232,15 @@ impl core::fmt::Display for SetUpError {
             Self::DuplicateNodeId { axis, node } => {
                 write!(f, "axis {axis}: another node has its node ID, {node}")
             }
+            Self::SharedCommand { axis, id } => {
+                write!(
+                    f,
+                    "axis {axis}: the command {id:?} cannot be shared with the other axes that it is for"
+                )
+            }
+            Self::NodeSupervision { axis, node } => {
+                write!(f, "axis {axis}: another axis of node {node} is supervised in another way")
+            }
             Self::EmptyGroup { group } => write!(f, "group {group} has no axis"),
             Self::UnknownGroupAxis { group, axis } => {
                 write!(f, "group {group} names axis {axis}, which does not exist")
@@ -235,8 +260,8 @@ impl core::fmt::Display for SetUpError {
 
 impl core::error::Error for SetUpError {}
 
-/// Frames of a cycle beside set-points: the heartbeat, TIME, and one service frame.
-pub(super) const OTHER_FRAMES: usize = 3;
+/// Frames of a cycle beside set-points: the heartbeat, TIME, a request of node guarding, and one service frame.
+pub(super) const OTHER_FRAMES: usize = 4;
 
 impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
     /// The longest period of the cycle.
@@ -335,6 +360,10 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         let counts = [
             (CycleCount::Heartbeat, heartbeat(|heartbeat| heartbeat.cycles)),
             (CycleCount::HeartbeatTimeout, heartbeat(|heartbeat| heartbeat.timeout_cycles)),
+            (
+                CycleCount::Guard,
+                self.axes.iter().filter_map(|axis| axis.supervision.guard_cycles()).min().unwrap_or(1),
+            ),
             (CycleCount::Time, self.time_cycles.unwrap_or(1)),
             (CycleCount::EnableTimeout, self.enable_timeout_cycles),
             (CycleCount::NotTransmitted, self.not_transmitted_cycles),
@@ -356,12 +385,18 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         }
         own.validate().map_err(|error| SetUpError::Axis { axis, error })?;
         let is_asked_by_sync = own.feedback_since == FeedbackSince::Sync;
-        if (is_asked_by_sync || own.heartbeat_timeout_cycles.is_some()) && !self.is_canopen(own.bus) {
+        if (is_asked_by_sync || own.supervision != Supervision::Feedback) && !self.is_canopen(own.bus) {
             return Err(SetUpError::NotCanopen { axis });
         }
         let mut before = self.axes.iter().take(axis);
-        if before.any(|other| (other.bus, other.node) == (own.bus, own.node)) {
+        let place = |axis: &AxisParameters| (axis.bus, axis.node, axis.node_axis);
+        if before.any(|other| place(other) == place(own)) {
             return Err(SetUpError::DuplicateNodeId { axis, node: own.node });
+        }
+        self.validate_shared_commands(axis, own)?;
+        let mut of_node = self.axes.iter().filter(|other| (other.bus, other.node) == (own.bus, own.node));
+        if of_node.any(|other| other.supervision != own.supervision) {
+            return Err(SetUpError::NodeSupervision { axis, node: own.node });
         }
         Ok(())
     }
@@ -400,6 +435,7 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
     parameters: &EngineParameters<AXES, BUSES>,
 ) -> Result<[Dispatch; BUSES], SetUpError> {
     let mut dispatch: [Dispatch; BUSES] = core::array::from_fn(|_| Dispatch::default());
+    let mut nodes: ArrayVec<(u8, u8), AXES> = ArrayVec::new();
     for (place, number) in (0..).zip(parameters.axes_of_groups().flatten()) {
         let axis = usize::from(number);
         let own = parameters.axes.get(axis).ok_or(SetUpError::NoAxis)?;
@@ -407,7 +443,9 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
         let taken = |taken: IdTaken| SetUpError::IdTaken { axis, id: taken.id };
         let table = table.ok_or(SetUpError::UnknownBus { axis })?;
         enter_process_data(table, place, own).map_err(taken)?;
-        if parameters.is_canopen(own.bus) {
+        if parameters.is_canopen(own.bus) && !nodes.contains(&(own.bus, own.node)) {
+            // What a node sends beside process data reaches each of its axes, by the entry of the first of them.
+            nodes.push((own.bus, own.node));
             enter_services(table, place, own).map_err(taken)?;
         }
     }

@@ -18,15 +18,22 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub(super) fn set_process_data(&mut self, data: &AxisProcessData) -> Result<(), Rejection> {
         self.require_phase_of(data.axis, &[Phase::Passive])?;
         let place = self.place_of(data.axis)?;
-        let bus = usize::from(self.axis_mut(data.axis)?.parameters().bus);
-        self.exchange(data, place, bus).map_err(|reason| reason.of_axis(data.axis))
+        let parameters = self.axis_mut(data.axis)?.parameters();
+        let (bus, node_axis) = (usize::from(parameters.bus), parameters.node_axis);
+        self.exchange(data, place, bus, node_axis).map_err(|reason| reason.of_axis(data.axis))
     }
 
-    fn exchange(&mut self, data: &AxisProcessData, place: usize, bus: usize) -> Result<(), RejectReason> {
-        let commands = data.commands.iter().flatten().map(command);
+    fn exchange(
+        &mut self,
+        data: &AxisProcessData,
+        place: usize,
+        bus: usize,
+        node_axis: u8,
+    ) -> Result<(), RejectReason> {
+        let commands = data.commands.iter().flatten().map(|pdo| command(pdo, node_axis));
         let commands: ArrayVec<CommandPdo, MAX_PDOS> =
             commands.collect::<Result<_, _>>().map_err(unmapped)?;
-        let feedback = data.feedback.iter().flatten().map(feedback);
+        let feedback = data.feedback.iter().flatten().map(|pdo| feedback(pdo, node_axis));
         let feedback: ArrayVec<Pdo, MAX_PDOS> = feedback.collect::<Result<_, _>>().map_err(unmapped)?;
         let frames = self.frames_beside(place, bus) + commands.len();
         if frames > SEND_BATCH {
@@ -36,6 +43,10 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let (Some(table), Some(axis)) = (self.dispatch.get_mut(bus), self.axes.get_mut(place)) else {
             return Err(RejectReason::NoProcessData);
         };
+        // The part of the others would be missing in a frame that they share.
+        if let Some(shared) = axis.parameters().commands.iter().find(|command| command.axes > 1) {
+            return Err(RejectReason::IdTaken { id: shared.pdo.id });
+        }
         if commands.is_empty() || feedback.is_empty() {
             return Err(RejectReason::NoProcessData);
         }
@@ -79,15 +90,16 @@ fn taken(IdTaken { id }: IdTaken) -> RejectReason {
     RejectReason::IdTaken { id }
 }
 
-fn objects(pdo: &MappedPdo) -> ArrayVec<MappedObject, MAX_OBJECTS> {
-    pdo.objects.iter().flatten().copied().collect()
+/// The objects of an axis by the numbers that those of the first axis of a node have.
+fn objects(pdo: &MappedPdo, node_axis: u8) -> ArrayVec<MappedObject, MAX_OBJECTS> {
+    pdo.objects.iter().flatten().map(|object| object.as_of_first_axis(node_axis)).collect()
 }
 
-fn command(pdo: &MappedPdo) -> Result<CommandPdo, MappingError> {
-    let mapping = Mapping::commands(&objects(pdo))?;
-    Ok(CommandPdo { pdo: Pdo::classic(pdo.id, mapping), transmission: pdo.transmission })
+fn command(pdo: &MappedPdo, node_axis: u8) -> Result<CommandPdo, MappingError> {
+    let mapping = Mapping::commands(&objects(pdo, node_axis))?;
+    Ok(CommandPdo { pdo: Pdo::classic(pdo.id, mapping), transmission: pdo.transmission, axes: 1 })
 }
 
-fn feedback(pdo: &MappedPdo) -> Result<Pdo, MappingError> {
-    Ok(Pdo::classic(pdo.id, Mapping::feedback(&objects(pdo))?))
+fn feedback(pdo: &MappedPdo, node_axis: u8) -> Result<Pdo, MappingError> {
+    Ok(Pdo::classic(pdo.id, Mapping::feedback(&objects(pdo, node_axis))?))
 }

@@ -61,6 +61,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Request::Sync(is_on) => {
                 if *is_on && !self.shared.requested.sync {
                     self.axes.iter_mut().for_each(Axis::begin_sync);
+                    self.shared.guards.begin();
                 }
                 self.shared.requested.sync = *is_on;
             }

@@ -65,11 +65,28 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let turns = 2 * self.axes.len() as u32;
         let repeat_slots =
             u32::try_from(ANSWER_NS.div_ceil(self.shared.period_ns)).unwrap_or(u32::MAX).max(turns);
-        let is_canopen = self.shared.is_canopen(bus);
-        self.axes_of(bus).find_map(|axis| match is_canopen {
-            true => axis.service_frame(repeat_slots),
-            false => axis.stop_frame(repeat_slots),
-        })
+        if !self.shared.is_canopen(bus) {
+            return self.axes_of(bus).find_map(|axis| axis.stop_frame(repeat_slots));
+        }
+        for place in self.shared.places_on(bus).iter() {
+            // The axes of a node have one SDO server, which answers one of them before it takes a request for the next.
+            if self.is_node_asked(place, repeat_slots / 2) {
+                continue;
+            }
+            let frame = self.axes.get_mut(place).and_then(|axis| axis.service_frame(repeat_slots));
+            if frame.is_some() {
+                return frame;
+            }
+        }
+        None
+    }
+
+    /// Whether another axis of the node at this place has been asked and may still be about to answer.
+    fn is_node_asked(&self, place: usize, left_slots: u32) -> bool {
+        let node = |axis: &Axis| (axis.parameters().bus, axis.parameters().node);
+        let own = self.axes.get(place).map(node);
+        let mut others = self.axes.iter().enumerate().filter(|(other, _)| *other != place);
+        others.any(|(_, other)| Some(node(other)) == own && other.is_asked_by_service(left_slots))
     }
 
     /// Takes a frame that may be a drive's answer.

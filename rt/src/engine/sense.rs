@@ -45,9 +45,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Destination::Feedback { .. } | Destination::Unused => {}
             Destination::Emergency { axis: place } => self.receive_emergency(place.into(), received),
             Destination::ErrorControl { axis: place } => {
-                let state = received.frame.payload().first().copied();
-                if let (Some(axis), Some(state)) = (self.axes.get_mut(usize::from(place)), state) {
-                    axis.receive_error_control(state);
+                if let Some(message) = received.frame.payload().first() {
+                    self.receive_error_control(place.into(), *message);
                 }
             }
             Destination::Foreign => {
@@ -58,19 +57,34 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
     }
 
+    fn receive_error_control(&mut self, place: usize, message: u8) {
+        let Some(axis) = self.axes.get_mut(place) else { return };
+        let (bus, node) = (axis.parameters().bus, axis.parameters().node);
+        if self.shared.guards.accepts(bus, node, message) {
+            self.axes_of_node(bus, node).for_each(|axis| axis.receive_error_control(message));
+        }
+    }
+
     fn receive_emergency(&mut self, place: usize, received: &Received) {
         let [low, high, register, manufacturer @ ..] = received.frame.first_word().to_le_bytes();
         let code = u16::from_le_bytes([low, high]);
-        let group = group_at(&self.groups, place);
-        let Some(axis) = self.axes.get_mut(place) else { return };
-        axis.receive_emergency(code);
-        let kind = EventKind::Emergency { axis: axis.number(), code, register, manufacturer };
-        self.shared.events.push(Event {
-            slot: self.shared.present_slot(),
-            at_ns: received.at_ns,
-            group,
-            kind,
-        });
+        let node = |axis: &Axis| (axis.parameters().bus, axis.parameters().node);
+        let Some(sender) = self.axes.get(place).map(node) else { return };
+        for (place, axis) in self.axes.iter_mut().enumerate().filter(|(_, axis)| node(axis) == sender) {
+            axis.receive_emergency(code);
+            let kind = EventKind::Emergency { axis: axis.number(), code, register, manufacturer };
+            self.shared.events.push(Event {
+                slot: self.shared.present_slot(),
+                at_ns: received.at_ns,
+                group: group_at(&self.groups, place),
+                kind,
+            });
+        }
+    }
+
+    /// The axes of a node.
+    fn axes_of_node(&mut self, bus: u8, node: u8) -> impl Iterator<Item = &mut Axis> {
+        self.axes_of(bus.into()).filter(move |axis| axis.parameters().node == node)
     }
 
     /// Takes what another master has told the nodes of a bus.
@@ -107,6 +121,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if let Some(heartbeat) = &mut self.shared.heartbeat {
             heartbeat.pass(elapsed);
         }
+        self.shared.guards.pass(elapsed);
         if let Some(time) = &mut self.shared.time {
             time.pass(elapsed, input.now_ns);
         }
@@ -142,6 +157,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
             axis.watch();
         }
+        self.watch_guarded_nodes();
     }
 }
 

@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::backlog::Backlog;
+use super::guarding::NodeGuards;
 use super::heartbeat::HeartbeatProducer;
 use super::outbox::Outbox;
 use super::parameters::{BusParameters, EngineParameters};
@@ -47,6 +48,8 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     /// The bus and the identifier of a frame that only this controller may send.
     pub(super) foreign_frame: Option<(u8, Id)>,
     pub(super) heartbeat: Option<HeartbeatProducer<BUSES>>,
+    /// The nodes that are asked for their state.
+    pub(super) guards: NodeGuards<AXES>,
     pub(super) time: Option<TimeProducer>,
 
     /// What the callbacks want of the axes, by their numbers. It counts in the cycle in which a callback was called.
@@ -93,6 +96,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
                 places.insert(place);
             }
         }
+        let guards = NodeGuards::new(&parameters);
         Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
@@ -110,6 +114,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             stopped_by_sdo: BitSet::default(),
             foreign_frame: None,
             heartbeat: parameters.heartbeat.map(heartbeat),
+            guards,
             time: parameters.time_cycles.map(TimeProducer::new),
             callback_targets: [None; AXES],
             events: Outbox::default(),

@@ -33,6 +33,7 @@ pub fn whole(check: &Check, config: &Config) -> String {
         let _ = write!(text, "\nTorque that streams may ask for\n{table}");
     }
     let _ = write!(text, "\nUnits\n{}", units_table(&axes));
+    let _ = write!(text, "\nSupervision, beside feedback in every cycle\n{}", supervision_table(&axes));
     let _ = write!(
         text,
         "\nIf the controller is gone at full speed (kill -9, a broken cable)\n{}",
@@ -160,7 +161,11 @@ fn limits_table(axes: &[&[AxisCheck]]) -> Table {
         table.row([
             counted_span(group.iter().map(|axis| axis.name.as_str())),
             span(group.iter().map(|axis| axis.bus.as_str())),
-            if lowest == highest { lowest.to_string() } else { format!("{lowest} to {highest}") },
+            match axis.node_axis {
+                1 if lowest == highest => lowest.to_string(),
+                1 => format!("{lowest} to {highest}"),
+                number => format!("{lowest}, axis {number}"),
+            },
             axis.mode.to_owned(),
             axis.unit().to_owned(),
             format!("{:.4}", axis.position_min),
@@ -230,6 +235,27 @@ fn units_table(axes: &[&[AxisCheck]]) -> Table {
             format!("{:.3} µ{}", axis.resolution * 1e6, axis.unit()),
             format!("{:.1}", axis.counts_per_cycle),
             format!("{lowest} to {highest}"),
+        ]);
+    }
+    table
+}
+
+fn supervision_table(axes: &[&[AxisCheck]]) -> Table {
+    let mut table = Table::new([
+        "axis",
+        "the controller sees the drive by",
+        ">stops after",
+        "the drive sees the controller by",
+        ">stops after",
+    ]);
+    for (group, axis) in axes.iter().filter_map(|group| Some((group, group.first()?))) {
+        let supervision = &axis.supervision;
+        table.row([
+            counted_span(group.iter().map(|axis| axis.name.as_str())),
+            supervision.drive.words(time),
+            time(supervision.drive_lost_after_ns),
+            supervision.controller.map_or("NOTHING".to_owned(), |sign| sign.words(time)),
+            supervision.controller_lost_after_ns.map_or("never".to_owned(), time),
         ]);
     }
     table

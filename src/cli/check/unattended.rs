@@ -14,17 +14,20 @@ pub enum Unattended {
     },
     /// It ends its move by itself.
     EndsItsMove,
-    /// It goes on until the drive misses the heartbeat, and then brakes.
+    /// It goes on until the drive misses the heartbeat or the requests of node guarding, and then brakes.
     GoesOn {
-        /// The time until the drive misses the heartbeat.
+        /// The time until the drive misses them.
         timeout_ns: u64,
         /// The time until the joint is at rest.
         time_ns: u64,
         /// The travel until the joint is at rest, from full speed: rad (m).
         travel: f64,
     },
-    /// It goes on, and no heartbeat stops it.
-    GoesOnForEver,
+    /// It goes on, and nothing stops it.
+    GoesOnForEver {
+        /// Why.
+        because: &'static str,
+    },
 }
 
 impl Unattended {
@@ -42,7 +45,7 @@ impl Unattended {
         match self {
             Self::EndsItsMove => 0.0,
             Self::HoldsLastSetPoint { travel } | Self::GoesOn { travel, .. } => *travel,
-            Self::GoesOnForEver => f64::INFINITY,
+            Self::GoesOnForEver { .. } => f64::INFINITY,
         }
     }
 
@@ -54,9 +57,16 @@ impl Unattended {
                 Self::HoldsLastSetPoint { travel: axis.following_error.limit + limits.velocity * cycle_s }
             }
             Control::ProfilePosition => Self::EndsItsMove,
-            _ if master.heartbeat_ns.is_none() => Self::GoesOnForEver,
             control => {
-                let timeout_s = master.heartbeat_timeout_ns as f64 / 1e9;
+                let Some(timeout_ns) = axis.controller_timeout_ns(master) else {
+                    return Self::GoesOnForEver {
+                        because: match master.heartbeat_ns {
+                            None => "[master] heartbeat is off",
+                            Some(_) => "the drive has neither a consumer heartbeat (1016) nor node guarding",
+                        },
+                    };
+                };
+                let timeout_s = timeout_ns as f64 / 1e9;
                 // A torque goes on to accelerate the joint; a speed is kept.
                 let acceleration = match control {
                     Control::Torque { .. } | Control::ProfileTorque => limits.acceleration,
@@ -66,7 +76,7 @@ impl Unattended {
                 let braking_s = speed / limits.deceleration;
                 let until_braking = 0.5 * (limits.velocity + speed) * timeout_s;
                 Self::GoesOn {
-                    timeout_ns: master.heartbeat_timeout_ns,
+                    timeout_ns,
                     time_ns: ((timeout_s + braking_s) * 1e9).round() as u64,
                     travel: until_braking + 0.5 * speed * braking_s,
                 }
@@ -98,7 +108,7 @@ impl Unattended {
                 milliseconds(*time_ns),
                 distance(*travel)
             ),
-            Self::GoesOnForEver => "goes on FOR EVER: [master] heartbeat is off".to_owned(),
+            Self::GoesOnForEver { because } => format!("goes on FOR EVER: {because}"),
         }
     }
 }

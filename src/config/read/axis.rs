@@ -13,7 +13,7 @@ use super::section::Section;
 use super::travel::{counting, travel};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
-use crate::config::drive_family::{ConfiguredFamily, DriveFacts, FamilyKeys};
+use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use crate::config::model::{
     Axis, FeedForward, Feedback, Follow, Identity, Interface, Joint, Limits, PdoMapping, PowerUpState,
     SimulatedJoint, Travel,
@@ -34,6 +34,7 @@ pub struct ReadAxis {
     /// `None` when something about it is wrong.
     pub axis: Option<Axis>,
     place: Option<(usize, u8)>,
+    drive: Option<DriveFamily>,
     header: Range<usize>,
 }
 
@@ -100,17 +101,17 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     });
     let bus =
         section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, machine.buses));
-    let node = section.require_own("node", "its node ID, 1 to 127").and_then(|entry| {
-        let node = node(&entry)?;
-        check_node(&entry, node, bus, machine, earlier);
-        Some(node)
-    });
+    let node_entry = section.require_own("node", "its node ID, 1 to 127");
+    let node = node_entry.as_ref().and_then(node);
     let families: Vec<_> = machine.families.iter().map(|family| (family.word(), *family)).collect();
     let family = section
         .require("drive", "the family of the drive: drive = \"erob-canopen\"")
         .and_then(|entry| entry.choice(&families));
     let family_drive = family.and_then(|family| family.read(&mut FamilyKeys::of(&mut section)));
     let drive = family_drive.as_deref();
+    if let Some((entry, node)) = node_entry.as_ref().zip(node) {
+        check_node(entry, node, drive, bus, machine, earlier);
+    }
     if let Some((drive, bus)) = drive.zip(machine.bus(bus))
         && let Some(spot) = &bus.bit_rate_spot
     {
@@ -213,7 +214,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         })
     };
     let axis = build();
-    ReadAxis { name, quantities: q, limits, axis, place, header }
+    ReadAxis { name, quantities: q, limits, axis, place, drive: family_drive, header }
 }
 
 fn bus_index(entry: &Entry<'_>, buses: &[ReadBus<'_>]) -> Option<usize> {
@@ -226,11 +227,22 @@ fn bus_index(entry: &Entry<'_>, buses: &[ReadBus<'_>]) -> Option<usize> {
     found
 }
 
-fn check_node(entry: &Entry<'_>, node: u8, bus: Option<usize>, machine: &Machine<'_>, earlier: &[ReadAxis]) {
+fn check_node(
+    entry: &Entry<'_>,
+    node: u8,
+    drive: Option<&DriveFacts>,
+    bus: Option<usize>,
+    machine: &Machine<'_>,
+    earlier: &[ReadAxis],
+) {
     let Some(bus) = bus else { return };
     let bus_name = machine.bus(Some(bus)).and_then(|bus| bus.name.as_deref()).unwrap_or_default();
     let kind = rules::axis::duplicate_node(bus_name, node);
-    if let Some(first) = earlier.iter().find(|axis| axis.place == Some((bus, node))) {
+    let is_other = |axis: &&ReadAxis| {
+        let both = axis.drive.as_deref().zip(drive);
+        !both.is_some_and(|(first, second)| rules::axis::are_of_one_node(first, second))
+    };
+    if let Some(first) = earlier.iter().filter(|axis| axis.place == Some((bus, node))).find(is_other) {
         entry.spot.report_against(kind, &first.header);
     } else if node == machine.master_node {
         entry.report(kind);

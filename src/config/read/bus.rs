@@ -8,7 +8,7 @@ use super::entry::Entry;
 use super::machine::boolean;
 use super::section::Section;
 use crate::config::defaults;
-use crate::config::model::{Bus, Interface};
+use crate::config::model::{Bus, CommandFrames, Interface};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -23,6 +23,8 @@ pub struct ReadBus<'a> {
     pub divider: Option<u32>,
     /// Where the bit rate is, if it is given.
     pub bit_rate_spot: Option<Spot<'a>>,
+    /// Whether the schedule decides if axes share command frames.
+    pub has_automatic_frames: bool,
     /// `None` when something about it is wrong.
     pub bus: Option<Bus>,
     /// Where the section begins.
@@ -72,6 +74,12 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> 
     let service_frames =
         section.get("service_frames_per_cycle").and_then(|entry| entry.integer(ranges::SERVICE_FRAMES));
     let sdo_while_enabled = boolean(&mut section, "sdo_while_enabled", defaults::SDO_WHILE_ENABLED);
+    let choices = [
+        ("auto", None),
+        ("one-per-axis", Some(CommandFrames::OnePerAxis)),
+        ("shared", Some(CommandFrames::Shared)),
+    ];
+    let command_frames = section.get("command_frames").and_then(|entry| entry.choice(&choices)).flatten();
     section.finish();
     let bus = name.zip(interface).map(|(name, interface)| Bus {
         name: name.to_owned(),
@@ -84,12 +92,14 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> 
             .and_then(|frames| usize::try_from(frames).ok())
             .unwrap_or(defaults::SERVICE_FRAMES_PER_CYCLE),
         sdo_while_enabled,
+        command_frames: command_frames.unwrap_or_default(),
     });
     ReadBus {
         name: name.map(str::to_owned),
         bit_rate,
         divider,
         bit_rate_spot: bit_rate_entry.map(|entry| entry.spot),
+        has_automatic_frames: command_frames.is_none(),
         bus,
         spot,
         header,

@@ -19,16 +19,28 @@ use toml::de::DeTable;
 
 use super::drive_family::ConfiguredFamily;
 use super::error::{ConfigError, Location, Problem};
-use super::model::Config;
+use super::model::{CommandFrames, Config};
 use super::problem_kind::ProblemKind;
 use super::spot::Problems;
 use section::Section;
+
+/// Which command phases count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PhaseChoice {
+    /// That of the configuration.
+    Given,
+    /// Any.
+    Any,
+}
 
 /// What the reader needs to know that is not a matter of reading.
 pub(crate) struct Knowledge<'a> {
     /// Finds what `command_phase = "auto"` stands for in a configuration that is complete otherwise, by an analysis of the buses.
     /// The error says in words why there is no such phase.
     pub command_phase: fn(&Config) -> Result<u64, String>,
+    /// Whether the bus with this index carries its traffic only if axes share command frames; with the command phase of the
+    /// configuration, or with any.
+    pub needs_shared_frames: fn(&Config, usize, PhaseChoice) -> bool,
     /// The families that a drive may be of.
     pub families: &'a [&'static dyn ConfiguredFamily],
 }
@@ -100,6 +112,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowl
     let program = program::program(root.section("program"), &axes, &groups);
     root.finish();
 
+    let automatic_frames: Vec<bool> = buses.iter().map(|bus| bus.has_automatic_frames).collect();
     let axes: Option<Vec<_>> = axes.into_iter().map(|axis| axis.axis).collect();
     let master = master.complete(axes.as_deref().unwrap_or_default(), cycle.period_ns);
     let mut config = Config {
@@ -118,6 +131,16 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowl
         simulation,
     };
     // Once everything else that counts is known.
+    let phase = if automatic_phase.is_some() { PhaseChoice::Any } else { PhaseChoice::Given };
+    for bus in (0..config.buses.len()).filter(|_| problems.is_empty()) {
+        let is_automatic = automatic_frames.get(bus).copied().unwrap_or_default();
+        if is_automatic
+            && (knowledge.needs_shared_frames)(&config, bus, phase)
+            && let Some(bus) = config.buses.get_mut(bus)
+        {
+            bus.command_frames = CommandFrames::Shared;
+        }
+    }
     if let Some(automatic_phase) = automatic_phase.filter(|_| problems.is_empty()) {
         match (knowledge.command_phase)(&config) {
             Ok(command_phase_ns) => config.cycle.command_phase_ns = command_phase_ns,

@@ -57,9 +57,13 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
     };
     let spot = fields.at("node");
     if spot.integer(axis.node, &ranges::NODE_ID).is_some() {
-        let is_taken = earlier.iter().any(|other| (other.bus, other.node) == (axis.bus, axis.node));
-        if is_taken || axis.node == config.master.node {
+        if axis.node == config.master.node {
             spot.report(duplicate_node(&bus.name, axis.node));
+        }
+        for other in earlier.iter().filter(|other| (other.bus, other.node) == (axis.bus, axis.node)) {
+            if !are_of_one_node(&other.drive, &axis.drive) {
+                spot.report(duplicate_node(&bus.name, axis.node));
+            }
         }
     }
     bit_rate(&fields.at("bus.bit_rate"), &axis.drive, bus.bit_rate);
@@ -69,6 +73,11 @@ pub fn unknown_bus(given: &str, known: &[&str]) -> ProblemKind {
     let nearest = spelling::nearest(given, known.iter().copied()).map(str::to_owned);
     let known = known.iter().map(|name| (*name).to_owned()).collect();
     ProblemKind::UnknownBus { name: excerpt(given), nearest, known }
+}
+
+/// Whether two axes can be those of one drive with several axes.
+pub fn are_of_one_node(first: &DriveFacts, second: &DriveFacts) -> bool {
+    (first.word, first.identity) == (second.word, second.identity) && first.node_axis != second.node_axis
 }
 
 pub fn duplicate_node(bus: &str, node: u8) -> ProblemKind {

@@ -8,7 +8,7 @@
 
 use std::cell::{Cell, Ref, RefCell};
 
-use takt_rt::Nanoseconds;
+use takt_rt::{MappedObject, Nanoseconds};
 
 use super::check::Check;
 use super::facts::AxisFacts;
@@ -39,7 +39,8 @@ pub(super) struct StepFailure {
     pub advice: &'static str,
 }
 
-/// A session with the drive of one axis.
+/// A session with the drive of one axis. Objects of the drive profile are named as those of the first axis of a node, and those of
+/// this axis are meant.
 pub struct AxisSession<'a> {
     /// The whole configuration.
     pub config: &'a Config,
@@ -103,6 +104,35 @@ impl<'a> AxisSession<'a> {
         }
     }
 
+    /// The other axes of the same node, in the order of the configuration.
+    fn siblings(&self) -> impl Iterator<Item = &Axis> {
+        let is_of_node = |axis: &&Axis| (axis.bus, axis.node) == (self.axis.bus, self.axis.node);
+        self.config.axes.iter().filter(is_of_node)
+    }
+
+    /// Whether this is the first axis of its node that is brought up or shut down: what belongs to the node as a whole is begun with
+    /// it.
+    pub fn is_first_of_node(&self) -> bool {
+        self.siblings().next().is_none_or(|first| first.drive.node_axis == self.axis.drive.node_axis)
+    }
+
+    /// Whether this is the last axis of its node: what belongs to the node as a whole is ended with it.
+    pub fn is_last_of_node(&self) -> bool {
+        self.siblings().last().is_none_or(|last| last.drive.node_axis == self.axis.drive.node_axis)
+    }
+
+    /// Whether the configuration has this axis of the node.
+    pub fn has_node_axis(&self, node_axis: u8) -> bool {
+        self.siblings().any(|axis| axis.drive.node_axis == node_axis)
+    }
+
+    /// The object of this axis that corresponds to an object of the first axis of a node.
+    pub(super) fn of_axis(&self, object: Object) -> Object {
+        let ObjectAddress { index, subindex } = object.address;
+        let own = MappedObject::new(index, subindex, 0).of_node_axis(self.axis.drive.node_axis);
+        Object { address: ObjectAddress::new(own.index, own.subindex), ..object }
+    }
+
     /// Begins a step: its name and its remedy, for progress and failures.
     pub fn step(&self, name: &'static str, advice: &'static str) {
         self.bus.step(name);
@@ -126,6 +156,7 @@ impl<'a> AxisSession<'a> {
         expected: Check,
         keep: impl FnOnce(&mut AxisFacts, i64),
     ) -> StepResult {
+        let object = self.of_axis(object);
         let compared = self.number(object, Access::Read, expected).await.and_then(|received| {
             self.keep(|facts| keep(facts, received));
             compared(object, Access::Read, expected, received)
@@ -139,6 +170,7 @@ impl<'a> AxisSession<'a> {
         object: Object,
         keep: impl FnOnce(&mut AxisFacts, i64),
     ) -> StepResult<bool> {
+        let object = self.of_axis(object);
         let read = match self.number(object, Access::Read, Check::Any).await {
             Ok(received) => {
                 self.keep(|facts| keep(facts, received));
@@ -184,6 +216,7 @@ impl<'a> AxisSession<'a> {
         within_ns: Nanoseconds,
         mut keep: impl FnMut(&mut AxisFacts, i64),
     ) -> StepResult {
+        let object = self.of_axis(object);
         let began_ns = self.bus.now_ns();
         let awaited = loop {
             let received = match self.number(object, Access::Read, expected).await {
@@ -212,12 +245,13 @@ impl<'a> AxisSession<'a> {
 
     /// Writes a number.
     pub async fn write(&self, object: Object, value: i64) -> StepResult {
-        let written = self.written(object, value).await;
+        let written = self.written(self.of_axis(object), value).await;
         self.settled(written)
     }
 
     /// Writes a number to an object that the drive may lack.
     pub async fn write_optional(&self, object: Object, value: i64) -> StepResult<bool> {
+        let object = self.of_axis(object);
         let written = match self.written(object, value).await {
             Ok(()) => Ok(true),
             Err(FailureCause::Transfer { error, .. }) if self.bus.quirks().means_absent(error) => {
@@ -236,6 +270,7 @@ impl<'a> AxisSession<'a> {
 
     /// Writes a number, reads it back, and compares it.
     pub async fn write_and_compare(&self, object: Object, value: i64, expected: Check) -> StepResult {
+        let object = self.of_axis(object);
         let written = async {
             self.written(object, value).await?;
             let access = Access::ReadBack(value);

@@ -18,7 +18,8 @@ pub async fn write(c: &AxisSession<'_>) -> StepResult {
 /// Writes a setting that the drive may lack, unless the file has a value for it: then the file wins.
 pub async fn write_unless_in_file(c: &AxisSession<'_>, object: Object, value: i64) -> StepResult {
     let mut downloads = c.axis.dcf.iter().flat_map(|file| &file.downloads);
-    if !downloads.any(|download| download.object == object.address) {
+    let address = c.of_axis(object).address;
+    if !downloads.any(|download| download.object == address) {
         c.write_optional(object, value).await?;
     }
     Ok(())

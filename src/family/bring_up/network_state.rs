@@ -8,7 +8,7 @@ use super::stages::BringUpTiming;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::sdo::{SdoError, Transfer};
-use crate::config::Axis;
+use crate::config::Supervision;
 use crate::family;
 use crate::procedure::Access;
 
@@ -47,7 +47,8 @@ impl AxisSession<'_> {
 
     /// Commands a state. The drive's heartbeat must report it, if it has one that comes soon.
     pub async fn command(&self, command: NmtCommand, awaited: NmtState) -> StepResult {
-        let reached = match confirmation_ns(self.axis, &self.timing) {
+        let supervision = self.axis.supervision(&self.config.master);
+        let reached = match confirmation_ns(supervision, &self.timing) {
             Some(within_ns) => {
                 self.reach(StateChange { command, awaited, within_ns, repeat_ns: within_ns / 3 }).await
             }
@@ -124,27 +125,25 @@ impl AxisSession<'_> {
 }
 
 /// How long to wait until the drive's heartbeat confirms a state; `None` when it has no heartbeat that comes soon.
-fn confirmation_ns(axis: &Axis, timing: &BringUpTiming) -> Option<Nanoseconds> {
-    let period_ns = axis.heartbeat_ns.filter(|period_ns| *period_ns <= LONGEST_AWAITED_HEARTBEAT_NS)?;
-    Some(timing.confirm_timeout_ns.saturating_add(period_ns.saturating_mul(3)))
+fn confirmation_ns(supervision: Supervision, timing: &BringUpTiming) -> Option<Nanoseconds> {
+    match supervision {
+        Supervision::Heartbeat { period_ns } if period_ns <= LONGEST_AWAITED_HEARTBEAT_NS => {
+            Some(timing.confirm_timeout_ns.saturating_add(period_ns.saturating_mul(3)))
+        }
+        Supervision::Heartbeat { .. } | Supervision::Guarding { .. } | Supervision::Feedback => None,
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::path::Path;
-
     use super::*;
-    use crate::config::Config;
 
     #[test]
     fn a_state_is_waited_for_unless_its_drive_reports_it_once_in_a_minute() {
-        let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
-        let mut within_ns = |heartbeat_ns| {
-            config.axes[0].heartbeat_ns = heartbeat_ns;
-            confirmation_ns(&config.axes[0], &BringUpTiming::default())
-        };
-        assert!(within_ns(Some(100_000_000)).is_some_and(|within_ns| within_ns > 300_000_000));
-        assert_eq!(within_ns(None), None);
-        assert_eq!(within_ns(Some(60_000_000_000)), None);
+        let within_ns = |supervision| confirmation_ns(supervision, &BringUpTiming::default());
+        let heartbeat = |period_ns| Supervision::Heartbeat { period_ns };
+        assert!(within_ns(heartbeat(100_000_000)).is_some_and(|within_ns| within_ns > 300_000_000));
+        assert_eq!(within_ns(Supervision::Feedback), None);
+        assert_eq!(within_ns(heartbeat(60_000_000_000)), None);
     }
 }

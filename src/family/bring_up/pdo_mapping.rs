@@ -1,34 +1,67 @@
 //! The PDO mapping of a drive: written and read back, or taken as the drive reports it.
 
+use std::cell::Cell;
+
 use super::axis_session::{AxisSession, StepResult};
 use super::check::Check;
 use super::failure::FailureCause;
-use super::process_data::{PdoPlan, ProcessData, pdo_id};
+use super::process_data::{PdoPlan, ProcessData, first_pdo, pdo_id};
 use crate::canopen::objects::{PDO_IDENTITY, PDO_INVALID, PdoDirection, PdoParameters};
 use crate::canopen::pdo_reader::PdoReader;
 
-/// Writes the mapping of the planned PDOs of one direction, and switches the others off, up to PDO `count`.
+/// Writes the mapping of the planned PDOs of one direction, and switches the others of the axis off, up to `count` of them.
 pub async fn write(c: &AxisSession<'_>, direction: PdoDirection, plans: &[PdoPlan], count: u8) -> StepResult {
     let name = match direction {
         PdoDirection::Receive => "RPDO mapping",
         PdoDirection::Transmit => "TPDO mapping",
     };
     c.step(name, "the drive cannot carry these objects in this PDO: choose other feedback or another mode");
-    for number in 1..=count {
+    let node_axis = c.axis.drive.node_axis;
+    for place in 1..=count {
+        let number = first_pdo(node_axis) + u16::from(place) - 1;
         match plans.iter().find(|plan| plan.number == number) {
             Some(plan) => map(c, direction, plan).await?,
-            None => {
-                let id = unused_id(direction, number, c.axis.node);
-                write_cob_id(c, PdoParameters::of(direction, number), id).await?;
+            None if node_axis == 1 => {
+                let id = unused_id(direction, place, c.axis.node);
+                write_cob_id(c, PdoParameters::of(direction, place), id).await?;
             }
+            None => switch_off(c, direction, number).await?,
         }
+    }
+    Ok(())
+}
+
+/// Switches a PDO off that keeps its identifier.
+async fn switch_off(c: &AxisSession<'_>, direction: PdoDirection, number: u16) -> StepResult {
+    let parameters = PdoParameters::at(direction, number);
+    let present = Cell::new(0);
+    c.read(parameters.cob_id(), Check::Any, |_, value| present.set(value as u32)).await?;
+    if present.get() & PDO_INVALID == 0 {
+        write_cob_id(c, parameters, present.get() | PDO_INVALID).await?;
+    }
+    Ok(())
+}
+
+/// Switches the PDOs of one direction off that belong to an axis of the node which nobody commands, up to `count` of them.
+pub async fn switch_all_off(
+    c: &AxisSession<'_>,
+    direction: PdoDirection,
+    node_axis: u8,
+    count: u8,
+) -> StepResult {
+    c.step(
+        "PDOs of other axes",
+        "switch the PDOs of the axes off that are not used (bit 31 of their COB-ID)",
+    );
+    for place in 0..count {
+        switch_off(c, direction, first_pdo(node_axis) + u16::from(place)).await?;
     }
     Ok(())
 }
 
 /// Writes a PDO mapping. It may only change while the PDO is invalid and the count is zero (CiA 301, 7.5.2.36).
 async fn map(c: &AxisSession<'_>, direction: PdoDirection, plan: &PdoPlan) -> StepResult {
-    let parameters = PdoParameters::of(direction, plan.number);
+    let parameters = PdoParameters::at(direction, plan.number);
     write_cob_id(c, parameters, plan.id.value() | PDO_INVALID).await?;
     c.write_and_read_back(parameters.transmission_type(), plan.transmission_type.into()).await?;
     if direction == PdoDirection::Transmit {
@@ -61,7 +94,7 @@ pub async fn take_reported(c: &AxisSession<'_>) -> StepResult {
 }
 
 async fn read_reported(c: &AxisSession<'_>) -> StepResult {
-    let mut reader = PdoReader::of_first_four();
+    let mut reader = PdoReader::of_four(first_pdo(c.axis.drive.node_axis));
     while let Some(object) = reader.question() {
         let answer = c.bus.read_bytes(object).await;
         reader.answer(answer);
@@ -75,7 +108,7 @@ async fn read_reported(c: &AxisSession<'_>) -> StepResult {
         Some(Err(failure)) => return Err(FailureCause::PdoRead(failure)),
         None => vec![],
     };
-    let data = ProcessData::as_reported(c.axis, &reported).map_err(FailureCause::Mapping)?;
+    let data = ProcessData::as_reported(c.axis, c.config, &reported).map_err(FailureCause::Mapping)?;
     c.keep(|facts| facts.process_data = Some(data));
     Ok(())
 }

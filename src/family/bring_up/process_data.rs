@@ -4,13 +4,13 @@ use takt_rt::{
     AxisProcessData, CommandSlot, Id, MAX_PDOS, MappedObject, MappedPdo, Request, TransmissionType,
 };
 
+use super::identifiers;
 use super::mapped_objects::{
     CONTROLWORD, CURRENT, ERROR_CODE, OPERATION_MODE, OPERATION_MODE_DISPLAY, POSITION, STATUSWORD,
     TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY, TORQUE, TORQUE_OFFSET, VELOCITY, VELOCITY_OFFSET,
 };
 use crate::canopen::objects::PdoDirection;
-use crate::config::{Axis, Control, Feedback};
-use crate::family;
+use crate::config::{Axis, Config, Control, Feedback};
 
 const PDO_BITS: u32 = 64;
 /// A placeholder for one byte of a PDO with unknown content.
@@ -19,14 +19,16 @@ const ANY_BYTE: MappedObject = MappedObject::new(0x0005, 0, 8);
 /// One PDO of a drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PdoPlan {
-    /// Its number, 1 to 4.
-    pub number: u8,
+    /// Its number, 1 to 4 for those of the first axis of a node.
+    pub number: u16,
     /// Its identifier.
     pub id: Id,
     /// Its transmission type (CiA 301, 7.5.2.36).
     pub transmission_type: u8,
     /// The mapped objects, in order.
     pub objects: Vec<MappedObject>,
+    /// For how many axes its frame is, for an RPDO: 1 unless they share it.
+    pub axes: u8,
     /// Condition the controller sends it, for an RPDO.
     pub transmission: TransmissionType,
     /// Whether it is sent in reply to a command, for a TPDO.
@@ -55,7 +57,15 @@ impl PdoPlan {
         transmission: TransmissionType,
     ) -> Self {
         let id = pdo_id(direction, number, node);
-        Self { number, id, transmission_type: 0, objects, transmission, reply: Reply::No }
+        Self {
+            number: number.into(),
+            id,
+            transmission_type: 0,
+            objects,
+            axes: 1,
+            transmission,
+            reply: Reply::No,
+        }
     }
 
     /// The payload in bytes.
@@ -76,10 +86,15 @@ pub struct ProcessData {
 }
 
 impl ProcessData {
-    /// The process data of an axis. If the drive's own mapping is used, it is known only after the drive has reported
-    /// it ([`ProcessData::as_reported`]).
-    pub fn of(axis: &Axis) -> Self {
-        family::of(&axis.drive).process_data(axis)
+    /// The process data of an axis of a configuration. If the drive's own mapping is used, it is known only after the drive has
+    /// reported it ([`ProcessData::as_reported`]).
+    pub fn of(axis: &Axis, config: &Config) -> Self {
+        identifiers::process_data(axis, config)
+    }
+
+    /// All of its PDOs.
+    pub fn all(&self) -> impl Iterator<Item = &PdoPlan> {
+        self.commands.iter().chain(&self.feedback).chain(&self.unused)
     }
 
     /// The same PDOs at full length.
@@ -101,7 +116,7 @@ impl ProcessData {
         };
         let mut objects = vec![CONTROLWORD, target_of(&axis.control)];
         if axis.control.is_profile() {
-            return objects;
+            return of_node_axis(objects, axis);
         }
         if changes_mode(axis) {
             objects.push(OPERATION_MODE);
@@ -117,7 +132,7 @@ impl ProcessData {
         if axis.feed_forward.has_velocity() && follows(CommandSlot::TargetPosition) {
             objects.push(VELOCITY_OFFSET);
         }
-        objects
+        of_node_axis(objects, axis)
     }
 
     /// The objects that a drive with free mapping must send in every cycle.
@@ -126,25 +141,25 @@ impl ProcessData {
         // Nothing else shows that the drive has taken another mode.
         let is_mode_missing = changes_mode(axis) && !axis.feedback.contains(&Feedback::OperationMode);
         let mode = is_mode_missing.then_some(Feedback::OperationMode);
-        [STATUSWORD, POSITION].into_iter().chain(mode.into_iter().chain(asked).map(mapped)).collect()
+        let objects = [STATUSWORD, POSITION].into_iter().chain(mode.into_iter().chain(asked).map(mapped));
+        of_node_axis(objects.collect(), axis)
     }
 
     /// Maps a drive with free mapping: command and feedback in as many PDOs as they need, controlword and target, statusword and
     /// position first.
     pub(crate) fn mapped_freely(axis: &Axis) -> Self {
         let (commands, feedback) = (packed(Self::needed_commands(axis)), packed(Self::needed_feedback(axis)));
-        let transmission_type = axis.transmission_type;
-        let receive = |number, objects| PdoPlan {
-            transmission_type,
-            ..PdoPlan::new(PdoDirection::Receive, number, axis.node, objects, TransmissionType::EveryCycle)
+        let plan = |direction, (place, objects): (u8, Vec<MappedObject>)| PdoPlan {
+            number: first_pdo(axis.drive.node_axis) + u16::from(place) - 1,
+            transmission_type: axis.transmission_type,
+            ..PdoPlan::new(direction, place, axis.node, objects, TransmissionType::EveryCycle)
         };
-        let transmit = |(number, objects)| PdoPlan {
-            transmission_type,
-            ..PdoPlan::new(PdoDirection::Transmit, number, axis.node, objects, TransmissionType::EveryCycle)
+        let plans = |direction, pdos: Vec<Vec<MappedObject>>| -> Vec<PdoPlan> {
+            (1..).zip(pdos).map(|pdo| plan(direction, pdo)).collect()
         };
         Self {
-            commands: (1..).zip(commands).map(|(number, objects)| receive(number, objects)).collect(),
-            feedback: (1..).zip(feedback).map(transmit).collect(),
+            commands: plans(PdoDirection::Receive, commands),
+            feedback: plans(PdoDirection::Transmit, feedback),
             unused: vec![],
         }
     }
@@ -173,6 +188,17 @@ impl ProcessData {
             self.commands.iter().find(|command| command.transmission == TransmissionType::EveryCycle)?;
         self.unused.iter().find(|pdo| pdo.number == command.number)
     }
+}
+
+/// The number of the first PDO of an axis of a node, counted from 1: each axis has 64 in each direction (CiA 402-2, multi-axis
+/// devices).
+pub const fn first_pdo(node_axis: u8) -> u16 {
+    64 * (node_axis.saturating_sub(1) as u16) + 1
+}
+
+/// Objects of the first axis of a node, as those of this axis.
+fn of_node_axis(objects: Vec<MappedObject>, axis: &Axis) -> Vec<MappedObject> {
+    objects.into_iter().map(|object| object.of_node_axis(axis.drive.node_axis)).collect()
 }
 
 /// Whether the mode of an axis may be changed at run time.

@@ -7,7 +7,7 @@ use super::process_data::{PdoPlan, ProcessData, Reply, pdo_id};
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::objects::PdoDirection;
 use crate::canopen::pdo_configuration::PdoConfiguration;
-use crate::config::Axis;
+use crate::config::{Axis, Config};
 use crate::family::{self, MappingMatch};
 
 /// Why the PDOs that the drive reports do not suit the axis.
@@ -160,8 +160,12 @@ impl ProcessData {
     ///
     /// # Errors
     /// The first reason for which the axis cannot work with it, or the bus load is not covered by the check.
-    pub fn as_reported(axis: &Axis, reported: &[PdoConfiguration]) -> Result<Self, MappingProblem> {
-        let counted = Self::of(axis);
+    pub fn as_reported(
+        axis: &Axis,
+        config: &Config,
+        reported: &[PdoConfiguration],
+    ) -> Result<Self, MappingProblem> {
+        let counted = Self::of(axis, config);
         match family::of(&axis.drive).mapping_match() {
             MappingMatch::ByContent => by_content(axis, &counted, reported),
             MappingMatch::ByNumber => by_number(axis, counted, reported),
@@ -197,10 +201,10 @@ fn by_content(
         if reported != Some(expected) {
             return Err(MappingProblem::TransmissionType { direction, number, reported, expected });
         }
-        plan_of(pdo, axis, TransmissionType::EveryCycle)
+        plan_of(pdo, axis, counted, TransmissionType::EveryCycle)
     };
     for pdo in &commands {
-        check_values(pdo, &ProcessData::needed_commands(axis))?;
+        check_values(pdo, axis.drive.node_axis, &ProcessData::needed_commands(axis))?;
     }
     Ok(ProcessData {
         commands: commands.iter().map(plan).collect::<Result<_, _>>()?,
@@ -248,12 +252,16 @@ fn check_length(
 
 /// Checks that every object of an RPDO has a value: dummy entries, needed objects, and targets or offsets of other
 /// modes, which are sent as zero.
-fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), MappingProblem> {
+fn check_values(
+    pdo: &PdoConfiguration,
+    node_axis: u8,
+    needed: &[MappedObject],
+) -> Result<(), MappingProblem> {
     let has_value = |object: &MappedObject| {
         object.is_dummy()
             || needed.contains(object)
             || matches!(
-                CommandSlot::of(*object),
+                CommandSlot::of(object.as_of_first_axis(node_axis)),
                 CommandSlot::OperationMode
                     | CommandSlot::TargetVelocity
                     | CommandSlot::TargetTorque
@@ -270,10 +278,17 @@ fn check_values(pdo: &PdoConfiguration, needed: &[MappedObject]) -> Result<(), M
 fn plan_of(
     pdo: &PdoConfiguration,
     axis: &Axis,
+    counted: &ProcessData,
     transmission: TransmissionType,
 ) -> Result<PdoPlan, MappingProblem> {
     let PdoConfiguration { direction, number, id: reported, transmission_type, .. } = *pdo;
-    let expected = pdo_id(direction, number as u8, axis.node);
+    let planned = match direction {
+        PdoDirection::Receive => counted.commands.iter().find(|plan| plan.number == number),
+        PdoDirection::Transmit => counted.feedback.iter().find(|plan| plan.number == number),
+    };
+    // The PDOs of further axes of a node have none in the pre-defined connection set.
+    let planned = planned.filter(|_| axis.drive.node_axis > 1);
+    let expected = planned.map_or_else(|| pdo_id(direction, number as u8, axis.node), |plan| plan.id);
     if reported != Some(expected) {
         return Err(MappingProblem::Identifier { direction, number, reported, expected });
     }
@@ -281,10 +296,11 @@ fn plan_of(
         return Err(MappingProblem::Width { direction, number, object: *object });
     }
     Ok(PdoPlan {
-        number: number as u8,
+        number,
         id: expected,
         transmission_type: transmission_type.unwrap_or(axis.transmission_type),
         objects: pdo.objects.clone(),
+        axes: 1,
         transmission,
         reply: Reply::No,
     })
@@ -295,8 +311,9 @@ fn by_number(
     counted: ProcessData,
     reported: &[PdoConfiguration],
 ) -> Result<ProcessData, MappingProblem> {
+    let numbered = counted.clone();
     let resolve = |direction, plan: PdoPlan| -> Result<PdoPlan, MappingProblem> {
-        let is_it = |pdo: &&PdoConfiguration| (pdo.direction, pdo.number) == (direction, plan.number.into());
+        let is_it = |pdo: &&PdoConfiguration| (pdo.direction, pdo.number) == (direction, plan.number);
         let Some(pdo) = reported.iter().find(is_it) else { return Ok(plan) };
         for object in &plan.objects {
             let mapped = carried(pdo, *object).filter(|_| pdo.is_valid);
@@ -307,14 +324,14 @@ fn by_number(
             )?;
         }
         if direction == PdoDirection::Receive {
-            check_values(pdo, &plan.objects)?;
+            check_values(pdo, axis.drive.node_axis, &plan.objects)?;
         }
         let (bits, counted_bits) = (pdo.bits(), 8 * plan.length());
         if bits > counted_bits {
             return Err(MappingProblem::TooLong { direction, number: pdo.number, bits, counted_bits });
         }
         let PdoPlan { transmission_type, reply, .. } = plan;
-        Ok(PdoPlan { transmission_type, reply, ..plan_of(pdo, axis, plan.transmission)? })
+        Ok(PdoPlan { transmission_type, reply, ..plan_of(pdo, axis, &numbered, plan.transmission)? })
     };
     let all = |direction, plans: Vec<PdoPlan>| -> Result<Vec<PdoPlan>, MappingProblem> {
         plans.into_iter().map(|plan| resolve(direction, plan)).collect()
@@ -329,14 +346,13 @@ fn by_number(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Config;
 
-    /// The one axis of a configuration with a YZ-AIM.
-    fn yz_aim() -> Axis {
+    /// A configuration with a YZ-AIM.
+    fn yz_aim() -> Config {
         let text = "name = \"n\"\n[[bus]]\nname = \"b\"\nperiod = \"2 ms\"\n[[axis]]\nname = \"x\"\nbus = \"b\"\nnode = 5\n\
                     drive = \"yz-aim\"\nmode = \"ip\"\n[axis.limits]\nposition = [-1, 1]\nvelocity = 1\nacceleration = 1\n\
                     torque = 1\n";
-        Config::parse("n.toml", text).unwrap().axes.remove(0)
+        Config::parse("n.toml", text).unwrap()
     }
 
     fn reported(direction: PdoDirection, number: u8, objects: &[u32]) -> PdoConfiguration {
@@ -353,13 +369,15 @@ mod tests {
     }
 
     fn as_reported(pdo: PdoConfiguration) -> Result<ProcessData, MappingProblem> {
-        ProcessData::as_reported(&yz_aim(), &[pdo])
+        let config = yz_aim();
+        ProcessData::as_reported(&config.axes[0], &config, &[pdo])
     }
 
     #[test]
     fn a_pdo_that_a_yz_aim_does_not_report_is_as_in_the_manual() {
-        let axis = yz_aim();
-        assert_eq!(ProcessData::as_reported(&axis, &[]), Ok(ProcessData::of(&axis)));
+        let config = yz_aim();
+        let axis = &config.axes[0];
+        assert_eq!(ProcessData::as_reported(axis, &config, &[]), Ok(ProcessData::of(axis, &config)));
     }
 
     #[test]
@@ -367,7 +385,8 @@ mod tests {
         let data = as_reported(reported(PdoDirection::Transmit, 2, &[0x6041_0010, 0x6064_0020])).unwrap();
         let objects: Vec<u16> = data.feedback[0].objects.iter().map(|object| object.index).collect();
         assert_eq!(objects, [0x6041, 0x6064]);
-        assert_eq!(data.commands, ProcessData::of(&yz_aim()).commands);
+        let config = yz_aim();
+        assert_eq!(data.commands, ProcessData::of(&config.axes[0], &config).commands);
     }
 
     #[test]

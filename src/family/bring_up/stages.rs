@@ -1,4 +1,4 @@
-//! Brings drives up and shuts them down, all axes of all buses in parallel.
+//! Brings drives up and shuts them down, all nodes of all buses in parallel, the axes of a node one after the other.
 //!
 //! [`BringUp`] has two stages. [`Stage::Configure`] leaves every drive in NMT pre-operational, without torque, with its
 //! PDO mapping and mode set, and its target at the actual position. Then [`BringUp::start`] begins [`Stage::Start`],
@@ -15,7 +15,7 @@ use std::task::{Context, Waker};
 
 use takt_rt::{Frame, Nanoseconds};
 
-use super::axis_session::{AxisSession, OnFailure, StepFailure, StepResult};
+use super::axis_session::{AxisSession, OnFailure, StepFailure};
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError, FailureCause};
 use super::network_state::RESTART_STEP;
@@ -199,52 +199,88 @@ impl Shutdown {
     }
 }
 
-/// The axes of a configuration, and their running procedures.
+/// The nodes of a configuration, and their running procedures.
 #[derive(Debug)]
 struct Group {
+    axes: Vec<AxisName>,
     members: Vec<Member>,
-    procedures: Parallel<CanopenClient, AxisFacts, StepFailure>,
+    procedures: Parallel<CanopenClient, Vec<AxisFacts>, NodeFailure>,
 }
 
+/// What a failure says of its axis.
 #[derive(Debug)]
-struct Member {
+struct AxisName {
     name: String,
-    bus: usize,
     bus_name: String,
     node: u8,
+}
+
+/// A node with one SDO server, and its axes, which are brought up one after the other.
+#[derive(Debug)]
+struct Member {
+    bus: usize,
+    /// Indices into the configuration, in its order.
+    axes: Vec<usize>,
     session: CanopenSession,
     /// The number of accesses without restarts and repetitions, for the progress.
     accesses: usize,
 }
 
+/// The failure of one axis of a node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct NodeFailure {
+    /// Its place among those of the node.
+    place: usize,
+    failure: StepFailure,
+}
+
 impl Group {
     fn new(config: &Config, timing: BringUpTiming) -> Self {
-        let members = config.axes.iter().map(|axis| Member {
+        let axes = config.axes.iter().map(|axis| AxisName {
             name: axis.name.clone(),
-            bus: axis.bus,
             bus_name: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
             node: axis.node,
-            session: session(axis, timing),
-            accesses: 0,
         });
-        Self { members: members.collect(), procedures: Parallel::new([]) }
+        let mut members: Vec<Member> = vec![];
+        for (index, axis) in config.axes.iter().enumerate() {
+            let is_its = |member: &&mut Member| (member.bus, member.session.node()) == (axis.bus, axis.node);
+            match members.iter_mut().find(is_its) {
+                Some(member) => member.axes.push(index),
+                None => members.push(Member {
+                    bus: axis.bus,
+                    axes: vec![index],
+                    session: session(axis, timing),
+                    accesses: 0,
+                }),
+            }
+        }
+        Self { axes: axes.collect(), members, procedures: Parallel::new([]) }
     }
 
     /// Begins a part of every axis. `facts` is what is known of each drive; without it, nothing is known.
     fn begin(&mut self, part: Part, config: &Rc<Config>, timing: BringUpTiming, facts: &[AxisFacts]) {
-        let mut facts = facts.iter().cloned();
-        let begun = self.members.iter_mut().zip(&config.axes).map(|(member, axis)| {
-            let unknown = || AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
-            let facts = facts.next().unwrap_or_else(unknown);
-            member.accesses = dry_run(part, config, axis).accesses;
+        let begun = self.members.iter_mut().map(|member| {
+            let axes = member.axes.iter().filter_map(|index| Some((*index, config.axes.get(*index)?)));
+            let facts: Vec<AxisFacts> = axes
+                .clone()
+                .map(|(index, axis)| {
+                    let unknown = || AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
+                    facts.get(index).cloned().unwrap_or_else(unknown)
+                })
+                .collect();
+            member.accesses = axes.map(|(_, axis)| dry_run(part, config, axis).accesses).sum();
             member.session.begin_again();
             // The progress shows it before the first poll.
             member.session.resume_step(RESTART_STEP);
-            let (session, config, axis) = (member.session.clone(), Rc::clone(config), axis.clone());
+            let (session, config, axes) = (member.session.clone(), Rc::clone(config), member.axes.clone());
             let work = async move {
-                let c = AxisSession::new(session, &config, &axis, timing, part.on_failure(), facts);
-                let result = carry_out(part, &c).await;
-                c.end(result)
+                let axes = axes.iter().filter_map(|index| config.axes.get(*index));
+                let of_axis = |(axis, facts)| {
+                    AxisSession::new(session.clone(), &config, axis, timing, part.on_failure(), facts)
+                };
+                let sessions: Vec<AxisSession<'_>> = axes.zip(facts).map(of_axis).collect();
+                let failed = carry_out(part, &sessions).await;
+                end(sessions, failed)
             };
             (member.bus, Procedure::new(member.session.clone(), work))
         });
@@ -260,26 +296,65 @@ impl Group {
     }
 
     fn progress(&self) -> BringUpProgress {
-        let of_axes = self.members.iter().zip(self.procedures.procedures()).enumerate();
-        let open = of_axes.filter(|(_, (_, procedure))| procedure.outcome().is_none());
+        let of_nodes = self.members.iter().zip(self.procedures.procedures()).enumerate();
+        let open = of_nodes.filter(|(_, (_, procedure))| procedure.outcome().is_none());
         let slowest = open.min_by_key(|(_, (member, _))| member.session.done());
         let sum: f64 = self.members.iter().map(Member::fraction).sum();
         BringUpProgress {
             fraction: if slowest.is_none() { 1.0 } else { sum / self.members.len() as f64 },
             step: slowest.map_or("", |(_, (member, _))| member.session.step_name()),
-            axis: slowest.map_or(0, |(index, _)| index),
+            axis: slowest.map_or(0, |(_, (member, _))| member.axes.first().copied().unwrap_or(0)),
         }
     }
 
     fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
-        let (mut facts, mut failures) = (vec![], vec![]);
-        for (axis, (member, procedure)) in self.members.iter().zip(self.procedures.procedures()).enumerate() {
+        let (mut facts, mut failures) = (vec![AxisFacts::default(); self.axes.len()], vec![]);
+        for (member, procedure) in self.members.iter().zip(self.procedures.procedures()) {
             match procedure.outcome()? {
-                Ok(of_axis) => facts.push(of_axis.clone()),
-                Err(error) => failures.push(member.failure(axis, error.step, error.failure)),
+                Ok(of_axes) => {
+                    for (index, of_axis) in member.axes.iter().zip(of_axes) {
+                        if let Some(facts) = facts.get_mut(*index) {
+                            facts.clone_from(of_axis);
+                        }
+                    }
+                }
+                Err(error) => failures.extend(self.failures(member, error.step, error.failure)),
             }
         }
+        failures.sort_by_key(|failure| failure.axis);
         Some(if failures.is_empty() { Ok(facts) } else { Err(BringUpError { failures }) })
+    }
+
+    /// The failure of a node: that of the axis at which it failed, and, where the node is silent, of those that were to follow.
+    fn failures(
+        &self,
+        member: &Member,
+        step: &'static str,
+        NodeFailure { place, failure }: NodeFailure,
+    ) -> impl Iterator<Item = AxisFailure> {
+        let count = if failure.cause.is_silence() { member.axes.len() } else { 1 };
+        let axes = member.axes.iter().skip(place).take(count);
+        axes.filter_map(move |axis| self.failure(member, *axis, step, failure))
+    }
+
+    fn failure(
+        &self,
+        member: &Member,
+        axis: usize,
+        step: &'static str,
+        failure: StepFailure,
+    ) -> Option<AxisFailure> {
+        let AxisName { name, bus_name, node } = self.axes.get(axis)?;
+        Some(AxisFailure {
+            axis,
+            name: name.clone(),
+            bus: bus_name.clone(),
+            node: *node,
+            step,
+            cause: failure.cause,
+            emergency: member.session.emergency(),
+            step_advice: failure.advice,
+        })
     }
 }
 
@@ -287,19 +362,6 @@ impl Member {
     /// The finished part, 0 to 1.
     fn fraction(&self) -> f64 {
         if self.accesses == 0 { 1.0 } else { (self.session.done() as f64 / self.accesses as f64).min(1.0) }
-    }
-
-    fn failure(&self, axis: usize, step: &'static str, failure: StepFailure) -> AxisFailure {
-        AxisFailure {
-            axis,
-            name: self.name.clone(),
-            bus: self.bus_name.clone(),
-            node: self.node,
-            step,
-            cause: failure.cause,
-            emergency: self.session.emergency(),
-            step_advice: failure.advice,
-        }
     }
 }
 
@@ -334,23 +396,52 @@ fn session(axis: &Axis, timing: BringUpTiming) -> CanopenSession {
     CanopenSession::new(CanopenClient::new(axis.node, family::sdo_quirks(&axis.drive, timing.sdo)))
 }
 
-/// Carries out a part, and watches for restarts of the drive: its configuration is then done again, and another part
-/// fails.
-async fn carry_out<'a>(part: Part, c: &'a AxisSession<'a>) -> StepResult {
+/// The place of an axis among those of its node, and why it failed.
+type FailedAxis = (usize, FailureCause);
+
+/// Carries out a part for the axes of a node, one after the other, and watches for restarts of the node: its configuration is then
+/// done again, and another part fails.
+async fn carry_out<'a>(part: Part, axes: &'a [AxisSession<'a>]) -> Option<FailedAxis> {
+    let bus = &axes.first()?.bus;
     loop {
-        let work = part.of_family(c);
-        if let Some(result) = c.bus.give_up_when(|| c.bus.has_restarted(), work).await {
-            return result;
+        if let Some(failed) = bus.give_up_when(|| bus.has_restarted(), each(part, axes)).await {
+            return failed;
         }
-        c.bus.accept_restart();
-        c.keep(|facts| facts.restarts = facts.restarts.saturating_add(1));
-        let times = c.facts().restarts;
+        bus.accept_restart();
+        let mut times = 0;
+        for c in axes {
+            c.keep(|facts| facts.restarts = facts.restarts.saturating_add(1));
+            times = c.facts().restarts;
+        }
         if part != Part::Configure || times > MAX_RESTARTS {
-            return Err(FailureCause::Restarted { times });
+            return Some((0, FailureCause::Restarted { times }));
         }
-        c.bus.reset_transfer();
-        c.bus.begin_again();
+        bus.reset_transfer();
+        bus.begin_again();
     }
+}
+
+/// Carries out a part for one axis after the other. Gives the first that failed.
+async fn each<'a>(part: Part, axes: &'a [AxisSession<'a>]) -> Option<FailedAxis> {
+    for (place, c) in axes.iter().enumerate() {
+        if let Err(cause) = part.of_family(c).await {
+            return Some((place, cause));
+        }
+    }
+    None
+}
+
+/// The facts of the axes of a node, or the first failure.
+fn end(axes: Vec<AxisSession<'_>>, failed: Option<FailedAxis>) -> Result<Vec<AxisFacts>, NodeFailure> {
+    let result_of = |place: usize| match failed {
+        Some((at, cause)) if at == place => Err(cause),
+        _ => Ok(()),
+    };
+    let ended = axes
+        .into_iter()
+        .enumerate()
+        .map(|(place, c)| c.end(result_of(place)).map_err(|failure| NodeFailure { place, failure }));
+    ended.collect()
 }
 
 /// What a part does when the drive answers as expected.

@@ -10,7 +10,7 @@ use crate::canopen::emcy::ErrorCode;
 use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
-use crate::config::PdoMapping;
+use crate::config::{PdoMapping, Supervision};
 use crate::family::bring_up::axis_units::{counts, interpolation_time, rounded_up};
 use crate::family::bring_up::configuration_file::{self, write_unless_in_file};
 use crate::family::bring_up::{
@@ -39,7 +39,9 @@ impl Sheet<'_> {
             RESTART_STEP,
             "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID",
         );
-        c.restart_communication().await?;
+        if c.is_first_of_node() {
+            c.restart_communication().await?;
+        }
         // Some drives leave the profile out of object 1000.
         identity::compare(c, Check::Any).await?;
         identity::read_texts(c).await?;
@@ -51,14 +53,19 @@ impl Sheet<'_> {
         self.ratings().await?;
         self.limits().await?;
         self.target_at_actual_position().await?;
-        self.heartbeats().await
+        if c.is_last_of_node() {
+            self.heartbeats().await?;
+        }
+        Ok(())
     }
 
     /// From configured to operational.
     pub async fn start(&self) -> StepResult {
         let c = self.c;
         c.step("start", "check that no other master commands this node");
-        c.command(NmtCommand::Start, NmtState::Operational).await?;
+        if c.is_first_of_node() {
+            c.command(NmtCommand::Start, NmtState::Operational).await?;
+        }
         self.read_state().await?;
         actual_position::read(c).await
     }
@@ -67,12 +74,23 @@ impl Sheet<'_> {
     pub async fn shut_down(&self) -> StepResult {
         let c = self.c;
         c.step("shut down", "power-cycle the drive before the next run");
-        c.wake_up(NmtCommand::EnterPreOperational).await?;
-        c.command(NmtCommand::EnterPreOperational, NmtState::PreOperational).await?;
+        if c.is_first_of_node() {
+            c.wake_up(NmtCommand::EnterPreOperational).await?;
+            c.command(NmtCommand::EnterPreOperational, NmtState::PreOperational).await?;
+        }
         self.come_to_rest().await?;
+        // Until the last axis is at rest, the node watches the controller.
+        if !c.is_last_of_node() {
+            return Ok(());
+        }
         if self.device.is_writable(CONSUMER_HEARTBEAT_TIME.address) {
             heartbeat::end_watch(c, "expect a communication fault of the drive; the next bring-up clears it")
                 .await?;
+        }
+        // The drive watches for the requests from the first one on.
+        if let Supervision::Guarding { .. } = c.axis.supervision(&c.config.master) {
+            self.set(GUARD_TIME, 0).await?;
+            self.set(LIFE_TIME_FACTOR, 0).await?;
         }
         self.set(PRODUCER_HEARTBEAT_TIME, 0).await
     }
@@ -160,9 +178,11 @@ impl Sheet<'_> {
         let c = self.c;
         c.step("SYNC", "choose a cycle period that this drive accepts");
         let period_ns = c.config.bus_cycle(c.axis.bus).period_ns;
-        // Bit 30 would make the drive the SYNC producer. Where the object is constant, it is 80h already.
-        self.set(SYNC_COB_ID, 0x80).await?;
-        self.set(COMMUNICATION_CYCLE_PERIOD, rounded_up(period_ns, 1_000)).await?;
+        if c.is_first_of_node() {
+            // Bit 30 would make the drive the SYNC producer. Where the object is constant, it is 80h already.
+            self.set(SYNC_COB_ID, 0x80).await?;
+            self.set(COMMUNICATION_CYCLE_PERIOD, rounded_up(period_ns, 1_000)).await?;
+        }
         if let Some((mantissa, exponent)) = interpolation_time(period_ns) {
             self.set(INTERPOLATION_TIME_PERIOD, mantissa).await?;
             self.set(INTERPOLATION_TIME_INDEX, exponent).await?;
@@ -172,15 +192,30 @@ impl Sheet<'_> {
 
     async fn process_data(&self) -> StepResult {
         let c = self.c;
+        if c.is_first_of_node() {
+            self.switch_other_axes_off().await?;
+        }
         match c.axis.mapping {
             PdoMapping::Written => {
-                let ProcessData { commands, feedback, .. } = ProcessData::of(c.axis);
+                let ProcessData { commands, feedback, .. } = ProcessData::of(c.axis, c.config);
                 let slots = |direction| self.device.pdo_slots(direction);
                 pdo_mapping::write(c, PdoDirection::Receive, &commands, slots(PdoDirection::Receive)).await?;
                 pdo_mapping::write(c, PdoDirection::Transmit, &feedback, slots(PdoDirection::Transmit)).await
             }
             PdoMapping::AsStored => pdo_mapping::take_reported(c).await,
         }
+    }
+
+    /// Switches the PDOs off of the axes of the node that the configuration does not have.
+    async fn switch_other_axes_off(&self) -> StepResult {
+        for node_axis in (1..=self.device.axes()).filter(|node_axis| !self.c.has_node_axis(*node_axis)) {
+            let Ok(other) = self.device.clone().of_axis(node_axis) else { continue };
+            for direction in [PdoDirection::Receive, PdoDirection::Transmit] {
+                let count = other.pdo_slots(direction);
+                pdo_mapping::switch_all_off(self.c, direction, node_axis, count).await?;
+            }
+        }
+        Ok(())
     }
 
     async fn mode(&self) -> StepResult {
@@ -267,10 +302,16 @@ impl Sheet<'_> {
 
     async fn heartbeats(&self) -> StepResult {
         let c = self.c;
+        let supervision = c.axis.supervision(&c.config.master);
         if self.device.is_writable(PRODUCER_HEARTBEAT_TIME.address) {
             heartbeat::produce(c).await?;
         }
-        if c.config.master.heartbeat_ns.is_some() {
+        if let Supervision::Guarding { guard_time_ns, life_time_factor } = supervision {
+            c.step("node guarding", "choose a heartbeat time that this drive accepts as guard time");
+            self.set(GUARD_TIME, rounded_up(guard_time_ns, 1_000_000)).await?;
+            self.set(LIFE_TIME_FACTOR, life_time_factor.into()).await?;
+        }
+        if c.axis.controller_timeout_ns(&c.config.master).is_some() {
             self.set(COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
             self.set(ABORT_CONNECTION_OPTION, FAULT_SIGNAL).await?;
         }

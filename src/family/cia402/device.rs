@@ -2,22 +2,26 @@
 
 use std::path::Path;
 
-use takt_rt::{MappedObject, Nanoseconds, OperationMode};
+use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode};
 
 use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
 use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::canopen::objects::{
-    CONTROLWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE, PROFILE_ACCELERATION, PROFILE_VELOCITY,
-    PdoDirection, STATUSWORD,
+    CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE,
+    PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection, PdoParameters, STATUSWORD,
 };
 use crate::config::quirks::{MotionUnit, Quirks};
-use crate::config::{Control, DriveFacts, Identity, ModeSet, VelocityUnit};
+use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, VelocityUnit};
 use crate::family::DataSheet;
+use crate::family::bring_up::first_pdo;
 use crate::family::commission::profile::objects::HOMING_METHOD;
 
-/// A data sheet, and the quirks of the drive.
+/// A data sheet, the quirks of the drive, and which of its axes is meant.
 #[derive(Clone, Debug)]
 pub struct Device {
+    /// The axis, 1 for the first or only one. Its objects stand 0x800 higher for each axis before it, and its PDOs 64 further (CiA
+    /// 402-2, multi-axis devices). Every object is named here as that of the first axis.
+    pub node_axis: u8,
     /// The object dictionary of the data sheet.
     pub dictionary: ObjectDictionary,
     /// In what the drive deviates from it.
@@ -67,10 +71,25 @@ impl Device {
             Some(path) => crate::config::quirks::load(path).map_err(|error| error.to_string())?,
             None => Quirks::default(),
         };
-        let device = Self { dictionary: loaded.dictionary, quirks };
+        Self { node_axis: 1, dictionary: loaded.dictionary, quirks }.of_axis(1)
+    }
+
+    /// The same drive, another of its axes.
+    ///
+    /// # Errors
+    /// In words for the reader of a configuration: what the data sheet lacks of this axis.
+    pub fn of_axis(self, node_axis: u8) -> Result<Self, String> {
+        let device = Self { node_axis, ..self };
         let needed = [CONTROLWORD, STATUSWORD, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE];
         match needed.into_iter().find(|object| !device.has(object)) {
-            Some(object) => Err(format!("the data sheet has no {object}, which every CiA 402 drive needs")),
+            Some(object) if node_axis == 1 => {
+                Err(format!("the data sheet has no {object}, which every CiA 402 drive needs"))
+            }
+            Some(object) => Err(format!(
+                "the data sheet has no axis {node_axis}: it lacks {}, the {} of that axis",
+                of_axis(object.address, node_axis),
+                object.name
+            )),
             None if device.modes().0 == 0 => {
                 Err("the data sheet has no target (607A, 60FF, 6071) of a mode that takt commands".to_owned())
             }
@@ -80,7 +99,22 @@ impl Device {
 
     /// What the data sheet says of an object; `None` if the drive lacks it.
     pub fn entry(&self, address: ObjectAddress) -> Option<&DictionaryEntry> {
+        let address = of_axis(address, self.node_axis);
         self.dictionary.entry(address).filter(|_| !self.quirks.is_missing(address))
+    }
+
+    /// How many axes the data sheet describes.
+    pub fn axes(&self) -> u8 {
+        let has = |node_axis: &u8| {
+            let controlword = of_axis(CONTROLWORD.address, *node_axis);
+            self.dictionary.entry(controlword).is_some()
+        };
+        (1..=MAX_NODE_AXES).take_while(has).last().unwrap_or(0)
+    }
+
+    /// The number of the first PDO of the axis, counted from 1.
+    pub const fn first_pdo(&self) -> u16 {
+        first_pdo(self.node_axis)
     }
 
     /// Whether the drive has an object.
@@ -99,7 +133,8 @@ impl Device {
                     | AccessType::ReadWriteWrite
             )
         };
-        self.entry(address).is_some_and(writable) && !self.quirks.is_constant(address)
+        self.entry(address).is_some_and(writable)
+            && !self.quirks.is_constant(of_axis(address, self.node_axis))
     }
 
     /// Whether a PDO can carry an object.
@@ -107,17 +142,31 @@ impl Device {
         self.entry(address).is_some_and(|entry| entry.is_mappable)
     }
 
-    /// How many PDOs of a direction the drive has, of the first four.
+    /// How many PDOs of a direction the axis has, of its first four.
     pub fn pdo_slots(&self, direction: PdoDirection) -> u8 {
-        let (parameters, mapping) = match direction {
-            PdoDirection::Receive => (0x1400, 0x1600),
-            PdoDirection::Transmit => (0x1800, 0x1A00),
-        };
         let has_slot = |number: &u8| {
-            let of = |first: u16| self.dictionary.object(first + u16::from(*number) - 1).is_some();
-            of(parameters) && of(mapping)
+            let parameters = PdoParameters::at(direction, self.first_pdo() + u16::from(*number) - 1);
+            let has = |object: Object| self.dictionary.object(object.address.index).is_some();
+            has(parameters.cob_id()) && has(parameters.mapped_count())
         };
         (1..=4).take_while(has_slot).last().unwrap_or(0)
+    }
+
+    /// How many objects one of the first RPDOs can map, by the sub-indices that its mapping has.
+    pub fn mappable_objects(&self, number: u8) -> usize {
+        if number > self.pdo_slots(PdoDirection::Receive) {
+            return 0;
+        }
+        let parameters = PdoParameters::of(PdoDirection::Receive, number);
+        let has = |position: &u8| self.entry(parameters.mapped_object(*position).address).is_some();
+        (1..=MAX_OBJECTS as u8).take_while(has).count()
+    }
+
+    /// The identifier of a PDO by the data sheet, for a drive with this node ID; `None` if it gives none.
+    pub fn pdo_id(&self, direction: PdoDirection, number: u16, node: u8) -> Option<Id> {
+        let cob_id = PdoParameters::at(direction, number).cob_id().address;
+        let value = self.entry(cob_id)?.value()?.number(Some(node))?;
+        Id::base((value & 0x7FF) as u32).ok().filter(|id| id.value() != 0)
     }
 
     /// The value that an object has by the data sheet, or by the configuration of a DCF.
@@ -147,7 +196,8 @@ impl Device {
     pub fn modes(&self) -> ModeSet {
         let stated = self.number(SUPPORTED_MODES).and_then(|bits| u32::try_from(bits).ok());
         let has = |index: u16| {
-            self.dictionary.object(index).is_some() && !self.quirks.is_missing(ObjectAddress::new(index, 0))
+            let address = of_axis(ObjectAddress::new(index, 0), self.node_axis);
+            self.dictionary.object(address.index).is_some() && !self.quirks.is_missing(address)
         };
         let having = |objects: &[(OperationMode, u16)]| {
             let modes = objects.iter().filter(|(_, index)| has(*index));
@@ -181,9 +231,40 @@ impl Device {
         by_quirks.or_else(by_si).or_else(by_factor).unwrap_or(VelocityUnit::Counts(1.0))
     }
 
-    /// Whether the controller can map the PDOs: the mapping of RPDO 1 and that of TPDO 1 are writable.
+    /// Whether the controller can map the PDOs: the mapping of the first RPDO of the axis and that of its first TPDO are writable.
     fn is_mapped_freely(&self) -> bool {
-        [0x1600, 0x1A00].into_iter().all(|index| self.is_writable(ObjectAddress::new(index, 0)))
+        [PdoDirection::Receive, PdoDirection::Transmit].into_iter().all(|direction| {
+            let parameters = PdoParameters::at(direction, self.first_pdo());
+            self.is_writable(parameters.mapped_count().address)
+        })
+    }
+
+    /// What the drive has for error control: the heartbeat before node guarding, since it asks less of the bus.
+    pub(super) fn error_control(&self) -> ErrorControl {
+        // What cannot be written and is not known is as good as absent.
+        let fixed = |address| match self.is_writable(address) {
+            true => None,
+            false => Some(self.number(address).unwrap_or(0)),
+        };
+        let is_usable = |address| self.entry(address).is_some() && fixed(address) != Some(0);
+        let (heartbeat, guard_time, life_time) =
+            (PRODUCER_HEARTBEAT_TIME.address, GUARD_TIME.address, LIFE_TIME_FACTOR.address);
+        if is_usable(heartbeat) {
+            let fixed_ms = fixed(heartbeat).and_then(|ms| u16::try_from(ms).ok());
+            ErrorControl::Heartbeat { fixed_ms }
+        } else if is_usable(guard_time) && is_usable(life_time) {
+            ErrorControl::Guarding {
+                fixed_guard_time_ms: fixed(guard_time).and_then(|ms| u16::try_from(ms).ok()),
+                fixed_life_time_factor: fixed(life_time).and_then(|factor| u8::try_from(factor).ok()),
+            }
+        } else {
+            ErrorControl::None
+        }
+    }
+
+    /// Whether the drive can watch the heartbeat of the controller.
+    pub(super) fn consumes_heartbeat(&self) -> bool {
+        self.entry(ObjectAddress::new(0x1016, 1)).is_some()
     }
 
     /// What is known of the drive.
@@ -222,6 +303,9 @@ impl Device {
             },
             has_fixed_process_data: !self.is_mapped_freely(),
             reports_mode: self.is_mappable(ObjectAddress::new(0x6061, 0)),
+            node_axis: self.node_axis,
+            error_control: self.error_control(),
+            consumes_heartbeat: self.consumes_heartbeat(),
             sends_emergencies: self.entry(ObjectAddress::new(0x1014, 0)).is_some(),
             ..standard
         }
@@ -268,6 +352,12 @@ impl DataSheet for Device {
     fn sdo_reply_ns(&self) -> Option<Nanoseconds> {
         self.quirks.delays.sdo_reply_ns
     }
+}
+
+/// The object of an axis that corresponds to this one of the first axis.
+fn of_axis(address: ObjectAddress, node_axis: u8) -> ObjectAddress {
+    let object = MappedObject::new(address.index, address.subindex, 0).of_node_axis(node_axis);
+    ObjectAddress::new(object.index, object.subindex)
 }
 
 /// A velocity by its SI unit (CiA 303-2): the power of ten in the highest byte, the numerator and the divisor in the next ones.

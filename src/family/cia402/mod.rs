@@ -16,11 +16,14 @@ pub use starting::starting_configuration;
 
 use std::path::PathBuf;
 
+use takt_rt::{Id, MappedObject};
+
 use super::bring_up::AxisSession;
 use super::commission::dictionary::ObjectEntry;
 use super::commission::{SdoSession, TargetDrive, Task, profile};
 use super::{CarryingOut, DataSheet, Family, SettingUp};
 use crate::canopen::object::Object;
+use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use crate::sim::Drive;
 use bring_up::Sheet;
@@ -58,16 +61,26 @@ impl ConfiguredFamily for Cia402 {
 
     fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
         let quirks: Option<PathBuf> = keys.path("quirks");
+        let node_axis = keys.node_axis();
         keys.require("eds", "the electronic data sheet of the drive: eds = \"my-drive.eds\"");
         let eds = keys.path("eds")?;
-        match Device::load(&eds, quirks.as_deref()) {
-            Ok(device) => Some(drive(device)),
+        let node_axis = node_axis?;
+        let device = match Device::load(&eds, quirks.as_deref()) {
+            Ok(device) => device,
             Err(reason) => {
                 keys.refuse(
                     "eds",
                     eds.display().to_string(),
                     format!("the data sheet of a CiA 402 drive: {reason}"),
                 );
+                return None;
+            }
+        };
+        let axes = device.axes();
+        match device.of_axis(node_axis) {
+            Ok(device) => Some(drive(device)),
+            Err(reason) => {
+                keys.refuse("node_axis", node_axis.to_string(), format!("1 to {axes}: {reason}"));
                 None
             }
         }
@@ -96,6 +109,18 @@ impl Family for Cia402 {
         remarks(device(axis))
     }
 
+    fn pdo_id(&self, axis: &Axis, direction: PdoDirection, number: u16) -> Option<Id> {
+        device(axis).pdo_id(direction, number, axis.node)
+    }
+
+    fn mappable_objects(&self, axis: &Axis, number: u8) -> usize {
+        device(axis).mappable_objects(number)
+    }
+
+    fn can_pass_over(&self, axis: &Axis, dummy: MappedObject) -> bool {
+        device(axis).dictionary.dummies.iter().any(|code| code.0 == dummy.index)
+    }
+
     fn data_sheet<'d>(&self, drive: &'d DriveFamily) -> Option<&'d dyn DataSheet> {
         let device: &Device = drive.description()?;
         Some(device)
@@ -119,7 +144,7 @@ impl Family for Cia402 {
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
-        simulated::drive(axis, device(axis), &config.simulation)
+        simulated::drive(axis, device(axis), config)
     }
 }
 

@@ -2,16 +2,11 @@
 
 use super::device::Device;
 use crate::canopen::object::ObjectAddress;
+use crate::config::ErrorControl;
 
 /// Objects that keep a drive safe, or let a person see why it is not, and what is lost without each.
-const LOSSES: [(u16, u8, &str); 9] = [
-    (
-        0x1016,
-        1,
-        "the drive does not notice that the controller is gone (no consumer heartbeat, 1016): it goes on with its last command",
-    ),
+const LOSSES: [(u16, u8, &str); 7] = [
     (0x1029, 1, "what the drive does when the controller is gone cannot be chosen (no 1029)"),
-    (0x1017, 0, "the drive has no heartbeat (1017): only its process data shows that it is there"),
     (
         0x6061,
         0,
@@ -33,5 +28,20 @@ pub fn remarks(device: &Device) -> Vec<&'static str> {
     let is_absent = |(index, subindex, _): &&(u16, u8, &str)| {
         device.entry(ObjectAddress::new(*index, *subindex)).is_none()
     };
-    LOSSES.iter().filter(is_absent).map(|(_, _, loss)| *loss).collect()
+    let control = device.error_control();
+    let unsupervised = [
+        (!device.consumes_heartbeat() && !matches!(control, ErrorControl::Guarding { .. })).then_some(
+            "the drive does not notice that the controller is gone (no consumer heartbeat, 1016, and no node guarding in its \
+             place): it goes on with its last command",
+        ),
+        (control == ErrorControl::None).then_some(
+            "the drive has neither a heartbeat (1017) nor node guarding (100C, 100D): only its process data shows that it is \
+             there",
+        ),
+    ];
+    unsupervised
+        .into_iter()
+        .flatten()
+        .chain(LOSSES.iter().filter(is_absent).map(|(_, _, loss)| *loss))
+        .collect()
 }

@@ -8,10 +8,9 @@ use takt_rt::CommandSlot;
 use super::device::Device;
 use crate::config::{DriveFacts, MODES, mode_word};
 
-/// The text of a configuration with one axis, which has this drive. It is complete, and runs on a simulated bus; what nobody but
+/// The text of a configuration with this drive, and an axis for each of its own. It is complete, and runs on a simulated bus; what nobody but
 /// the owner of the machine can know is marked.
 pub fn starting_configuration(device: &Device, eds: &Path, node: u8) -> String {
-    let facts = device.facts(super::FACTS);
     let sheet = &device.dictionary.device;
     let named = |name: &Option<String>| name.clone().unwrap_or_else(|| "unnamed".to_owned());
     let mut text = String::new();
@@ -21,8 +20,26 @@ pub fn starting_configuration(device: &Device, eds: &Path, node: u8) -> String {
     line("# Try it as it is: takt run FILE. Then set the limits of your machine, and the interface of your bus.".to_owned());
     line("name = \"my-machine\"\n".to_owned());
     line("[[bus]]\nname = \"can\"\ninterface = \"sim\"  # \"can0\"\n".to_owned());
-    line("[[axis]]\nname = \"joint1\"\nbus = \"can\"".to_owned());
+    let axes: Vec<Device> =
+        (1..=device.axes()).filter_map(|axis| device.clone().of_axis(axis).ok()).collect();
+    for axis in &axes {
+        axis_lines(axis, eds, node, &mut line);
+    }
+    let takes_positions =
+        |axis: &Device| axis.facts(super::FACTS).usual_mode.target_slot() == CommandSlot::TargetPosition;
+    if axes.iter().all(takes_positions) {
+        line("[[program.move]]\nto = \"10 deg\"\n\n[[program.move]]\nto = \"0 deg\"".to_owned());
+    }
+    text
+}
+
+fn axis_lines(axis: &Device, eds: &Path, node: u8, line: &mut impl FnMut(String)) {
+    let facts = axis.facts(super::FACTS);
+    line(format!("[[axis]]\nname = \"joint{}\"\nbus = \"can\"", axis.node_axis));
     line(format!("node = {node}"));
+    if axis.node_axis > 1 {
+        line(format!("node_axis = {}", axis.node_axis));
+    }
     line(format!("drive = \"{}\"", facts.word));
     line(format!("eds = {:?}", eds.display().to_string()));
     line(format!(
@@ -35,11 +52,7 @@ pub fn starting_configuration(device: &Device, eds: &Path, node: u8) -> String {
         None => line("counts_per_turn = 65536  # YOURS: the data sheet does not say".to_owned()),
     }
     line("gear_ratio = 1  # YOURS: turns of the reported position for one turn of the joint".to_owned());
-    line("limits = { position = [\"-90 deg\", \"90 deg\"], velocity = \"30 deg/s\", acceleration = \"60 deg/s2\", torque = 10 }  # YOURS".to_owned());
-    if facts.usual_mode.target_slot() == CommandSlot::TargetPosition {
-        line("\n[[program.move]]\nto = \"10 deg\"\n\n[[program.move]]\nto = \"0 deg\"".to_owned());
-    }
-    text
+    line("limits = { position = [\"-90 deg\", \"90 deg\"], velocity = \"30 deg/s\", acceleration = \"60 deg/s2\", torque = 10 }  # YOURS\n".to_owned());
 }
 
 fn modes(facts: &DriveFacts) -> String {

@@ -49,7 +49,7 @@ pub type ProcedureError = procedure::ProcedureError<Failure>;
 pub fn procedure(target: TargetDrive, task: Task) -> Procedure {
     let quirks = family::sdo_quirks(&target.drive, target.family().sdo_quirks().timing);
     let session = CanopenSession::new(CanopenClient::new(target.node, quirks));
-    let c = SdoSession::new(session.clone());
+    let c = SdoSession::new(session.clone(), target.drive.node_axis);
     Procedure::new(session, async move {
         match task {
             Task::Read { objects } => objects::read(&c, &target, &objects).await,

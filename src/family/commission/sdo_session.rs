@@ -5,28 +5,40 @@
 
 use std::ops::Deref;
 
-use takt_rt::{Frame, Nanoseconds};
+use takt_rt::{Frame, MappedObject, Nanoseconds};
 
 use super::failure::Failure;
 use crate::canopen::object::{Object, ObjectAddress};
 use crate::canopen::sdo::{Completed, SdoError, Transfer, Uploaded};
 use crate::procedure::{Access, CanopenSession, POLL_NS};
 
-/// An SDO session with one drive. An interruption ends each wait, and is refused by each new transfer.
+/// An SDO session with one axis of a drive. An interruption ends each wait, and is refused by each new transfer.
+///
+/// The objects of the drive profile are named as those of the first axis of a node; those of the axis are read and written.
 #[derive(Debug)]
-pub struct SdoSession(CanopenSession);
+pub struct SdoSession {
+    session: CanopenSession,
+    node_axis: u8,
+}
 
 impl Deref for SdoSession {
     type Target = CanopenSession;
 
     fn deref(&self) -> &CanopenSession {
-        &self.0
+        &self.session
     }
 }
 
 impl SdoSession {
-    pub(super) fn new(session: CanopenSession) -> Self {
-        Self(session)
+    pub(super) const fn new(session: CanopenSession, node_axis: u8) -> Self {
+        Self { session, node_axis }
+    }
+
+    /// The object of the axis that corresponds to this one of the first axis of its node.
+    fn of_axis(&self, object: &Object) -> Object {
+        let ObjectAddress { index, subindex } = object.address;
+        let mapped = MappedObject::new(index, subindex, 0).of_node_axis(self.node_axis);
+        Object { address: ObjectAddress::new(mapped.index, mapped.subindex), ..*object }
     }
 
     /// Waits for a time.
@@ -72,6 +84,7 @@ impl SdoSession {
     /// # Errors
     /// The transfer failed, or the data is not a number.
     pub async fn read(&self, object: &Object) -> Result<i64, Failure> {
+        let object = &self.of_axis(object);
         let failed = |error| Failure::Transfer { object: *object, access: Access::Read, error };
         let uploaded = self.upload(object.address).await?.map_err(failed)?;
         number(object, &uploaded)
@@ -106,6 +119,7 @@ impl SdoSession {
     /// # Errors
     /// The number does not fit, or the transfer failed.
     pub async fn write(&self, object: &Object, value: i64) -> Result<(), Failure> {
+        let object = &self.of_axis(object);
         let data = object.data_type.encode(value).ok_or(Failure::DoesNotFit { object: *object, value })?;
         let outcome = self.transfer(Transfer::Download { object: object.address, data }).await?;
         match outcome {
@@ -143,6 +157,7 @@ impl SdoSession {
     /// # Errors
     /// As [`SdoSession::write`], and [`Failure::NotKept`].
     pub async fn write_and_check(&self, object: &Object, value: i64) -> Result<(), Failure> {
+        let object = &self.of_axis(object);
         self.write(object, value).await?;
         let received = self.read(object).await?;
         if received == value {
@@ -162,6 +177,7 @@ impl SdoSession {
         within_ns: Nanoseconds,
         is_wanted: impl Fn(i64) -> bool,
     ) -> Result<i64, Failure> {
+        let object = &self.of_axis(object);
         let began_ns = self.now_ns();
         loop {
             let value = self.read(object).await?;

@@ -123,7 +123,7 @@ async fn synchronisation(c: &AxisSession<'_>) -> StepResult {
 async fn process_data(c: &AxisSession<'_>) -> StepResult {
     match c.axis.mapping {
         PdoMapping::Written => {
-            let ProcessData { commands, feedback, .. } = ProcessData::of(c.axis);
+            let ProcessData { commands, feedback, .. } = ProcessData::of(c.axis, c.config);
             pdo_mapping::write(c, PdoDirection::Receive, &commands, PDO_COUNT).await?;
             pdo_mapping::write(c, PdoDirection::Transmit, &feedback, PDO_COUNT).await
         }

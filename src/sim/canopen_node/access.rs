@@ -86,6 +86,7 @@ impl CanopenNode {
     fn written(&mut self, index: u16, now_ns: Nanoseconds) {
         match index {
             0x1005 | 0x1006 => self.network.schedule_sync(now_ns, &self.dictionary),
+            0x100C | 0x100D => self.network.stop_life_guarding(),
             0x1016 => self.network.stop_master_monitor(),
             0x1017 => self.network.schedule_heartbeat(now_ns, &self.dictionary),
             _ if is_parameter(index) => self.pdos.compile(&self.dictionary),

@@ -81,6 +81,13 @@ impl Cia402Drive {
         self.axes.len()
     }
 
+    /// From now on gravity loads the joint of one of its axes so, counted from 0. An axis that is not there is left alone.
+    pub fn set_axis_gravity(&mut self, axis: usize, gravity: Gravity) {
+        if let Some(axis) = self.axes.get_mut(axis) {
+            axis.joint.set_gravity(gravity);
+        }
+    }
+
     /// The true state of one of its axes at `now_ns`, counted from 0.
     pub fn observe_axis(&mut self, now_ns: Nanoseconds, axis: usize) -> Option<Observation> {
         self.run_loops(now_ns);

@@ -10,7 +10,7 @@ use takt_rt::{
     ControlLaw, CycleInput, CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince,
     Follow, Frame, HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request,
     RequestEnvelope, RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories,
-    TimingLadder, TorqueLimits,
+    Supervision, TimingLadder, TorqueLimits,
 };
 
 // The C library gives the program its entry; nothing else of it is used.
@@ -63,6 +63,7 @@ fn axis() -> Option<AxisParameters> {
     Some(AxisParameters {
         bus: 0,
         node: 1,
+        node_axis: 1,
         commands: [CommandPdo::every_cycle(pdo(0x200, Mapping::commands(&commands).ok()?))]
             .into_iter()
             .collect(),
@@ -87,7 +88,7 @@ fn axis() -> Option<AxisParameters> {
         feed_forward: FeedForward::None,
         start_tolerance: 0.02,
         follow: Follow::Smooth,
-        heartbeat_timeout_cycles: None,
+        supervision: Supervision::Feedback,
         following_error_limit: 0.1,
         following_error_cycles: 50,
         missed_feedback_cycles: 5,

@@ -53,7 +53,7 @@ async fn configure(c: &AxisSession<'_>) -> StepResult {
     identity::compare(c, identity::PROFILE_CIA402).await?;
     c.write(CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
     c.step("process data", "this drive has two PDOs of each kind");
-    let data = ProcessData::of(c.axis);
+    let data = ProcessData::of(c.axis, c.config);
     pdo_mapping::write(c, PdoDirection::Receive, &data.commands, 2).await?;
     pdo_mapping::write(c, PdoDirection::Transmit, &data.feedback, 2).await?;
     c.write(MODES_OF_OPERATION, c.axis.control.operation_mode() as i64).await?;
