@@ -179,6 +179,8 @@ struct Outbound {
     /// The event objects of the last sent payload, to detect a change.
     events: u64,
     last_ns: Nanoseconds,
+    /// When its inhibit time ends.
+    free_ns: Nanoseconds,
     is_sent: bool,
 }
 
@@ -190,6 +192,7 @@ impl Outbound {
         self.due_ns = NEVER;
         self.events = 0;
         self.last_ns = 0;
+        self.free_ns = 0;
         self.is_sent = false;
     }
 }
@@ -230,6 +233,7 @@ impl PdoEngine {
             due_ns: NEVER,
             events: 0,
             last_ns: 0,
+            free_ns: 0,
             is_sent: false,
         });
         let mut engine = Self { inbound: inbound.collect(), outbound: outbound.collect(), features };
@@ -381,9 +385,8 @@ impl PdoEngine {
         dictionary: &SimulatedDictionary,
     ) {
         let outbound = &mut self.outbound[number];
-        let free_ns = if outbound.is_sent { outbound.last_ns + outbound.pdo.inhibit_ns } else { 0 };
         outbound.sampled = outbound.pdo.pack(dictionary);
-        outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(free_ns));
+        outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(outbound.free_ns));
     }
 
     /// How many SYNCs a synchronous TPDO waits for; `None` for another one.
@@ -420,6 +423,7 @@ impl PdoEngine {
         outbound.due_ns = NEVER;
         outbound.is_sent = true;
         outbound.last_ns = now_ns;
+        outbound.free_ns = now_ns + outbound.pdo.inhibit_ns;
         outbound.pdo.frame(outbound.sampled)
     }
 

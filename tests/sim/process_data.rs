@@ -20,6 +20,15 @@ fn nothing_is_sent_at_sync_before_the_node_is_started() {
 }
 
 #[test]
+fn an_event_driven_tpdo_without_objects_is_not_sent() {
+    let mut bench = Bench::new();
+    bench.write(0x1803, 1, 4, 0x485).unwrap();
+    bench.nmt(0x01);
+    bench.run_ms(5);
+    assert_eq!((bench.take(0x185).len(), bench.take(0x485).len()), (1, 0));
+}
+
+#[test]
 fn a_tpdo_of_type_n_is_sent_shortly_after_every_nth_sync() {
     for transmission_type in [1, 3, 240] {
         let mut bench = Bench::new();

@@ -151,12 +151,13 @@ fn only_mappable_objects_that_fit_a_pdo_can_be_mapped() {
     bench.write(0x1401, 0x01, 4, 0x8000_0305).unwrap();
     bench.write(0x1601, 0, 1, 0).unwrap();
     bench.write(0x1A01, 0, 1, 0).unwrap();
-    // In turn: not mappable, read-only in an RPDO, missing object, missing sub-index, wrong length.
+    // In turn: not mappable, read-only in an RPDO, missing object, missing sub-index, wrong length, a placeholder.
     assert_eq!(bench.write(0x1A01, 1, 4, 0x22A2_0010), Err(NOT_MAPPABLE));
     assert_eq!(bench.write(0x1601, 1, 4, 0x6064_0020), Err(NOT_MAPPABLE));
     assert_eq!(bench.write(0x1A01, 1, 4, 0x6072_0010), Err(NO_OBJECT));
     assert_eq!(bench.write(0x1A01, 1, 4, 0x607D_0320), Err(NO_SUBINDEX));
     assert_eq!(bench.write(0x1A01, 1, 4, 0x6064_0010), Err(NOT_MAPPABLE));
+    assert_eq!(bench.write(0x1601, 1, 4, 0x0005_0008), Err(NO_OBJECT));
     for subindex in 1..=3 {
         bench.write(0x1A01, subindex, 4, 0x6064_0020).unwrap();
     }

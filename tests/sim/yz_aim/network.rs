@@ -172,6 +172,24 @@ fn replies_to_rpdos_respect_the_inhibit_time() {
 }
 
 #[test]
+fn an_inhibit_time_applies_after_the_next_tpdo() {
+    let mut bench = bench(parameters(NODE));
+    bench.nmt(0x01);
+    bench.write(0x1803, 3, 2, 0).unwrap();
+    bench.send_data(0x505, [0, 0, 0, 0]);
+    bench.run_ms(1);
+    bench.write(0x1803, 3, 2, 100).unwrap();
+    bench.heard.clear();
+    for expected in [1, 0] {
+        bench.send_data(0x505, [0, 0, 0, 0]);
+        bench.run_ms(2);
+        assert_eq!(bench.take(0x485).len(), expected);
+    }
+    bench.run_ms(10);
+    assert_eq!(bench.take(0x485).len(), 1);
+}
+
+#[test]
 fn pdos_and_sync_do_nothing_before_operational() {
     let mut bench = bench(by_the_manual(NODE));
     bench.send_data(0x205, [0x2F, 0, 1, 0x50, 0xC3, 0, 0]);
