@@ -6,8 +6,9 @@ use std::path::PathBuf;
 use takt::Config;
 use takt::family::bring_up::ProcessData;
 use takt::family::cia402::{self, Device};
-use takt::family::commission::{CommandValue, MotionProfile, MoveKind, TargetDrive, Task};
+use takt::family::commission::{CommandValue, MotionProfile, MoveKind, ReadObject, TargetDrive, Task};
 use takt::internals::commission::bus_session::{self, SessionEvent};
+use takt::internals::commission::dictionary::{self, SelectedObject};
 use takt::internals::commission::procedure;
 use takt::schedule::{self, MessageKind};
 use takt::sim::{DriveFault, SimulatedBus};
@@ -316,4 +317,25 @@ fn commissioning_of_the_second_axis_moves_the_second_axis_alone() {
     assert!(profile_objects.iter().all(|index| *index >= 0x6800), "{profile_objects:04X?}");
     // Observed is the first axis of a node.
     assert!(bus.observe(1).unwrap().position.abs() < 1e-6);
+}
+
+#[test]
+fn an_object_is_read_from_the_axis_that_it_was_written_to() {
+    let config = machine("");
+    let mut bus = SimulatedBus::new(&config, 0);
+    let mut clock = VirtualClock::default();
+    let mut run = |axis: usize, task: Task| {
+        let target = TargetDrive::of(&config.axes[axis]).unwrap();
+        bus_session::run(procedure(target, task), &mut bus, &mut clock, || false, |_, _| {}).unwrap()
+    };
+    let found = dictionary::find(&config.axes[1].drive, "profile velocity").unwrap();
+    let SelectedObject::Known(entry) = found else { panic!("{found:?}") };
+    run(1, Task::Write { object: entry.object, value: 1234, entry: Some(entry) });
+    let mut read = |axis: usize| {
+        let object = ReadObject { address: entry.object.address, entry: Some(entry), data_type: None };
+        let report = run(axis, Task::Read { objects: vec![object] });
+        serde_json::to_value(&report).unwrap()["objects"][0]["raw"].as_i64().unwrap()
+    };
+    assert_eq!(read(1), 1234);
+    assert_ne!(read(0), 1234);
 }

@@ -1,6 +1,6 @@
 //! Describes frames in words, for the trace of a procedure.
 
-use takt_rt::{Frame, StoppedHeartbeat};
+use takt_rt::{Frame, MappedObject, StoppedHeartbeat};
 
 use super::dictionary::{self, ObjectEntry};
 use super::target::TargetDrive;
@@ -96,12 +96,16 @@ fn answered(target: &TargetDrive, response: &SdoResponse) -> String {
     }
 }
 
+/// The entry of an object, which is named as that of the first axis of the node.
 fn entry(target: &TargetDrive, address: ObjectAddress) -> Option<ObjectEntry> {
-    dictionary::entry(&target.drive, address)
+    let own = MappedObject::new(address.index, address.subindex, 0);
+    let first = own.as_of_first_axis(target.drive.node_axis);
+    dictionary::entry(&target.drive, ObjectAddress::new(first.index, first.subindex))
 }
 
 fn named(target: &TargetDrive, address: ObjectAddress) -> String {
-    entry(target, address).map_or_else(|| address.to_string(), |entry| entry.object.to_string())
+    let name = |entry: ObjectEntry| Object { address, ..entry.object }.to_string();
+    entry(target, address).map_or_else(|| address.to_string(), name)
 }
 
 fn value(target: &TargetDrive, address: ObjectAddress, bytes: &[u8]) -> String {

@@ -36,9 +36,12 @@ impl SdoSession {
 
     /// The object of the axis that corresponds to this one of the first axis of its node.
     fn of_axis(&self, object: &Object) -> Object {
-        let ObjectAddress { index, subindex } = object.address;
-        let mapped = MappedObject::new(index, subindex, 0).of_node_axis(self.node_axis);
-        Object { address: ObjectAddress::new(mapped.index, mapped.subindex), ..*object }
+        Object { address: self.address_of_axis(object.address), ..*object }
+    }
+
+    fn address_of_axis(&self, address: ObjectAddress) -> ObjectAddress {
+        let mapped = MappedObject::new(address.index, address.subindex, 0).of_node_axis(self.node_axis);
+        ObjectAddress::new(mapped.index, mapped.subindex)
     }
 
     /// Waits for a time.
@@ -75,6 +78,7 @@ impl SdoSession {
     /// # Errors
     /// See [`SdoSession::transfer`].
     pub async fn upload(&self, address: ObjectAddress) -> Result<Result<Uploaded, SdoError>, Failure> {
+        let address = self.address_of_axis(address);
         self.gap().await;
         if self.is_interrupted() { Err(Failure::Interrupted) } else { Ok(self.read_bytes(address).await) }
     }
