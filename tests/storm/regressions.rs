@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 14] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 15] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -284,6 +284,10 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 14] = [
     (
         66_000_032_281,
         "A drive that had heard no heartbeat yet was cut off with its bus, and nothing could stop it",
+    ),
+    (
+        67_000_011_973,
+        "A YZ-AIM whose alarm ended by itself was enabled again after its group was disabled, for want of another controlword",
     ),
     (65_000_032_737, "The correction of a velocity stayed as it was when the feedback did not come any more"),
 ];

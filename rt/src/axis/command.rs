@@ -130,6 +130,12 @@ impl Axis {
         self.controlwords.may_be_switching_on()
     }
 
+    /// Whether the drive has been told to leave operation enabled since it was told to go there, if it can be told so by process
+    /// data.
+    pub fn is_told_to_switch_off(&self) -> bool {
+        self.controlwords.leads_away() || self.is_pdo_unreachable()
+    }
+
     /// The controlword that brings the drive one step nearer to `goal`.
     #[inline]
     fn word_towards(&self, goal: Goal) -> u16 {

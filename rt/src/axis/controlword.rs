@@ -37,6 +37,11 @@ impl ControlwordSender {
         };
     }
 
+    /// Takes a controlword that the drive has got by another way than process data.
+    pub(super) fn note_by_service(&mut self, word: u16) {
+        (self.last, self.age_cycles) = (word, 0);
+    }
+
     /// The last controlword without the bits of its mode of operation.
     pub(super) const fn last(&self) -> u16 {
         self.last
@@ -55,6 +60,12 @@ impl ControlwordSender {
     /// Whether the drive has been disabled for so long that no older controlword is under way, and no older statusword.
     pub(super) const fn is_disabled_for_long(&self) -> bool {
         self.last == controlword::SHUTDOWN && self.age_cycles >= SETTLED_CYCLES
+    }
+
+    /// Whether the last controlword leads away from operation enabled, or none has been sent. It is one that has left: late ones are
+    /// not made.
+    pub(super) const fn leads_away(&self) -> bool {
+        !matches!(self.last, controlword::SWITCH_ON | controlword::ENABLE_OPERATION)
     }
 
     /// Whether a controlword that leads to operation enabled may still be on its way to the drive, or the drive's answer on
@@ -84,6 +95,19 @@ mod tests {
                 assert_eq!(sender.may_be_switching_on(), !has_torque && cycle <= SETTLED_CYCLES);
             }
         }
+    }
+
+    #[test]
+    fn only_a_controlword_that_has_left_leads_a_drive_away_from_operation_enabled() {
+        let mut sender = ControlwordSender::default();
+        assert!(sender.leads_away(), "nothing has led it there");
+        sender.take(ENABLE, 0, true, true);
+        assert!(!sender.leads_away());
+        // By process data, or by SDO.
+        let mut told_by_service = sender;
+        sender.take(SHUTDOWN, 0, false, true);
+        told_by_service.note_by_service(controlword::DISABLE_VOLTAGE);
+        assert!(sender.leads_away() && told_by_service.leads_away());
     }
 
     #[test]

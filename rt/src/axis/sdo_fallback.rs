@@ -92,14 +92,16 @@ impl SdoFallback {
         Some(Frame::of(Id::canopen(SDO_REQUEST, node), request))
     }
 
-    /// Takes a frame that may be the confirmation.
-    fn receive(&mut self, from: Address, frame: &Frame) {
-        if let Self::Writing { word, .. } = *self
-            && frame.id() == Id::canopen(SDO_ANSWER, from.node)
-            && frame.payload().starts_with(&controlword_of(from.node_axis, DOWNLOADED))
-        {
-            *self = Self::Confirmed { word };
+    /// Takes a frame that may be the confirmation. Returns the controlword that it confirms.
+    fn receive(&mut self, from: Address, frame: &Frame) -> Option<u16> {
+        let Self::Writing { word, .. } = *self else { return None };
+        let is_confirmed = frame.id() == Id::canopen(SDO_ANSWER, from.node)
+            && frame.payload().starts_with(&controlword_of(from.node_axis, DOWNLOADED));
+        if !is_confirmed {
+            return None;
         }
+        *self = Self::Confirmed { word };
+        Some(word)
     }
 
     /// Whether the node may still be about to answer: so many slots are left until the controlword is written again.
@@ -156,6 +158,7 @@ impl Axis {
     pub fn stop_frame(&mut self, repeat_slots: u32) -> Option<Frame> {
         let word = self.sdo_fallback.take_due_word(repeat_slots)?;
         self.command.set(CommandSlot::Controlword, word.into());
+        self.controlwords.note_by_service(word);
         let carries_it = |command: &&CommandPdo| command.pdo.mapping.sends(CommandSlot::Controlword);
         let command = self.parameters.commands.iter().find(carries_it)?;
         Some(command.pdo.frame(&self.command))
@@ -163,7 +166,9 @@ impl Axis {
 
     /// Takes a frame that may confirm a controlword that was written by SDO.
     pub fn receive_service(&mut self, frame: &Frame) {
-        self.sdo_fallback.receive(self.sdo_address(), frame);
+        if let Some(word) = self.sdo_fallback.receive(self.sdo_address(), frame) {
+            self.controlwords.note_by_service(word);
+        }
     }
 
     /// Whether the node may still be about to answer such a frame, of which so many slots are left until it is sent again.

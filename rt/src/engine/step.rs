@@ -266,11 +266,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             let is_over = timeout_cycles.is_some_and(|timeout_cycles| silent_cycles > timeout_cycles);
             is_over && !is_on_way && !axis.is_pdo_unreachable()
         };
-        // The set-points of a drive that seems to follow go on to rest, though it may have said otherwise by SDO; and
-        // one that shows no torque yet may be about to have it.
+        // The set-points of a drive that seems to follow go on to rest, though it may have said otherwise by SDO; and one that shows
+        // no torque yet may be about to have it. One with a fault that ends by itself goes on where its last controlword leads.
         let is_waited_for = |axis: &Axis| {
             let may_have_torque = axis.has_torque()
                 || axis.may_be_switching_on()
+                || !axis.is_told_to_switch_off()
                 || is_on_way && axis.drive_state().has_torque();
             may_have_torque && !has_stopped_by_itself(axis)
         };
