@@ -12,6 +12,7 @@ use crate::erob_can::frame::{ReceivedRequest, Reply, reply_id};
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, NodeState, Observation};
 use crate::sim::mailbox::Mailbox;
+use crate::sim::motion::Generator;
 use crate::sim::plant::{Encoder, Gravity, Joint, JointParameters};
 use crate::sim::servo::Servo;
 
@@ -97,8 +98,8 @@ pub struct ErobCanDrive {
     servo: Servo,
     joint: Joint,
     torque: f64,
-    /// The demand of velocity control: counts/s.
-    ramped_velocity: f64,
+    /// The demand of velocity control.
+    velocity_demand: Generator,
     /// What is added to the encoder's counts since the count of turns was lost.
     counts_offset: i32,
     has_battery_alarm: bool,
@@ -120,7 +121,7 @@ impl ErobCanDrive {
             servo: Servo::new(joint.inertia, peak_torque, highest_velocity),
             joint: Joint::new(joint, parameters.initial_position),
             torque: 0.0,
-            ramped_velocity: 0.0,
+            velocity_demand: Generator::default(),
             counts_offset: 0,
             has_battery_alarm: false,
             defects: Defects::default(),
@@ -243,7 +244,7 @@ impl ErobCanDrive {
             (1, Power::Off) if now_ns < self.ready_ns => Err(Some(ErrorCode::NO_COMMUTATION)),
             (1, Power::Off) => {
                 self.servo.reset();
-                self.ramped_velocity = self.velocity_counts();
+                self.velocity_demand.velocity = self.velocity_counts();
                 self.power =
                     Power::On { motion: Motion::resting_at(self.counts().into()), settled_ns: now_ns };
                 Ok(())
@@ -373,16 +374,9 @@ impl ErobCanDrive {
     }
 
     fn step_velocity(&mut self, velocity: f64, per_unit: f64) -> f64 {
-        let wanted = self.settings.get(SET_POINT);
-        let is_faster = wanted * self.ramped_velocity >= 0.0 && wanted.abs() > self.ramped_velocity.abs();
-        let rate = if is_faster {
-            motion::acceleration(&self.settings)
-        } else {
-            motion::deceleration(&self.settings)
-        };
-        let most = rate * STEP_S;
-        self.ramped_velocity += (wanted - self.ramped_velocity).clamp(-most, most);
-        self.servo.velocity(self.ramped_velocity / per_unit, velocity, 0.0, STEP_S)
+        let (faster, slower) = (motion::acceleration(&self.settings), motion::deceleration(&self.settings));
+        self.velocity_demand.ramp_between(self.settings.get(SET_POINT), faster, slower, STEP_S);
+        self.servo.velocity(self.velocity_demand.velocity / per_unit, velocity, 0.0, STEP_S)
     }
 
     fn step_position(

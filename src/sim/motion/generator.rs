@@ -11,7 +11,7 @@ const FORWARD_PERIODS: f64 = 2.0;
 pub const ARRIVED: f64 = 0.01;
 
 /// The demanded position and velocity of one axis, and the way to its target.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Generator {
     /// Demanded position: counts.
     pub position: f64,
