@@ -21,8 +21,8 @@
 //! [`Controller`] does the same in real time, on the buses that the configuration names, and takes commands from any thread.
 //!
 //! This crate is the half that is not real-time: set-up, configuration, files, people, simulation. What runs inside the
-//! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two is a door of
-//! bounded, lock-free channels, and nothing else.
+//! real-time thread is the crate [`takt_rt`], which is `no_std` and links no allocator. Between the two are bounded, lock-free
+//! channels, and nothing else.
 //!
 //! # What is here
 //! The root has what most programs need: [`Config`], [`Controller`] and its [`Handle`]s, [`VirtualRun`], [`Trajectory`], the
@@ -73,7 +73,7 @@
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! canopen erob_can                    CiA 301, 305 and 306; eRob's own protocol; both without I/O
-//! channels                            the lock-free door to the real-time thread
+//! channels                            the lock-free channels to the real-time thread
 //! trajectory frame_time sleep_alignment source_text printable text_file
 //! ```
 //!
