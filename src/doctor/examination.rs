@@ -27,7 +27,7 @@ pub struct Examination {
     pub self_test: Option<SelfTest>,
 }
 
-/// Examines a machine. `attempt` is the result of [`super::attempt`] on it.
+/// Examines a machine. `attempt` is what a real-time thread was granted on it.
 pub fn examine(source: &Source, subject: &Subject, attempt: &ThreadReport) -> Examination {
     let threads = threads(source);
     let cpu = subject.cpu;
