@@ -1,6 +1,10 @@
 //! The frames that the manual prints. The encoders produce every host frame without a misprint, and the decoders read
 //! every drive frame without a misprint.
 
+#[path = "vectors/rows.rs"]
+mod rows;
+
+use rows::columns;
 use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
 use takt::canopen::object::ObjectAddress;
 use takt::canopen::sdo::{Completed, SdoTiming, Transfer};
@@ -21,7 +25,7 @@ struct Vector {
 
 /// The CANopen rows without misprints.
 fn vectors() -> Vec<Vector> {
-    let rows = VECTORS.lines().skip(1).map(fields);
+    let rows = VECTORS.lines().skip(1).map(columns);
     let usable = rows.filter(|row| !row[8].starts_with("MISPRINT") && !row[3].starts_with("64"));
     let canopen = usable.filter(|row| !row[3].starts_with("5C"));
     canopen.map(|row| vector(&row)).collect()
@@ -37,20 +41,6 @@ fn vector(row: &[String]) -> Vector {
         meaning: row[6].clone(),
         value: row[7].parse().ok(),
     }
-}
-
-/// Splits a line at commas outside quotation marks.
-fn fields(line: &str) -> Vec<String> {
-    let mut fields = vec![String::new()];
-    let mut is_quoted = false;
-    for character in line.chars() {
-        match character {
-            '"' => is_quoted = !is_quoted,
-            ',' if !is_quoted => fields.push(String::new()),
-            _ => fields.last_mut().unwrap().push(character),
-        }
-    }
-    fields
 }
 
 impl Vector {

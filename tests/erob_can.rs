@@ -375,3 +375,21 @@ fn resetting_the_encoder_wipes_the_count_of_turns() {
     bench.run(async |session| module::reset_encoder(&session).await, |_, _| false).unwrap();
     assert_eq!(position(&mut bench).unwrap(), 131_072);
 }
+
+#[test]
+fn firmware_that_takes_the_velocity_limit_while_enabled_is_an_option_of_the_simulation() {
+    for has_free_velocity_limit in [false, true] {
+        let parameters = ErobCanParameters { has_free_velocity_limit, ..parameters() };
+        let mut bench = Bench { now_ns: 9 * SECOND, ..Bench::of(parameters) };
+        let written: Outcome<(), RequestError> = bench.run(
+            async |session| {
+                session.write(&entries::MOTOR_ENABLE, 1).await?;
+                session.write(&entries::TORQUE_VELOCITY_LIMIT, 10_000).await
+            },
+            |_, _| false,
+        );
+        let refusal = written.err().map(|error| error.failure.failure);
+        let expected = RequestFailure::Refused(Some(ErrorCode::ENABLED));
+        assert_eq!(refusal, (!has_free_velocity_limit).then_some(expected));
+    }
+}

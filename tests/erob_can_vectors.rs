@@ -1,25 +1,15 @@
 //! eRob's own CAN protocol against what the manual prints: its frames, and its table of addresses.
 
+#[path = "vectors/rows.rs"]
+mod rows;
+
+use rows::columns;
 use takt::internals::erob_can::entries::{self, Entry, EntryAccess, Unit};
 use takt::internals::erob_can::frame::{EntryAddress, ReceivedRequest, Reply, Request, replying_node};
 use takt_rt::{Frame, Id};
 
 const VECTORS: &str = include_str!("vectors/erob-can.csv");
 const OBJECTS: &str = include_str!("vectors/erob-objects.csv");
-
-/// The columns of a line; commas within quotation marks do not divide them.
-fn columns(line: &str) -> Vec<String> {
-    let mut columns = vec![String::new()];
-    let mut is_quoted = false;
-    for character in line.chars() {
-        match character {
-            '"' => is_quoted = !is_quoted,
-            ',' if !is_quoted => columns.push(String::new()),
-            _ => columns.last_mut().unwrap().push(character),
-        }
-    }
-    columns
-}
 
 fn hexadecimal(text: &str) -> u16 {
     u16::from_str_radix(text, 16).unwrap()

@@ -4,9 +4,9 @@ use takt_rt::{Frame, Nanoseconds};
 
 use super::client::Client;
 use super::session::ProcedureSession;
-use crate::erob_can::client::{Answer, RequestClient, RequestError};
+use crate::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure};
 use crate::erob_can::entries::Entry;
-use crate::erob_can::frame::Request;
+use crate::erob_can::frame::{Reply, Request};
 
 impl Client for RequestClient {
     type Message = Frame;
@@ -34,11 +34,11 @@ impl ErobCanSession {
     /// # Errors
     /// The drive refuses, or does not reply.
     pub async fn read(&self, entry: &Entry) -> Result<i32, RequestError> {
-        Ok(match self.exchange(Request::Read(entry.address)).await? {
-            Answer::Value(value) => value,
-            // The client takes no other reply to a read.
-            Answer::Done => 0,
-        })
+        let request = Request::Read(entry.address);
+        match self.exchange(request).await? {
+            Answer::Value(value) => Ok(value),
+            Answer::Done => Err(RequestError { request, failure: RequestFailure::WrongReply(Reply::Done) }),
+        }
     }
 
     /// Writes an entry, or gives a command its argument.

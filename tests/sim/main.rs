@@ -9,6 +9,8 @@ mod network;
 mod port;
 mod process_data;
 mod profiles;
+#[path = "../vectors/rows.rs"]
+mod rows;
 mod sdo;
 mod vectors;
 mod yz_aim;

@@ -1,6 +1,7 @@
 //! Every CANopen exchange that the manual prints, byte for byte.
 
 use super::bench::{Bench, parameters};
+use super::rows::columns;
 
 struct Row {
     id: String,
@@ -13,7 +14,7 @@ struct Row {
 fn rows() -> Vec<Row> {
     let text = include_str!("../vectors/erob-can.csv");
     let rows = text.lines().skip(1).filter_map(|line| {
-        let mut columns = split(line).into_iter();
+        let mut columns = columns(line).into_iter();
         let (id, _, direction, can_id, data) =
             (columns.next()?, columns.next()?, columns.next()?, columns.next()?, columns.next()?);
         let note = columns.nth(3).unwrap_or_default();
@@ -26,20 +27,6 @@ fn rows() -> Vec<Row> {
         Some(Row { id, is_request: direction == "host->drive", can_id, data })
     });
     rows.collect()
-}
-
-/// Splits a line of the table at commas outside quotation marks.
-fn split(line: &str) -> Vec<String> {
-    let mut columns = vec![String::new()];
-    let mut is_quoted = false;
-    for character in line.chars() {
-        match character {
-            '"' => is_quoted = !is_quoted,
-            ',' if !is_quoted => columns.push(String::new()),
-            _ => columns.last_mut().unwrap().push(character),
-        }
-    }
-    columns
 }
 
 #[test]

@@ -24,6 +24,10 @@ const SAVE_NS: Nanoseconds = 3_000_000_000;
 /// A joint slower than this does not move: counts/s.
 const STANDING: f64 = 200.0;
 
+/// By how much the torque twists the joint between its encoders: counts for one N·m. Not published; of the size of a strain wave gear,
+/// about 40,000 N·m/rad.
+const TWIST: f64 = 2.0;
+
 /// What a simulated module is made with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ErobCanParameters {
@@ -310,7 +314,7 @@ impl ErobCanDrive {
             (0x009F, None) => f64::from(self.counts()).rem_euclid(self.parameters.counts_per_turn) as i32,
             (0x010C, None) => self.target_state(),
             // The difference of the two encoders; in no table of the manual (a program of the vendor reads it).
-            (0x0119, None) => (self.torque * 2.0).round() as i32,
+            (0x0119, None) => (self.torque * TWIST).round() as i32,
             // A module without a torque sensor.
             (0x020D, None) => return None,
             (0x0232, Some(1)) => i32::from(self.node) + 1_000,
