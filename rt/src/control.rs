@@ -185,16 +185,29 @@ impl ControlLaw {
         }
     }
 
+    /// Stiffness and damping of the loop that makes a torque: those of the demand, or its own.
+    pub const fn gains(&self, demand: &TorqueDemand) -> (f64, f64) {
+        match (self, demand) {
+            (_, TorqueDemand::Impedance { stiffness, damping, .. })
+            | (Self::Torque { stiffness, damping, .. }, TorqueDemand::Law { .. }) => (*stiffness, *damping),
+            _ => (0.0, 0.0),
+        }
+    }
+
+    /// The velocity (rad/s, m/s) of a set-point: for a drive that follows velocities with what its position loop adds.
+    pub fn velocity(&self, input: &LoopInput, limits: &AxisLimits) -> f64 {
+        let Self::Velocity { position_gain } = *self else { return input.set.velocity };
+        let velocity = input.set.velocity + position_gain * input.error.position;
+        velocity.clamp(-limits.velocity, limits.velocity)
+    }
+
     /// The torque (N·m, N) that is commanded beside the loops of the drive: where it closes them all, what is fed forward.
     pub fn torque(&self, input: &LoopInput, demand: &TorqueDemand) -> f64 {
-        let (stiffness, damping, fed_forward) = match (*self, *demand) {
-            (_, TorqueDemand::Torque(torque)) => return torque,
-            (Self::Torque { stiffness, damping, .. }, TorqueDemand::Law { torque }) => {
-                (stiffness, damping, torque)
-            }
-            (_, TorqueDemand::Impedance { stiffness, damping, torque }) => (stiffness, damping, torque),
-            (_, TorqueDemand::Law { torque }) => (0.0, 0.0, torque),
+        let fed_forward = match *demand {
+            TorqueDemand::Torque(torque) => return torque,
+            TorqueDemand::Impedance { torque, .. } | TorqueDemand::Law { torque } => torque,
         };
+        let (stiffness, damping) = self.gains(demand);
         let Self::Torque { inertia, viscous_friction, coulomb_friction, .. } = *self else {
             return fed_forward;
         };
@@ -217,10 +230,7 @@ impl ControlLaw {
             }
             Self::ProfileVelocity => scale.velocity_to_drive(input.set.velocity),
             Self::ProfileTorque => 0,
-            Self::Velocity { position_gain } => {
-                let velocity = input.set.velocity + position_gain * input.error.position;
-                scale.velocity_to_drive(velocity.clamp(-limits.velocity, limits.velocity))
-            }
+            Self::Velocity { .. } => scale.velocity_to_drive(self.velocity(input, limits)),
             Self::Torque { .. } => scale.torque_to_per_mille(torque),
         }
     }

@@ -3,7 +3,7 @@
 
 use arrayvec::ArrayVec;
 
-use crate::axis::{Pdo, SenderByte};
+use crate::axis::SenderByte;
 use crate::frame::{Frame, FrameFormat, FrameKind, Id};
 use crate::record::MAX_AXES;
 
@@ -89,13 +89,19 @@ impl core::fmt::Display for IdTaken {
 }
 
 impl Dispatch {
-    /// Enters a feedback PDO (0 to 3) of an axis (0 to 31). Several axes may have the same identifier where a byte tells their frames
+    /// Enters the feedback frame of an axis (0 to 31) with a number (0 to 3). Several axes may have the same identifier where a byte tells their frames
     /// apart: in the same place, and with another value for each.
-    pub fn feedback(&mut self, pdo: &Pdo, axis: u8, number: u8) -> Result<(), IdTaken> {
-        let entry = entry_of(pdo.id, axis, number.min(ERROR_CONTROL - 1))? | format_bit(pdo.format);
-        match pdo.sender {
-            None => self.enter(pdo.id, entry),
-            Some(sender) => self.share(SharedId { id: pdo.id, sender, entry }),
+    pub fn feedback(
+        &mut self,
+        id: Id,
+        format: FrameFormat,
+        sender: Option<SenderByte>,
+        (axis, number): (u8, u8),
+    ) -> Result<(), IdTaken> {
+        let entry = entry_of(id, axis, number.min(ERROR_CONTROL - 1))? | format_bit(format);
+        match sender {
+            None => self.enter(id, entry),
+            Some(sender) => self.share(SharedId { id, sender, entry }),
         }
     }
 
@@ -257,6 +263,7 @@ const fn destination_of(entry: u16) -> Destination {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::axis::Pdo;
     use crate::pdo::Mapping;
 
     fn pdo(id: Id) -> Pdo {
@@ -267,6 +274,10 @@ mod tests {
         Pdo { sender: Some(SenderByte { at, value }), ..pdo(id) }
     }
 
+    fn enter(table: &mut Dispatch, pdo: &Pdo, axis: u8, number: u8) -> Result<(), IdTaken> {
+        table.feedback(pdo.id, pdo.format, pdo.sender, (axis, number))
+    }
+
     #[test]
     fn every_axis_and_pdo_is_found_by_its_identifier_alone() {
         let mut table = Dispatch::default();
@@ -275,7 +286,7 @@ mod tests {
             table.emergency(Id::canopen(0x080, node), axis).unwrap();
             for number in 0..4u8 {
                 let id = Id::canopen(0x180 + 0x100 * u16::from(number), node);
-                table.feedback(&pdo(id), axis, number).unwrap();
+                enter(&mut table, &pdo(id), axis, number).unwrap();
             }
         }
         for axis in 0..32u8 {
@@ -291,8 +302,8 @@ mod tests {
     fn one_identifier_has_one_owner() {
         let mut table = Dispatch::default();
         let id = Id::canopen(0x180, 1);
-        table.feedback(&pdo(id), 0, 0).unwrap();
-        assert_eq!(table.feedback(&pdo(id), 1, 0), Err(IdTaken { id }));
+        enter(&mut table, &pdo(id), 0, 0).unwrap();
+        assert_eq!(enter(&mut table, &pdo(id), 1, 0), Err(IdTaken { id }));
     }
 
     #[test]
@@ -302,7 +313,7 @@ mod tests {
             let node = axis + 1;
             table.emergency(Id::canopen(0x080, node), axis).unwrap();
             table.error_control(Id::canopen(0x700, node), axis).unwrap();
-            table.feedback(&pdo(Id::canopen(0x180, node)), axis, 0).unwrap();
+            enter(&mut table, &pdo(Id::canopen(0x180, node)), axis, 0).unwrap();
             table.unused(Id::canopen(0x280, node), axis).unwrap();
         }
         table.foreign(Id::canopen(0x200, 2), FrameFormat::Classic);
@@ -322,7 +333,7 @@ mod tests {
     fn remote_and_extended_frames_are_no_feedback() {
         let mut table = Dispatch::default();
         let id = Id::canopen(0x180, 1);
-        table.feedback(&pdo(id), 0, 0).unwrap();
+        enter(&mut table, &pdo(id), 0, 0).unwrap();
         assert_eq!(table.destination(&Frame::remote(id, 8).unwrap()), Destination::Service);
         let extended = Frame::of(Id::extended(0x181).unwrap(), [0; 8]);
         assert_eq!(table.destination(&extended), Destination::Service);
@@ -331,7 +342,7 @@ mod tests {
     #[test]
     fn a_flexible_data_rate_frame_is_neither_feedback_nor_a_foreign_master_on_any_identifier() {
         let mut table = Dispatch::default();
-        table.feedback(&pdo(Id::canopen(0x180, 1)), 0, 0).unwrap();
+        enter(&mut table, &pdo(Id::canopen(0x180, 1)), 0, 0).unwrap();
         table.emergency(Id::canopen(0x080, 1), 0).unwrap();
         table.error_control(Id::canopen(0x700, 1), 0).unwrap();
         table.foreign(Id::canopen(0x200, 1), FrameFormat::Classic);
@@ -350,7 +361,7 @@ mod tests {
         let id = |number: u32| Id::extended(number.wrapping_mul(0x0345_6789) & 0x1FFF_FFFF).unwrap();
         let axis = |number: u32| (number % 32) as u8;
         for number in 0..EXTENDED_IDS as u32 {
-            table.feedback(&pdo(id(number)), axis(number), 1).unwrap();
+            enter(&mut table, &pdo(id(number)), axis(number), 1).unwrap();
         }
         for number in 0..EXTENDED_IDS as u32 {
             let destination = table.destination(&Frame::of(id(number), [0; 8]));
@@ -358,10 +369,10 @@ mod tests {
             assert_eq!(table.emergency(id(number), 0), Err(IdTaken { id: id(number) }));
         }
         let one_more = id(1_000);
-        assert_eq!(table.feedback(&pdo(one_more), 0, 0), Err(IdTaken { id: one_more }));
+        assert_eq!(enter(&mut table, &pdo(one_more), 0, 0), Err(IdTaken { id: one_more }));
         assert_eq!(table.destination(&Frame::of(one_more, [])), Destination::Service);
         // An 11-bit identifier with the same number is another one.
-        table.feedback(&pdo(Id::base(0).unwrap()), 3, 0).unwrap();
+        enter(&mut table, &pdo(Id::base(0).unwrap()), 3, 0).unwrap();
         let base = Frame::of(Id::base(0).unwrap(), []);
         assert_eq!(table.destination(&base), Destination::Feedback { axis: 3, pdo: 0 });
     }
@@ -370,7 +381,7 @@ mod tests {
     fn a_drive_of_flexible_data_rate_is_heard_with_and_without_bit_rate_switch_and_not_by_classic_frames() {
         let mut table = Dispatch::default();
         let (reply, command) = (Id::base(0x064).unwrap(), Id::base(0x001).unwrap());
-        table.feedback(&Pdo { format: FrameFormat::Fd, ..pdo(reply) }, 2, 0).unwrap();
+        enter(&mut table, &Pdo { format: FrameFormat::Fd, ..pdo(reply) }, 2, 0).unwrap();
         table.foreign(command, FrameFormat::FdBitRateSwitch);
         for has_bit_rate_switch in [false, true] {
             let to = |id| table.destination(&Frame::fd(id, &[0; 16], has_bit_rate_switch).unwrap());
@@ -387,7 +398,7 @@ mod tests {
         for id in [Id::base(0x064).unwrap(), Id::extended(0x064).unwrap()] {
             let mut table = Dispatch::default();
             for axis in 0..4u8 {
-                table.feedback(&shared(id, 0, axis + 1), axis, 0).unwrap();
+                enter(&mut table, &shared(id, 0, axis + 1), axis, 0).unwrap();
             }
             let to = |table: &Dispatch, payload: &[u8]| table.destination(&Frame::data(id, payload).unwrap());
             for axis in 0..4u8 {
@@ -396,18 +407,18 @@ mod tests {
             assert_eq!(to(&table, &[9, 0x80]), Destination::Service, "nobody's");
             assert_eq!(to(&table, &[]), Destination::Service, "it has no such byte");
             let taken = Err(IdTaken { id });
-            assert_eq!(table.feedback(&shared(id, 0, 2), 5, 0), taken, "two drives would be one");
-            assert_eq!(table.feedback(&shared(id, 1, 9), 5, 0), taken, "another place");
-            assert_eq!(table.feedback(&pdo(id), 5, 0), taken, "all of its frames");
+            assert_eq!(enter(&mut table, &shared(id, 0, 2), 5, 0), taken, "two drives would be one");
+            assert_eq!(enter(&mut table, &shared(id, 1, 9), 5, 0), taken, "another place");
+            assert_eq!(enter(&mut table, &pdo(id), 5, 0), taken, "all of its frames");
             let fd = Pdo { format: FrameFormat::Fd, ..shared(id, 0, 9) };
-            assert_eq!(table.feedback(&fd, 5, 0), taken, "another kind of frame");
+            assert_eq!(enter(&mut table, &fd, 5, 0), taken, "another kind of frame");
             table.forget_process_data(1);
             assert_eq!(to(&table, &[2]), Destination::Service);
             assert_eq!(to(&table, &[3]), Destination::Feedback { axis: 2, pdo: 0 });
             for axis in [0, 2, 3] {
                 table.forget_process_data(axis);
             }
-            table.feedback(&pdo(id), 5, 0).unwrap();
+            enter(&mut table, &pdo(id), 5, 0).unwrap();
         }
     }
 }

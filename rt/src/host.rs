@@ -2,6 +2,7 @@
 //! bounded, lock-free channels. No call waits; a full channel drops, and says so.
 
 use crate::answers::Answers;
+use crate::axis::OffCycleReport;
 use crate::cia402;
 use crate::frame::Frame;
 use crate::motion_reports::MotionReports;
@@ -21,6 +22,12 @@ use crate::watch::TimingLevel;
 pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
     /// The oldest request that waits.
     fn request(&mut self) -> Option<RequestEnvelope<AXES>> {
+        None
+    }
+
+    /// The oldest report that waits of a drive that is spoken to outside of the cycle ([`Exchange::OffCycle`](crate::Exchange)), with
+    /// the number of its axis. Asked for only where there are such axes.
+    fn off_cycle_report(&mut self) -> Option<(u8, OffCycleReport)> {
         None
     }
 
@@ -212,7 +219,11 @@ pub struct AxisSnapshot {
     /// Object 6060, the mode of operation that is commanded; 0 before the first cycle. While it is being changed this is the new
     /// mode already, and `mode` the old one until the drive shows the new one.
     pub mode_set: i8,
-    /// Object 6041.
+    /// The temperature that the drive reports: °C; `None` if it reports none.
+    pub temperature: Option<f32>,
+    /// Object 6040 as it is commanded; 0 before the first cycle. It says what is wanted of a drive without such an object, too.
+    pub controlword: u16,
+    /// Object 6041; of a drive without such an object, one that shows the same state.
     pub statusword: u16,
     /// What it says of the drive.
     pub drive_state: cia402::DriveState,

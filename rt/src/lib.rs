@@ -19,7 +19,8 @@
 //!    deviations of a drive ([`Cia402Codec`]), the handshake of profile position, the loops closed here ([`ControlLaw`]), SI to
 //!    drive units ([`Scale`]), and PDO mappings compiled to shifts and masks ([`Mapping`]).
 //! 8. `bit_fields`: the same for drives without an object dictionary, which are spoken to by frames of fixed bit fields
-//!    ([`FieldDrive`], [`FrameLayout`]). The engine does not use it yet.
+//!    ([`FieldDrive`], [`FrameLayout`]). [`Exchange`] is where an axis has the one or the other.
+//! 9. [`slcan`]: CAN frames as text, for an adapter on a serial line.
 //!
 //! What crosses the border of the real-time thread:
 //!
@@ -57,6 +58,7 @@ mod record;
 mod rejection;
 mod request;
 mod rule;
+pub mod slcan;
 mod source;
 mod stop;
 mod stop_category;
@@ -68,14 +70,15 @@ mod wire;
 
 pub use answers::{Answer, Answers};
 pub use axis::{
-    Axis, AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, Jump, ModeChanges,
-    ModeCondition, Pdo, SenderByte, Supervision, TorqueLimits,
+    Axis, AxisParameters, AxisParametersError, CommandPdo, Exchange, FeedForward, FeedbackSince, Jump,
+    ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, SenderByte, Supervision, TorqueLimits,
 };
 pub use bit_fields::{
-    BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits, FieldDrive,
-    FieldDriveParameters, FieldFrame, FieldMode, FieldTargets, FieldValue, FrameLayout, LayoutError, Life,
-    LifeCycle, LifeState, LifeStep, LifeWish, LinearScale, MAX_FIELD_BYTES, MAX_FIELDS, ModeCodes, Number,
-    OwnFrame, OwnFrames, PositionReference, ReplyError, ReplyValue, ReplyValues, Setting,
+    BesideTarget, BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits,
+    FieldDrive, FieldDriveParameters, FieldFrame, FieldGains, FieldMode, FieldTargets, FieldValue,
+    FrameLayout, LayoutError, Life, LifeCycle, LifeState, LifeStep, LifeWish, LinearScale, MAX_FIELD_BYTES,
+    MAX_FIELDS, ModeCodes, Number, OwnFrame, OwnFrames, PositionReference, ReplyError, ReplyValue,
+    ReplyValues, RunningMode, Setting, StateCodes,
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};

@@ -197,6 +197,11 @@ impl FeedbackSlots {
         Self(fields.fold(0, |slots, field| slots | 1 << (field.slot & 7)))
     }
 
+    /// These numbers.
+    pub(crate) fn with(slots: impl IntoIterator<Item = FeedbackSlot>) -> Self {
+        Self(slots.into_iter().fold(0, |set, slot| set | 1 << (slot as u8 & 7)))
+    }
+
     /// Whether a number is in the set.
     pub(crate) const fn contains(self, slot: FeedbackSlot) -> bool {
         self.0 >> slot as u8 & 1 == 1
@@ -218,6 +223,11 @@ impl ProcessImage {
     /// What will be sent.
     pub fn command(&self, slot: CommandSlot) -> i32 {
         self.0[slot as usize % IMAGE_SLOTS]
+    }
+
+    /// Takes what was received.
+    pub(crate) fn take(&mut self, slot: FeedbackSlot, value: i32) {
+        self.0[slot as usize % IMAGE_SLOTS] = value;
     }
 
     /// What was received last; 0 when nothing was.

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use takt_rt::{
     BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits, FieldFrame, FieldValue,
     Frame, FrameFormat, FrameLayout, Id, LayoutError, LinearScale, Number, ReplyError, ReplyValue,
-    ReplyValues,
+    ReplyValues, StateCodes,
 };
 
 /// The frames of the manual. Misprints have a corrected row of their own.
@@ -317,6 +317,22 @@ fn a_reply_with_a_field_that_holds_no_number_changes_nothing() {
         assert_eq!(error, Err(ReplyError::NoNumber { field: 1 }));
     }
     assert_eq!(read(&values), (1.5, -0.25));
+}
+
+#[test]
+fn a_code_for_the_state_shows_torque_and_errors() {
+    let fields =
+        [raw(ReplyValue::State, 0, 4, Number::Unsigned), raw(ReplyValue::Position, 8, 16, Number::Unsigned)];
+    let reply = compiled(FrameFormat::Classic, 3, &fields);
+    assert!(!reply.carries(ReplyValue::Run) && !reply.carries(ReplyValue::Error));
+    let reply = reply.with_states(StateCodes { stopped: 0, running: 1 });
+    assert!(reply.carries(ReplyValue::Run) && reply.carries(ReplyValue::Error));
+    assert!(!reply.carries(ReplyValue::Velocity));
+    let mut values = ReplyValues::default();
+    for (code, run, error) in [(0, 0.0, 0.0), (1, 1.0, 0.0), (9, 0.0, 9.0), (0, 0.0, 0.0)] {
+        reply.receive(&Frame::of(MASTER, [code << 4 | 5, 0, 0]), &mut values).unwrap();
+        assert_eq!((values.get(ReplyValue::Run), values.get(ReplyValue::Error)), (run, error), "{code}");
+    }
 }
 
 fn error_of(bytes: usize, fields: &[BitField<CommandValue>]) -> LayoutError {

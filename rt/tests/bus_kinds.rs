@@ -4,7 +4,7 @@ mod fixture;
 
 use std::collections::BTreeSet;
 
-use fixture::{PERIOD_NS, Rig, flexible, parameters, scale};
+use fixture::{PERIOD_NS, Rig, flexible, parameters, pdos, scale};
 use takt_rt::{
     DriveState, Engine, EngineParameters, Fault, FeedbackSince, Frame, Id, MAX_AXES, MAX_BUSES, Phase,
     Request, Rule, SetUpError, StopCause, Supervision, nmt_command,
@@ -96,8 +96,9 @@ fn flexible_rig() -> Rig {
     let mut parameters = two_kinds();
     for axis in &mut parameters.axes[3..] {
         let node = axis.node;
-        axis.commands[0].pdo = flexible::command_pdo(&axis.commands[0].pdo, node);
-        axis.feedback[0] = flexible::reply_pdo(&axis.feedback[0], node);
+        let pdos = pdos(axis);
+        pdos.commands[0].pdo = flexible::command_pdo(&pdos.commands[0].pdo, node);
+        pdos.feedback[0] = flexible::reply_pdo(&pdos.feedback[0], node);
     }
     let mut rig = Rig::of(parameters);
     rig.buses[1].is_flexible = true;
@@ -157,8 +158,8 @@ fn an_axis_that_needs_sync_or_heartbeats_is_refused_where_there_are_none() {
 fn the_identifiers_of_canopen_services_are_free_where_there_are_none() {
     for function in [0x080, 0x700] {
         let taken = Id::canopen(function, 1);
-        assert_eq!(error_of(|own| own.axes[3].feedback[0].id = taken), None);
-        let refused = error_of(|own| own.axes[0].feedback[0].id = taken);
+        assert_eq!(error_of(|own| pdos(&mut own.axes[3]).feedback[0].id = taken), None);
+        let refused = error_of(|own| pdos(&mut own.axes[0]).feedback[0].id = taken);
         assert_eq!(refused, Some(SetUpError::IdTaken { axis: 0, id: taken }));
     }
     // Nor does the node ID of the controller mean anything there.

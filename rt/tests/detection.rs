@@ -3,7 +3,7 @@
 
 mod fixture;
 
-use fixture::{PERIOD_NS, Rig, parameters};
+use fixture::{PERIOD_NS, Rig, parameters, pdos};
 use takt_rt::{
     BusState, EventKind, Frame, Id, MappedObject, Mapping, Origin, Phase, RejectReason, Request, Rule,
     StopCategory, Supervision, TimingLevel,
@@ -38,7 +38,7 @@ fn a_drive_that_boots_in_motion_stops_the_group() {
 fn a_drive_that_has_not_reported_yet_is_silent_and_in_no_other_mode() {
     let mut parameters = parameters(1);
     let feedback = [0x6041_0010, 0x6064_0020, 0x6061_0008].map(MappedObject::from_parameter);
-    parameters.axes[0].feedback[0].mapping = Mapping::feedback(&feedback).unwrap();
+    pdos(&mut parameters.axes[0]).feedback[0].mapping = Mapping::feedback(&feedback).unwrap();
     let mut rig = Rig::of(parameters);
     rig.drive(0).is_silent = true;
     rig.host.requests.extend([Request::Sync(true), Request::Activate, Request::Enable]);

@@ -2,7 +2,7 @@
 
 mod fixture;
 
-use fixture::{Rig, jerk_limited, move_to, parameters, scale};
+use fixture::{Rig, jerk_limited, move_to, parameters, pdos, scale};
 use proptest::prelude::*;
 use takt_rt::{
     Answer, AxisParameters, AxisParametersError, BusState, ControlLaw, DriveState, Engine, EventKind, Follow,
@@ -463,7 +463,7 @@ fn impossible_parameters_are_refused_with_the_axis() {
     };
     assert_eq!(with(|axis| axis.bus = 9), Some(SetUpError::UnknownBus { axis: 1 }));
     assert_eq!(
-        with(|axis| axis.commands.clear()),
+        with(|axis| pdos(axis).commands.clear()),
         Some(SetUpError::Axis { axis: 1, error: AxisParametersError::NoPdo })
     );
     let changes: [fn(&mut AxisParameters); 5] = [
@@ -478,7 +478,7 @@ fn impossible_parameters_are_refused_with_the_axis() {
     }
     let taken = with(|axis| axis.node = 1);
     assert_eq!(taken, Some(SetUpError::DuplicateNodeId { axis: 1, node: 1 }));
-    let same_id = with(|axis| axis.feedback[0].id = Id::canopen(0x180, 1));
+    let same_id = with(|axis| pdos(axis).feedback[0].id = Id::canopen(0x180, 1));
     assert_eq!(same_id, Some(SetUpError::IdTaken { axis: 1, id: Id::canopen(0x180, 1) }));
     let mut none = parameters(1);
     none.axes.clear();

@@ -4,7 +4,7 @@ mod fixture;
 
 use std::f64::consts::TAU;
 
-use fixture::{COUNTS_PER_TURN, LIMITS, PERIOD_NS, Rig, axis, axis_in, parameters, scale};
+use fixture::{COUNTS_PER_TURN, LIMITS, PERIOD_NS, Rig, axis, axis_in, parameters, pdos, scale};
 use takt_rt::{
     Axis, AxisParameters, Cia402Codec, CommandPdo, ControlLaw, DriveState, Goal, Id, Phase, Request, Rule,
     ShownStates, TransmissionType,
@@ -161,8 +161,9 @@ fn a_drive_that_is_enabled_already_when_the_group_becomes_active_is_not_moved() 
 
 #[test]
 fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_disabled_it_seems() {
-    let rare = |command: CommandPdo| CommandPdo { transmission: TransmissionType::OnControlword, ..command };
-    let usual = axis(0, 1);
+    let rare = |command: &mut CommandPdo| command.transmission = TransmissionType::OnControlword;
+    let mut usual = axis(0, 1);
+    pdos(&mut usual).commands.iter_mut().for_each(rare);
     let mut drive = Axis::new(
         0,
         AxisParameters {
@@ -171,7 +172,6 @@ fn a_drive_that_hears_its_controlword_now_and_then_only_is_told_again_however_di
                 ..Cia402Codec::default()
             },
             controlword_spacing_cycles: 10,
-            commands: usual.commands.iter().cloned().map(rare).collect(),
             ..usual
         },
     );

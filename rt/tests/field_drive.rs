@@ -3,9 +3,10 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{
-    BitField, BitRange, ByteOrder, CommandValue, FieldBits, FieldDrive, FieldDriveParameters, FieldFrame,
-    FieldMode, FieldTargets, Frame, FrameFormat, Id, LifeCycle, LifeState, LifeWish, LinearScale, ModeCodes,
-    Number, OwnFrame, OwnFrames, PositionReference, ReplyValue, Setting,
+    BesideTarget, BitField, BitRange, ByteOrder, CommandValue, DriveState, FieldBits, FieldDrive,
+    FieldDriveParameters, FieldFrame, FieldGains, FieldMode, FieldTargets, Frame, FrameFormat, Id, LifeCycle,
+    LifeState, LifeWish, LinearScale, ModeCodes, Number, OwnFrame, OwnFrames, PositionReference, ReplyError,
+    ReplyValue, RunningMode, Setting,
 };
 
 const MOTOR: Id = Id::canopen(0, 1);
@@ -13,8 +14,9 @@ const MASTER: Id = Id::canopen(0, 0x64);
 const COUNTS_PER_TURN: f64 = 1_048_576.0;
 const COUNT: f64 = TAU / COUNTS_PER_TURN;
 const RUN: LifeWish = LifeWish::Run(FieldMode::Position);
-/// A limit of velocity for a motor that follows positions.
+/// The limits for a motor that follows positions.
 const VELOCITY: f64 = 10.0;
+const TORQUE: f64 = 2.0;
 
 fn field<V>(value: V, bits: FieldBits, number: Number, scale: LinearScale) -> BitField<V> {
     BitField { value, bits, number, scale, codes: None }
@@ -52,7 +54,8 @@ fn flexible() -> FieldDriveParameters {
         life_cycle: LifeCycle::ByFields { modes: ModeCodes { torque: 0, velocity: 1, position: 2 } },
         position_reference: PositionReference::Zero,
         position_span: None,
-        missed_reply_cycles: 3,
+        beside_target: BesideTarget::Limits { velocity: VELOCITY, torque: TORQUE },
+        gains: FieldGains::default(),
     }
 }
 
@@ -89,7 +92,8 @@ fn packed(is_extended: bool) -> FieldDriveParameters {
         }),
         position_reference: if is_extended { PositionReference::Present } else { PositionReference::Zero },
         position_span: is_extended.then_some(4096.0 * TAU),
-        missed_reply_cycles: 3,
+        beside_target: BesideTarget::Limits { velocity: VELOCITY, torque: TORQUE },
+        gains: FieldGains::default(),
     }
 }
 
@@ -119,12 +123,13 @@ impl Motor {
         Self { protocol, position, zero: 0, runs: false, told: None, velocity_limit: 0, zeroed: 0 }
     }
 
-    fn drive(&self) -> FieldDrive {
-        FieldDrive::new(match self.protocol {
+    fn drive(&self) -> Master {
+        let by = match self.protocol {
             Protocol::Flexible => flexible(),
             Protocol::Normal => packed(false),
             Protocol::Extended => packed(true),
-        })
+        };
+        Master { by, drive: FieldDrive::default() }
     }
 
     /// The way that it has still to go.
@@ -203,12 +208,44 @@ impl Motor {
     }
 }
 
+/// A drive with what does not change of it.
+struct Master {
+    by: FieldDriveParameters,
+    drive: FieldDrive,
+}
+
+impl Master {
+    fn step(&mut self, wish: LifeWish, targets: &FieldTargets) -> Frame {
+        self.drive.step(&self.by, wish, targets)
+    }
+
+    fn receive(&mut self, reply: &Frame) -> Result<(), ReplyError> {
+        self.drive.receive(&self.by, reply)
+    }
+
+    fn position(&self) -> Option<f64> {
+        self.drive.position(&self.by)
+    }
+
+    fn reported(&self, value: ReplyValue) -> Option<f64> {
+        self.drive.reported(&self.by, value)
+    }
+
+    fn state(&self) -> LifeState {
+        self.drive.state()
+    }
+
+    fn shown(&self) -> (DriveState, RunningMode) {
+        (self.drive.drive_state(&self.by), self.drive.mode(&self.by))
+    }
+}
+
 fn to(position: f64) -> FieldTargets {
-    FieldTargets { position, velocity: VELOCITY, ..FieldTargets::default() }
+    FieldTargets { position, ..FieldTargets::default() }
 }
 
 /// Cycles in which the motor hears everything and is heard.
-fn run(drive: &mut FieldDrive, motor: &mut Motor, wish: LifeWish, position: f64, cycles: usize) {
+fn run(drive: &mut Master, motor: &mut Motor, wish: LifeWish, position: f64, cycles: usize) {
     for _ in 0..cycles {
         let reply = motor.hear(&drive.step(wish, &to(position)));
         drive.receive(&reply).unwrap();
@@ -222,7 +259,7 @@ fn a_motor_is_started_where_it_stands_follows_its_set_points_and_is_stopped() {
     for protocol in PROTOCOLS {
         let mut motor = Motor::new(protocol, 320_000);
         let mut drive = motor.drive();
-        assert!(drive.is_stale() && drive.position().is_none());
+        assert!(drive.position().is_none());
         // It stands until it runs, whatever the set-points are.
         while !matches!(drive.state(), LifeState::Running(_)) {
             run(&mut drive, &mut motor, RUN, -3.0, 1);
@@ -233,11 +270,11 @@ fn a_motor_is_started_where_it_stands_follows_its_set_points_and_is_stopped() {
             assert!((drive.position().unwrap() - target).abs() <= 32.0 * COUNT, "{target}");
             assert!((motor.position as f64 * COUNT - target).abs() <= 32.0 * COUNT, "{target}");
         }
-        run(&mut drive, &mut motor, LifeWish::Stop, 2.0, 4);
+        run(&mut drive, &mut motor, LifeWish::Stop, 2.0, 10);
         assert_eq!((drive.state(), motor.runs), (LifeState::Stopped, false));
         // Somebody turns it by hand: it is started again where it is then.
         motor.position = -100_000;
-        run(&mut drive, &mut motor, RUN, 2.0, 12);
+        run(&mut drive, &mut motor, RUN, 2.0, 20);
         assert!((motor.position as f64 * COUNT - 2.0).abs() <= 32.0 * COUNT);
     }
 }
@@ -247,7 +284,7 @@ fn the_position_goes_on_where_the_report_of_32_bits_wraps_around() {
     let edge = i64::from(i32::MAX);
     let mut motor = Motor::new(Protocol::Extended, edge - 1_000);
     let mut drive = motor.drive();
-    run(&mut drive, &mut motor, RUN, (edge - 1_000) as f64 * COUNT, 10);
+    run(&mut drive, &mut motor, RUN, (edge - 1_000) as f64 * COUNT, 20);
     for _ in 0..3 {
         for step in [100_000, 300_000, 200_000, -50_000, -400_000] {
             let target = (edge + step) as f64 * COUNT;
@@ -259,34 +296,64 @@ fn the_position_goes_on_where_the_report_of_32_bits_wraps_around() {
 }
 
 #[test]
+fn a_motor_that_counts_from_where_it_is_is_led_by_the_way_of_each_cycle_while_it_is_not_heard() {
+    let mut motor = Motor::new(Protocol::Extended, 0);
+    let mut drive = motor.drive();
+    run(&mut drive, &mut motor, RUN, 0.5, 20);
+    for cycle in 1..=20 {
+        let target = 0.5 + 0.01 * f64::from(cycle);
+        motor.hear(&drive.step(RUN, &to(target)));
+        // A quantum of the increment is 32 counts.
+        let most = 32.0 * COUNT * f64::from(cycle + 1);
+        assert!((motor.position as f64 * COUNT - target).abs() <= most, "cycle {cycle}: {}", motor.position);
+    }
+    run(&mut drive, &mut motor, RUN, 0.7, 2);
+    assert!((motor.position as f64 * COUNT - 0.7).abs() <= 32.0 * COUNT);
+}
+
+#[test]
 fn zero_is_set_only_while_the_motor_is_stopped_and_the_count_begins_anew() {
     for protocol in PROTOCOLS {
         let mut motor = Motor::new(protocol, 200_000);
         let mut drive = motor.drive();
-        run(&mut drive, &mut motor, RUN, 1.0, 10);
-        run(&mut drive, &mut motor, LifeWish::Zero, 1.0, 10);
+        run(&mut drive, &mut motor, RUN, 1.0, 20);
+        run(&mut drive, &mut motor, LifeWish::Zero, 1.0, 20);
         assert_eq!((motor.zeroed, drive.state()), (1, LifeState::Told(Setting::Zero)));
         assert!(drive.position().unwrap().abs() < 1e-9);
-        run(&mut drive, &mut motor, RUN, 0.25, 10);
+        run(&mut drive, &mut motor, RUN, 0.25, 20);
         assert!((drive.position().unwrap() - 0.25).abs() <= 32.0 * COUNT);
     }
 }
 
 #[test]
-fn a_motor_that_is_not_heard_for_longer_than_is_bridged_is_stale_until_it_is_heard_again() {
+fn a_frame_of_another_length_is_no_reply_and_changes_nothing() {
     let mut motor = Motor::new(Protocol::Normal, 0);
     let mut drive = motor.drive();
-    run(&mut drive, &mut motor, RUN, 0.0, 10);
-    for missed in 1..=6 {
-        drive.step(RUN, &to(0.0));
-        assert_eq!(drive.is_stale(), missed > 3, "{missed} missed");
-    }
-    // A frame of another length, as in the other mode, is no reply.
+    run(&mut drive, &mut motor, RUN, 0.0, 20);
+    // That of a motor in the other mode.
     let other = Motor::new(Protocol::Extended, 77_777).reply();
-    assert!(drive.receive(&other).is_err());
-    assert!(drive.is_stale() && drive.position().unwrap().abs() < 1e-9);
-    drive.receive(&motor.reply()).unwrap();
-    assert!(!drive.is_stale());
+    assert_eq!(drive.receive(&other), Err(ReplyError::Length { expected: 6, received: 8 }));
+    assert!(drive.position().unwrap().abs() < 1e-9);
+}
+
+#[test]
+fn the_life_of_a_motor_shows_as_states_of_cia_402() {
+    for protocol in PROTOCOLS {
+        let mut motor = Motor::new(protocol, 0);
+        let mut drive = motor.drive();
+        assert_eq!(drive.shown(), (DriveState::QuickStopActive, RunningMode::None), "it may have torque");
+        let mut shown = vec![];
+        for (wish, cycles) in [(LifeWish::Stop, 9), (RUN, 8), (LifeWish::Stop, 10)] {
+            for _ in 0..cycles {
+                run(&mut drive, &mut motor, wish, 0.0, 1);
+                shown.push(drive.shown().0);
+            }
+        }
+        shown.dedup();
+        let up = [DriveState::ReadyToSwitchOn, DriveState::SwitchedOn, DriveState::OperationEnabled];
+        let down = [DriveState::QuickStopActive, DriveState::ReadyToSwitchOn];
+        assert_eq!(shown, [&[DriveState::QuickStopActive][..], &up, &down].concat());
+    }
 }
 
 #[test]
@@ -299,7 +366,7 @@ fn a_motor_shows_what_its_replies_carry_and_nothing_else() {
         [ReplyValue::Temperature, ReplyValue::Sender, ReplyValue::Torque].map(|value| drive.reported(value));
     assert_eq!(shown, [Some(-25.0), Some(1.0), None]);
     // It takes its torque away by itself: it gets no further set-point.
-    run(&mut drive, &mut motor, RUN, 1.0, 10);
+    run(&mut drive, &mut motor, RUN, 1.0, 20);
     motor.runs = false;
     drive.receive(&motor.reply()).unwrap();
     assert_eq!(drive.state(), LifeState::Stopping);

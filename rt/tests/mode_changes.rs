@@ -5,6 +5,7 @@ mod fixture;
 use arrayvec::ArrayVec;
 use fixture::{
     FRICTION, INERTIA, LIMITS, PERIOD_NS, Rig, TakenModes, axis_in, changeable_axis, move_to, parameters,
+    pdos,
 };
 use takt_rt::OperationMode::{
     CyclicSynchronousPosition as CSP, CyclicSynchronousTorque as CST, CyclicSynchronousVelocity as CSV,
@@ -175,7 +176,7 @@ fn the_torque_that_holds_the_load_goes_over_into_the_offset_of_csp_and_back() {
     let mut axis = changeable_axis(ControlLaw::Position, modes, 0, 1);
     let objects =
         [(0x60FF, 32), (0x6071, 16), (0x60B2, 16)].map(|(index, bits)| MappedObject::new(index, 0, bits));
-    axis.commands[1].pdo.mapping = Mapping::commands(&objects).unwrap();
+    pdos(&mut axis).commands[1].pdo.mapping = Mapping::commands(&objects).unwrap();
     axis.feed_forward = FeedForward::Torque;
     parameters.axes[0] = axis;
     let mut rig = Rig::of(parameters);
@@ -294,16 +295,16 @@ fn the_process_data_must_carry_what_a_change_needs() {
     let laws = ArrayVec::from([VELOCITY, TORQUE]);
     let modes = ModeChanges { laws, condition: ModeCondition::AtRest, timeout_cycles: TIMEOUT_CYCLES };
     let whole = changeable_axis(ControlLaw::Position, modes, 0, 1);
-    let plain = axis_in(ControlLaw::Position, 0, 1);
+    let plain = pdos(&mut axis_in(ControlLaw::Position, 0, 1)).clone();
     let object = MappedObject::new;
     let lacking = |commands: bool, feedback: usize| {
         let mut axis = whole.clone();
         if !commands {
-            axis.commands = plain.commands.clone();
+            pdos(&mut axis).commands = plain.commands.clone();
         }
-        axis.feedback.truncate(feedback);
+        pdos(&mut axis).feedback.truncate(feedback);
         if feedback == 0 {
-            axis.feedback = plain.feedback.clone();
+            pdos(&mut axis).feedback = plain.feedback.clone();
         }
         axis
     };

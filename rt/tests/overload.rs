@@ -3,7 +3,7 @@
 
 mod fixture;
 
-use fixture::{PERIOD_NS, Rig, parameters};
+use fixture::{PERIOD_NS, Rig, parameters, pdos};
 use takt_rt::{Engine, Frame, Id, MAX_AXES, MappedObject, Mapping, Pdo, Phase, Request, Rule, SetUpError};
 
 /// Object 6040 = 0 (disable voltage), as an SDO download.
@@ -133,14 +133,14 @@ fn frames_that_do_not_fit_into_one_batch_are_refused_at_set_up() {
         wanted.buses.truncate(1);
         for (axis, node) in wanted.axes.iter_mut().zip(1..) {
             (axis.bus, axis.node) = (0, node);
-            axis.feedback[0].id = Id::canopen(0x180, node);
-            let first = axis.commands[0].clone();
+            pdos(axis).feedback[0].id = Id::canopen(0x180, node);
+            let first = pdos(axis).commands[0].clone();
             let dummy = Mapping::commands(&[MappedObject::new(0x6040, 0, 16)]).unwrap();
-            axis.commands.clear();
+            pdos(axis).commands.clear();
             for function in [0x200, 0x300, 0x400, 0x500] {
                 let mapping = if function == 0x200 { first.pdo.mapping.clone() } else { dummy.clone() };
                 let pdo = Pdo::classic(Id::canopen(function, node), mapping);
-                axis.commands.push(takt_rt::CommandPdo::every_cycle(pdo));
+                pdos(axis).commands.push(takt_rt::CommandPdo::every_cycle(pdo));
             }
         }
         Engine::<MAX_AXES, 16>::new(wanted).err()

@@ -3,7 +3,7 @@
 mod fixture;
 
 use arrayvec::ArrayVec;
-use fixture::{Rig, axis_in, parameters};
+use fixture::{Rig, axis_in, parameters, pdos};
 use takt_rt::{
     AxisProcessData, CommandPdo, ControlLaw, Engine, EngineParameters, Frame, GroupParameters, Id,
     MappedObject, Mapping, Pdo, Phase, RejectReason, Request, SetUpError, TorqueLimits, TransmissionType,
@@ -36,8 +36,8 @@ fn two_of_three() -> EngineParameters {
         axis.torque_limits = TorqueLimits::NONE;
     }
     let [controlword, target] = own();
-    parameters.axes[0].commands = command(&[controlword, target, DUMMY, DUMMY]);
-    parameters.axes[1].commands = command(&[DUMMY, DUMMY, controlword, target]);
+    pdos(&mut parameters.axes[0]).commands = command(&[controlword, target, DUMMY, DUMMY]);
+    pdos(&mut parameters.axes[1]).commands = command(&[DUMMY, DUMMY, controlword, target]);
     parameters
 }
 
@@ -118,15 +118,15 @@ fn a_frame_that_is_not_shared_as_it_says_is_refused() {
         Engine::new(parameters).err()
     };
     assert_eq!(of_two_groups, refused);
-    assert_eq!(error_of(|own| own.axes[1].commands[0].axes = 1), refused);
-    assert_eq!(error_of(|own| own.axes[0].commands[0].axes = 3), refused);
+    assert_eq!(error_of(|own| pdos(&mut own.axes[1]).commands[0].axes = 1), refused);
+    assert_eq!(error_of(|own| pdos(&mut own.axes[0]).commands[0].axes = 3), refused);
     assert_eq!(
-        error_of(|own| own.axes[1].commands = own.axes[0].commands.clone()),
+        error_of(|own| own.axes[1].exchange = own.axes[0].exchange.clone()),
         refused,
         "one part twice"
     );
     let rare = |own: &mut EngineParameters| {
-        own.axes[0].commands[0].transmission = TransmissionType::OnControlword;
+        pdos(&mut own.axes[0]).commands[0].transmission = TransmissionType::OnControlword;
     };
     assert_eq!(error_of(rare), refused);
 }

@@ -23,11 +23,26 @@ impl Axis {
         if !is_enabled {
             self.profile.rest(self.parameters.law.idle(self.joint.position_counts()));
         }
-        let (raw, torque) = self.target(is_enabled);
+        if !is_enabled {
+            self.forget_loops();
+        }
+        let input = self.loop_input();
+        let (raw, torque) = self.target(is_enabled, &input);
         self.torque_set = torque;
         self.command.set(self.parameters.law.target_slot(), raw);
         let mode_bits = if is_enabled { self.mode_bits() } else { 0 };
         self.command.set(CommandSlot::Controlword, (word | mode_bits).into());
+        if !self.has_pdos() {
+            self.command_fields(word, &input, torque);
+        }
+    }
+
+    /// The drive has no torque: what the loops have come to counts no more.
+    fn forget_loops(&mut self) {
+        self.torque_loop = TorqueLoop::default();
+        self.error_if_unheard = TrackingError::default();
+        self.command.set(CommandSlot::VelocityOffset, 0);
+        self.command.set(CommandSlot::TorqueOffset, 0);
     }
 
     /// Sends the set-point that is due. A drive that follows positions gets no longer way than that of one cycle of its bus.
@@ -42,13 +57,7 @@ impl Axis {
 
     /// The target in drive units, and the torque that is commanded with it.
     #[inline]
-    fn target(&mut self, is_enabled: bool) -> (i32, f64) {
-        if !is_enabled {
-            self.torque_loop = TorqueLoop::default();
-            self.error_if_unheard = TrackingError::default();
-            self.command.set(CommandSlot::VelocityOffset, 0);
-            self.command.set(CommandSlot::TorqueOffset, 0);
-        }
+    fn target(&mut self, is_enabled: bool, input: &LoopInput) -> (i32, f64) {
         let AxisParameters { law, scale, limits, torque_limits, feed_forward, .. } = &self.parameters;
         if law.is_profile() {
             return (self.profile.target_raw(), self.profile.torque());
@@ -56,7 +65,6 @@ impl Axis {
         if !is_enabled && law.target_slot() != CommandSlot::TargetPosition {
             return (law.idle(self.joint.position_counts()), 0.0);
         }
-        let input = self.loop_input();
         let cycle_s = self.reception.cycle_s();
         self.error_if_unheard = law.error_without_feedback(input.error, cycle_s);
         // Where nobody takes a torque, none is wanted either.
@@ -64,11 +72,11 @@ impl Axis {
         let torque = if is_torque_taken {
             // Nothing, where an unlimited rate meets a period that is not known: `max` leaves out what is no number.
             let fade = (torque_limits.rate * cycle_s).max(0.0);
-            self.torque_loop.next(law, &input, limits.torque, fade)
+            self.torque_loop.next(law, input, limits.torque, fade)
         } else {
             0.0
         };
-        let raw = law.target(&input, torque, scale, limits);
+        let raw = law.target(input, torque, scale, limits);
         if *feed_forward != FeedForward::None {
             self.set_offsets(input.set.velocity, torque);
         }
@@ -116,7 +124,8 @@ impl Axis {
     /// The set-point of this cycle requests the feedback of a drive that answers set-points, unless it is skipped.
     fn request_by_set_point(&mut self) {
         self.set_point_skip.begin_command();
-        if !(self.answers_set_points() && self.joint.is_known()) {
+        let is_sent = self.joint.is_known() || !self.has_pdos();
+        if !(self.answers_set_points() && is_sent) {
             return;
         }
         match self.set_point_skip {
@@ -172,7 +181,7 @@ impl Axis {
         self.command.command(CommandSlot::Controlword) as u16
     }
 
-    /// The frames of this cycle's command; none while the position of the joint is not known.
+    /// The PDOs of this cycle's command; none while the position of the joint is not known.
     /// Each with the number of axes whose parts it is to have.
     pub fn frames(&self) -> impl Iterator<Item = (Frame, u8)> {
         let is_due = |command: &CommandPdo| {
@@ -182,7 +191,7 @@ impl Axis {
                     TransmissionType::OnControlword => self.controlwords.is_due(),
                 }
         };
-        let due = self.parameters.commands.iter().filter(move |command| is_due(command));
+        let due = self.parameters.exchange.commands().iter().filter(move |command| is_due(command));
         due.map(|command| (command.pdo.frame(&self.command), command.axes))
     }
 }

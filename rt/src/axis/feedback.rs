@@ -1,10 +1,11 @@
 //! What the drive of an axis reports, and when.
 
+use super::exchange::{Exchange, NoFeedback};
 use super::late_reply::SetPointSkip;
 use super::{Axis, FeedbackSince};
 use crate::cia402::DriveState;
 use crate::frame::Frame;
-use crate::pdo::{FeedbackSlot, TooShort};
+use crate::pdo::FeedbackSlot;
 use crate::time::Nanoseconds;
 use crate::watch::NodeFault;
 
@@ -62,19 +63,29 @@ impl Axis {
         self.late_reply.is_reply_unverified()
     }
 
-    /// Takes feedback PDO number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing, nor one that is
-    /// too short.
+    /// Takes feedback frame number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing.
+    ///
+    /// # Errors
+    /// Its length is none of a feedback of this drive. Nothing is changed then.
     #[inline]
-    pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), TooShort> {
+    pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), NoFeedback> {
         if pdo == 0 {
             self.late_reply.note_reply();
         }
         if !self.reception.is_in_time(at_ns) {
             return Ok(());
         }
-        let Some(parameters) = self.parameters.feedback.get(pdo) else { return Ok(()) };
-        // No remote frame is feedback: what has a length has as many bytes.
-        parameters.mapping.unpack(frame.first_word(), frame.length(), &mut self.feedback)?;
+        match &self.parameters.exchange {
+            Exchange::Pdos(pdos) => {
+                let Some(parameters) = pdos.feedback.get(pdo) else { return Ok(()) };
+                // No remote frame is feedback: what has a length has as many bytes.
+                let unpacked =
+                    parameters.mapping.unpack(frame.first_word(), frame.length(), &mut self.feedback);
+                unpacked.map_err(|_| NoFeedback)?;
+            }
+            Exchange::BitFields(_) => self.receive_fields(frame)?,
+            Exchange::OffCycle => return Err(NoFeedback),
+        }
         if self.reception.note_arrival(pdo) {
             self.duplicate_node.note_repetition();
         }
@@ -105,7 +116,7 @@ impl Axis {
         if !self.late_reply.pass(self.reception.has_any()) {
             return false;
         }
-        let pdos = self.parameters.feedback.len();
+        let pdos = self.parameters.exchange.reports();
         let Some(span) = self.reception.complete(pdos, self.parameters.feedback_since) else { return false };
         let scale = &self.parameters.scale;
         let counts = self.feedback.feedback(FeedbackSlot::Position);

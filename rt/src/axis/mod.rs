@@ -4,7 +4,8 @@
 //! `stream` (what a source wants, and the set-points that come of it), `torque_loop` (the torque where it is made here),
 //! `mode` (its change at run time), `profile_mode` (targets instead of set-points), `joint` and `plausibility` (where the joint is), `reception` and
 //! `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
-//! `sdo_fallback` (the controlword when process data do not arrive), `command` (the frames), `rest` and `standstill` (has the
+//! `sdo_fallback` (the controlword when process data do not arrive), `exchange` and `command` (the frames), `bit_fields` (the same for a
+//! drive without PDOs), `off_cycle` (a drive that is spoken to outside of the cycle), `rest` and `standstill` (has the
 //! joint stopped).
 //!
 //! # Power
@@ -20,14 +21,17 @@
 //! | [`Axis::begin_fault_reset`], the drive shows a fault | Resetting | – | Resetting | Resetting |
 //! | the drive shows no fault any more | – | Off | – | – |
 
+mod bit_fields;
 mod command;
 mod controlword;
 mod delay;
 mod drive_report;
+mod exchange;
 mod feedback;
 mod joint;
 mod late_reply;
 mod mode;
+mod off_cycle;
 mod parameters;
 mod plausibility;
 mod power;
@@ -40,13 +44,13 @@ mod standstill;
 mod stream;
 mod torque_loop;
 
-use arrayvec::ArrayVec;
-
+use crate::bit_fields::FieldDrive;
 use crate::cia402::DriveState;
-use crate::control::TrackingError;
+use crate::control::{ControlLaw, TrackingError};
+use crate::frame::Frame;
 use crate::guard::FollowingErrorGuard;
 use crate::host::AxisSnapshot;
-use crate::pdo::{CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, ProcessImage};
+use crate::pdo::{CommandSlot, FeedbackSlot, FeedbackSlots, ProcessImage};
 use crate::record::AxisRecord;
 use crate::source::Follow;
 use crate::watch::{DuplicateNodeDetector, NodeMonitor};
@@ -63,10 +67,12 @@ use sdo_fallback::SdoFallback;
 use set_points::SetPoints;
 use torque_loop::TorqueLoop;
 
+pub use exchange::{CommandPdo, Exchange, NoFeedback, Pdo, Pdos, SenderByte};
 pub use feedback::Jump;
+pub use off_cycle::OffCycleReport;
 pub use parameters::{
-    AxisParameters, AxisParametersError, CommandPdo, FeedForward, FeedbackSince, ModeChanges, ModeCondition,
-    Pdo, SenderByte, Supervision, TorqueLimits,
+    AxisParameters, AxisParametersError, FeedForward, FeedbackSince, ModeChanges, ModeCondition, Supervision,
+    TorqueLimits,
 };
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
@@ -84,6 +90,10 @@ pub struct Axis {
     feedback: ProcessImage,
     /// Which numbers the drive reports.
     reported_slots: FeedbackSlots,
+    /// The life of a drive without PDOs.
+    field_drive: FieldDrive,
+    /// The frame of this cycle to such a drive.
+    field_frame: Option<Frame>,
     set_points: SetPoints,
     mode: Mode,
     /// What is done with a target beyond the limits, by what leads the axis now.
@@ -118,11 +128,13 @@ impl Axis {
         let mut command = ProcessImage::default();
         command.set(CommandSlot::OperationMode, parameters.law.operation_mode() as i32);
         Self {
-            reported_slots: slots_of(&parameters.feedback),
+            reported_slots: parameters.exchange.reported_slots(),
             follow: parameters.follow,
             parameters,
             command,
             feedback: ProcessImage::default(),
+            field_drive: FieldDrive::default(),
+            field_frame: None,
             set_points: SetPoints::default(),
             mode: Mode::default(),
             stream_rest: 0.0,
@@ -176,15 +188,20 @@ impl Axis {
         }
     }
 
+    /// Whether the drive has PDOs.
+    pub const fn has_pdos(&self) -> bool {
+        matches!(self.parameters.exchange, Exchange::Pdos(_))
+    }
+
+    /// Whether the drive is spoken to outside of the cycle.
+    pub const fn is_off_cycle(&self) -> bool {
+        matches!(self.parameters.exchange, Exchange::OffCycle)
+    }
+
     /// Changes the process data that are exchanged; before the first feedback.
-    pub fn set_process_data(
-        &mut self,
-        commands: ArrayVec<CommandPdo, MAX_PDOS>,
-        feedback: ArrayVec<Pdo, MAX_PDOS>,
-    ) {
-        self.parameters.commands = commands;
-        self.reported_slots = slots_of(&feedback);
-        self.parameters.feedback = feedback;
+    pub fn set_process_data(&mut self, pdos: Pdos) {
+        self.parameters.exchange = Exchange::Pdos(pdos);
+        self.reported_slots = self.parameters.exchange.reported_slots();
         self.reception.drop_arrived();
     }
 
@@ -270,6 +287,8 @@ impl Axis {
             current_per_mille: self.current_per_mille(),
             mode: self.mode(),
             mode_set: self.mode_set(),
+            temperature: self.temperature(),
+            controlword: self.controlword(),
             statusword: self.statusword(),
             drive_state: self.drive_state(),
             error_code: self.error_code(),
@@ -305,8 +324,4 @@ impl Axis {
             position_raw: self.feedback.feedback(FeedbackSlot::Position),
         };
     }
-}
-
-fn slots_of(feedback: &[Pdo]) -> FeedbackSlots {
-    FeedbackSlots::of(feedback.iter().map(|pdo| &pdo.mapping))
 }

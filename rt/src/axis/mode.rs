@@ -41,7 +41,7 @@ impl Axis {
 
     /// Whether the process data of the drive carry a number to it.
     pub fn sends(&self, slot: CommandSlot) -> bool {
-        self.parameters.commands.iter().any(|command| command.pdo.mapping.sends(slot))
+        self.parameters.exchange.sends(slot)
     }
 
     /// Object 6060 as it is sent.

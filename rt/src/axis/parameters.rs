@@ -2,68 +2,14 @@
 
 use arrayvec::ArrayVec;
 
+use super::exchange::Exchange;
 use crate::cia402::OperationMode;
 use crate::cia402_codec::Cia402Codec;
 use crate::control::{ControlLaw, GainError};
-use crate::frame::{Frame, FrameFormat, Id};
 use crate::guard::{AxisLimits, LimitError};
-use crate::pdo::{MAX_NODE_AXES, MAX_PDOS, Mapping, ProcessImage, TransmissionType};
+use crate::pdo::MAX_NODE_AXES;
 use crate::source::Follow;
 use crate::units::Scale;
-
-/// A PDO: its frames and its compiled mapping.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Pdo {
-    /// The identifier.
-    pub id: Id,
-    /// The kind of its frames. CAN FD frames are received with and without bit-rate switch, whichever of the two this says.
-    pub format: FrameFormat,
-    /// The byte by which its frames are known where several drives send by this identifier. Nothing in a PDO that is sent.
-    pub sender: Option<SenderByte>,
-    /// What it carries.
-    pub mapping: Mapping,
-}
-
-/// A byte of a frame that says which drive has sent it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SenderByte {
-    /// Its place in the payload, from 0.
-    pub at: u8,
-    /// Its value in the frames of this drive.
-    pub value: u8,
-}
-
-impl Pdo {
-    /// A PDO of classic frames whose identifier is its own.
-    pub const fn classic(id: Id, mapping: Mapping) -> Self {
-        Self { id, format: FrameFormat::Classic, sender: None, mapping }
-    }
-
-    /// The frame that carries these numbers.
-    #[inline]
-    pub(crate) fn frame(&self, image: &ProcessImage) -> Frame {
-        Frame::packed(self.id, self.format, self.mapping.pack(image), self.mapping.length())
-    }
-}
-
-/// A PDO that is sent to the drive.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CommandPdo {
-    /// What.
-    pub pdo: Pdo,
-    /// When.
-    pub transmission: TransmissionType,
-    /// For how many axes its frame is: 1 as a rule. Where it is for several, the drive of each takes its own part and passes over that
-    /// of the others (dummy mapping, CiA 301, 7.4.7.1), and the frame leaves when each of them has its part in it.
-    pub axes: u8,
-}
-
-impl CommandPdo {
-    /// One that is sent in every cycle of its bus.
-    pub const fn every_cycle(pdo: Pdo) -> Self {
-        Self { pdo, transmission: TransmissionType::EveryCycle, axes: 1 }
-    }
-}
 
 /// Since when feedback must have arrived to be that of the present cycle. PDOs carry no number: the time of their arrival
 /// is what tells an answer of this cycle from one that is late.
@@ -214,14 +160,10 @@ pub struct AxisParameters {
     /// Its number among the axes of the node, 1 to 8: 1 where the node has one axis. The objects of axis n stand 0x800 · (n − 1) higher
     /// than those of the first one.
     pub node_axis: u8,
-    /// What is sent, in order.
-    pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
-    /// What is expected each cycle of the bus.
-    pub feedback: ArrayVec<Pdo, MAX_PDOS>,
-    /// Since when it must have arrived.
+    /// What is exchanged with the drive in each cycle of the bus.
+    pub exchange: Exchange,
+    /// Since when feedback must have arrived.
     pub feedback_since: FeedbackSince,
-    /// Identifiers of process data that the drive sends beside that, which carries nothing new.
-    pub unused: ArrayVec<Id, MAX_PDOS>,
     /// How its drive uses controlword and statusword.
     pub codec: Cia402Codec,
     /// Cycles of the bus from one controlword to the next on the way to operation enabled; 0 where the drive shows how
@@ -327,7 +269,7 @@ impl core::fmt::Display for AxisParametersError {
 }
 
 impl AxisParameters {
-    /// Checks everything that an axis relies on. A [`Scale`] and a [`Mapping`] are checked when they are made.
+    /// Checks everything that an axis relies on. A [`Scale`] and a [`Mapping`](crate::Mapping) are checked when they are made.
     pub fn validate(&self) -> Result<(), AxisParametersError> {
         if !NODE_IDS.contains(&self.node) {
             return Err(AxisParametersError::NodeId { node: self.node });
@@ -335,7 +277,9 @@ impl AxisParameters {
         if !(1..=MAX_NODE_AXES).contains(&self.node_axis) {
             return Err(AxisParametersError::NodeAxis { node_axis: self.node_axis });
         }
-        if self.commands.is_empty() || self.feedback.is_empty() {
+        if let Exchange::Pdos(pdos) = &self.exchange
+            && (pdos.commands.is_empty() || pdos.feedback.is_empty())
+        {
             return Err(AxisParametersError::NoPdo);
         }
         self.limits.validate().map_err(AxisParametersError::Limit)?;
@@ -362,8 +306,10 @@ impl AxisParameters {
 
 #[cfg(test)]
 pub(super) mod tests {
+    use super::super::exchange::{CommandPdo, Pdo, Pdos};
     use super::*;
-    use crate::pdo::MappedObject;
+    use crate::frame::Id;
+    use crate::pdo::{MappedObject, Mapping};
     use crate::units::ScaleParameters;
     use core::f64::consts::TAU;
 
@@ -377,10 +323,12 @@ pub(super) mod tests {
             bus: 0,
             node: 5,
             node_axis: 1,
-            commands: [CommandPdo::every_cycle(command)].into_iter().collect(),
-            feedback: [feedback].into_iter().collect(),
+            exchange: Exchange::Pdos(Pdos {
+                commands: [CommandPdo::every_cycle(command)].into_iter().collect(),
+                feedback: [feedback].into_iter().collect(),
+                unused: ArrayVec::new(),
+            }),
             feedback_since: FeedbackSince::Sync,
-            unused: ArrayVec::new(),
             codec: Cia402Codec::default(),
             controlword_spacing_cycles: 0,
             law: ControlLaw::Position,
@@ -433,7 +381,10 @@ pub(super) mod tests {
                 AxisParametersError::NodeAxis { node_axis }
             );
         }
-        assert_eq!(error_of(|axis| axis.feedback.clear()), AxisParametersError::NoPdo);
+        assert_eq!(
+            error_of(|axis| axis.exchange = Exchange::Pdos(Pdos::default())),
+            AxisParametersError::NoPdo
+        );
         let error = error_of(|axis| axis.limits.velocity = -1.0);
         assert_eq!(error, AxisParametersError::Limit(LimitError::Velocity { value: -1.0 }));
         let error = error_of(|axis| axis.law = ControlLaw::Velocity { position_gain: f64::INFINITY });

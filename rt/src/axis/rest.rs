@@ -36,7 +36,11 @@ impl Axis {
             DriveState::QuickStopActive => self.feedback_age() <= self.parameters.missed_feedback_cycles,
             _ => false,
         };
-        self.parameters.codec.has_quick_stop() && !self.is_profile() && is_moving && !self.joint.is_settled()
+        self.has_pdos()
+            && self.parameters.codec.has_quick_stop()
+            && !self.is_profile()
+            && is_moving
+            && !self.joint.is_settled()
     }
 
     /// Whether the drive reports and is enabled, and the joint is near its set-point, as far as a following error is allowed.

@@ -1,6 +1,7 @@
 //! The drive's controlword by SDO: what is left for a drive that takes no process data any more.
 
-use super::{Axis, CommandPdo};
+use super::{Axis, CommandPdo, Exchange};
+use crate::bit_fields::{FieldTargets, LifeWish};
 use crate::cia402::controlword;
 use crate::frame::{Frame, Id};
 use crate::pdo::CommandSlot;
@@ -159,9 +160,18 @@ impl Axis {
         let word = self.sdo_fallback.take_due_word(repeat_slots)?;
         self.command.set(CommandSlot::Controlword, word.into());
         self.controlwords.note_by_service(word);
-        let carries_it = |command: &&CommandPdo| command.pdo.mapping.sends(CommandSlot::Controlword);
-        let command = self.parameters.commands.iter().find(carries_it)?;
-        Some(command.pdo.frame(&self.command))
+        match &self.parameters.exchange {
+            Exchange::Pdos(pdos) => {
+                let carries_it = |command: &&CommandPdo| command.pdo.mapping.sends(CommandSlot::Controlword);
+                let command = pdos.commands.iter().find(carries_it)?;
+                Some(command.pdo.frame(&self.command))
+            }
+            Exchange::BitFields(by) => {
+                Some(self.field_drive.step(by, LifeWish::Stop, &FieldTargets::default()))
+            }
+            // Whoever speaks to it sees the controlword.
+            Exchange::OffCycle => None,
+        }
     }
 
     /// Takes a frame that may confirm a controlword that was written by SDO.

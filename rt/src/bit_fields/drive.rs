@@ -1,8 +1,9 @@
 //! A drive that is spoken to by bit fields: in each cycle one frame to it, and one reply.
 
 use super::frame::{FieldFrame, ReplyError};
-use super::life_cycle::{Life, LifeCycle, LifeState, LifeStep, LifeWish};
+use super::life_cycle::{FieldMode, Life, LifeCycle, LifeState, LifeStep, LifeWish};
 use super::values::{CommandValue, CommandValues, ReplyValue, ReplyValues};
+use crate::cia402::DriveState;
 use crate::frame::Frame;
 
 /// What is known of a drive that is spoken to by bit fields.
@@ -16,10 +17,48 @@ pub struct FieldDriveParameters {
     pub life_cycle: LifeCycle,
     /// What the position of a command is counted from.
     pub position_reference: PositionReference,
+    /// What velocity and torque are beside a target that is not theirs.
+    pub beside_target: BesideTarget,
+    /// The gains of the drive's position loop.
+    pub gains: FieldGains,
     /// The width of the range in which the reported position wraps around: rad (m). `None` where it does not.
     pub position_span: Option<f64>,
-    /// Cycles in a row without a reply that are bridged.
-    pub missed_reply_cycles: u32,
+}
+
+/// What the fields for velocity and torque are, where the drive follows a position, and that for torque, where it follows a velocity.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum BesideTarget {
+    /// What is fed forward.
+    #[default]
+    FeedForward,
+    /// The most that the drive may use.
+    Limits {
+        /// rad/s (m/s)
+        velocity: f64,
+        /// N·m (N)
+        torque: f64,
+    },
+}
+
+/// The gains that a command carries to the position loop of a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FieldGains {
+    /// Always these, in the unit of their fields.
+    Fixed {
+        /// The field `Stiffness`.
+        stiffness: f64,
+        /// The field `Damping`.
+        damping: f64,
+    },
+    /// Those of each cycle, in N·m/rad and N·m·s/rad: the drive closes the loop that is closed here for another drive that follows
+    /// torques.
+    Commanded,
+}
+
+impl Default for FieldGains {
+    fn default() -> Self {
+        Self::Fixed { stiffness: 0.0, damping: 0.0 }
+    }
 }
 
 /// What the position of a command is counted from.
@@ -32,7 +71,7 @@ pub enum PositionReference {
     Present,
 }
 
-/// What a running drive is to follow. A drive that follows positions may take velocity and torque as limits.
+/// What a running drive is to follow, with what is fed forward beside it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FieldTargets {
     /// rad (m)
@@ -41,20 +80,48 @@ pub struct FieldTargets {
     pub velocity: f64,
     /// N·m (N)
     pub torque: f64,
-    /// The gain of the drive's position loop, in the unit of its field.
+    /// N·m/rad (N/m); for [`FieldGains::Commanded`] alone.
     pub stiffness: f64,
-    /// The damping of the drive's position loop, in the unit of its field.
+    /// N·m·s/rad (N·s/m); for [`FieldGains::Commanded`] alone.
     pub damping: f64,
 }
 
-/// A drive that is spoken to by bit fields, as its replies show it.
-#[derive(Clone, Debug)]
+/// The mode of a drive that is spoken to by bit fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RunningMode {
+    /// It does not run. Its mode is told again before it does.
+    None,
+    /// This one.
+    Known(FieldMode),
+    /// It shows a code that is none of its modes.
+    Unknown,
+}
+
+/// A drive that is spoken to by bit fields, as its replies show it. What does not change of it is passed in: always the same.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FieldDrive {
-    parameters: FieldDriveParameters,
     life: Life,
     reply: ReplyValues,
     /// `None` before the first reply.
     position: Option<ExtendedPosition>,
+    ways: Ways,
+}
+
+/// The ways (rad, m) that a drive has been commanded which counts from where it is. Each one that is commanded twice is gone twice.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ways {
+    /// That of the last command, until it is answered.
+    last: f64,
+    /// Those of the commands before it that have had no reply.
+    unanswered: f64,
+}
+
+impl Ways {
+    /// A command leaves before the last one was answered, or after that. Returns how far the drive is beyond its last report.
+    fn begin_command(&mut self) -> f64 {
+        self.unanswered += core::mem::take(&mut self.last);
+        self.unanswered
+    }
 }
 
 /// A position beyond the range in which it is reported.
@@ -84,76 +151,96 @@ impl ExtendedPosition {
 }
 
 impl FieldDrive {
-    /// A drive of which nothing is known yet.
-    pub fn new(parameters: FieldDriveParameters) -> Self {
-        Self { parameters, life: Life::default(), reply: ReplyValues::default(), position: None }
-    }
-
-    /// The one frame of this cycle, which leads the drive where it is wanted. The targets count while it runs; until then its targets
-    /// are rest at its actual position.
-    pub fn step(&mut self, wish: LifeWish, targets: &FieldTargets) -> Frame {
-        let (run, zero, mode, is_at_rest) = match self.life.step(wish, &self.parameters.life_cycle) {
+    /// The one frame of this cycle, which leads the drive where it is wanted. The targets count while it runs; until then its target
+    /// is rest at its actual position, with the same gains.
+    pub fn step(&mut self, by: &FieldDriveParameters, wish: LifeWish, targets: &FieldTargets) -> Frame {
+        let (run, zero, mode, is_at_rest) = match self.life.step(wish, &by.life_cycle) {
             LifeStep::Own(frame) => return frame,
             LifeStep::Command { run, zero, mode, is_at_rest } => (run, zero, mode, is_at_rest),
         };
-        let present = self.position().unwrap_or(0.0);
-        let targets = match is_at_rest {
-            true => FieldTargets { position: present, ..FieldTargets::default() },
+        let present = self.position(by).unwrap_or(0.0) + self.ways.begin_command();
+        let followed = match is_at_rest {
+            true => FieldTargets { position: present, velocity: 0.0, torque: 0.0, ..*targets },
             false => *targets,
         };
-        let position = match self.parameters.position_reference {
+        let position = match by.position_reference {
             // The drive knows its position only within its range.
-            PositionReference::Zero => targets.position - self.laps_distance(),
-            PositionReference::Present => targets.position - present,
+            PositionReference::Zero => followed.position - self.laps_distance(by),
+            PositionReference::Present => {
+                self.ways.last = followed.position - present;
+                self.ways.last
+            }
+        };
+        let (velocity, torque) = self.beside(by, wish, &followed);
+        let (stiffness, damping) = match by.gains {
+            FieldGains::Fixed { stiffness, damping } => (stiffness, damping),
+            FieldGains::Commanded => (followed.stiffness, followed.damping),
         };
         let mut values = CommandValues::default();
         values.set(CommandValue::Position, position);
-        values.set(CommandValue::Velocity, targets.velocity);
-        values.set(CommandValue::Torque, targets.torque);
-        values.set(CommandValue::Stiffness, targets.stiffness);
-        values.set(CommandValue::Damping, targets.damping);
+        values.set(CommandValue::Velocity, velocity);
+        values.set(CommandValue::Torque, torque);
+        values.set(CommandValue::Stiffness, stiffness);
+        values.set(CommandValue::Damping, damping);
         values.set(CommandValue::Mode, mode.into());
         values.set(CommandValue::Run, f64::from(u8::from(run)));
         values.set(CommandValue::Zero, f64::from(u8::from(zero)));
-        self.parameters.command.frame(&values)
+        by.command.frame(&values)
+    }
+
+    /// Velocity and torque of a command: targets, what is fed forward, or limits. A drive that is not to run gets no limit to use.
+    fn beside(&self, by: &FieldDriveParameters, wish: LifeWish, targets: &FieldTargets) -> (f64, f64) {
+        let FieldTargets { velocity, torque, .. } = *targets;
+        match (by.beside_target, wish) {
+            (BesideTarget::Limits { velocity, torque }, LifeWish::Run(FieldMode::Position)) => {
+                (velocity, torque)
+            }
+            (BesideTarget::Limits { torque, .. }, LifeWish::Run(FieldMode::Velocity)) => (velocity, torque),
+            _ => (velocity, torque),
+        }
     }
 
     /// Takes a reply.
     ///
     /// # Errors
     /// The frame is no reply of this drive. Nothing is changed then.
-    pub fn receive(&mut self, frame: &Frame) -> Result<(), ReplyError> {
-        self.parameters.reply.receive(frame, &mut self.reply)?;
+    pub fn receive(&mut self, by: &FieldDriveParameters, frame: &Frame) -> Result<(), ReplyError> {
+        by.reply.receive(frame, &mut self.reply)?;
+        self.ways = Ways::default();
         let reported = self.reply.get(ReplyValue::Position);
-        self.position = Some(match (self.position, self.parameters.position_span) {
+        self.position = Some(match (self.position, by.position_span) {
             // What the drive has been told as zero is where the count begins.
             (Some(last), Some(span)) if !self.is_zeroing() => last.after(reported, span),
             _ => ExtendedPosition { reported, laps: 0 },
         });
-        let shows_torque = self.parameters.reply.carries(ReplyValue::Run);
-        self.life.receive(shows_torque.then(|| self.reply.get(ReplyValue::Run) != 0.0));
+        self.life.receive(self.shows_torque(by));
         Ok(())
+    }
+
+    /// Whether the last reply shows that the drive has torque; `None` for a drive that does not show it.
+    fn shows_torque(&self, by: &FieldDriveParameters) -> Option<bool> {
+        self.reported(by, ReplyValue::Run).map(|run| run != 0.0)
     }
 
     fn is_zeroing(&self) -> bool {
         matches!(self.life.state(), LifeState::Telling(super::Setting::Zero))
     }
 
-    fn laps_distance(&self) -> f64 {
-        match (self.position, self.parameters.position_span) {
+    fn laps_distance(&self, by: &FieldDriveParameters) -> f64 {
+        match (self.position, by.position_span) {
             (Some(ExtendedPosition { laps, .. }), Some(span)) => f64::from(laps) * span,
             _ => 0.0,
         }
     }
 
     /// The actual position: rad (m). `None` before the first reply.
-    pub fn position(&self) -> Option<f64> {
-        self.position.map(|position| position.value(self.parameters.position_span.unwrap_or(0.0)))
+    pub fn position(&self, by: &FieldDriveParameters) -> Option<f64> {
+        self.position.map(|position| position.value(by.position_span.unwrap_or(0.0)))
     }
 
     /// A value of the last reply.
-    pub fn reported(&self, value: ReplyValue) -> Option<f64> {
-        (self.position.is_some() && self.parameters.reply.carries(value)).then(|| self.reply.get(value))
+    pub fn reported(&self, by: &FieldDriveParameters, value: ReplyValue) -> Option<f64> {
+        (self.position.is_some() && by.reply.carries(value)).then(|| self.reply.get(value))
     }
 
     /// How far the drive is.
@@ -161,8 +248,38 @@ impl FieldDrive {
         self.life.state()
     }
 
-    /// Whether the drive has not replied for longer than is bridged, or never has.
-    pub const fn is_stale(&self) -> bool {
-        self.position.is_none() || self.life.unanswered_cycles() > self.parameters.missed_reply_cycles
+    /// The same in the states of CiA 402, in which every drive is led. A drive that is told to stop may have torque.
+    ///
+    /// | drive | state of CiA 402 |
+    /// | --- | --- |
+    /// | it replies with an error, and that it has torque | fault reaction active |
+    /// | it replies with an error | fault |
+    /// | Stopping | quick stop active |
+    /// | Stopped, Telling, Told | ready to switch on |
+    /// | Choosing, Aligning, Starting | switched on |
+    /// | Running | operation enabled |
+    pub fn drive_state(&self, by: &FieldDriveParameters) -> DriveState {
+        let has_error = self.reported(by, ReplyValue::Error).is_some_and(|error| error != 0.0);
+        match self.life.state() {
+            _ if has_error && self.shows_torque(by) == Some(true) => DriveState::FaultReactionActive,
+            _ if has_error => DriveState::Fault,
+            LifeState::Stopping => DriveState::QuickStopActive,
+            LifeState::Stopped | LifeState::Telling(_) | LifeState::Told(_) => DriveState::ReadyToSwitchOn,
+            LifeState::Choosing(_) | LifeState::Aligning(_) | LifeState::Starting(_) => {
+                DriveState::SwitchedOn
+            }
+            LifeState::Running(_) => DriveState::OperationEnabled,
+        }
+    }
+
+    /// The mode that it runs in, by its reply, or by what it has been told where it does not show it.
+    pub fn mode(&self, by: &FieldDriveParameters) -> RunningMode {
+        let LifeState::Running(told) = self.life.state() else { return RunningMode::None };
+        match (&by.life_cycle, self.reported(by, ReplyValue::Mode)) {
+            (LifeCycle::ByFields { modes }, Some(shown)) => {
+                modes.mode(shown).map_or(RunningMode::Unknown, RunningMode::Known)
+            }
+            _ => RunningMode::Known(told),
+        }
     }
 }

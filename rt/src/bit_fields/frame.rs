@@ -12,8 +12,18 @@ pub struct FieldFrame<V> {
     id: Id,
     format: FrameFormat,
     sender: Option<SenderByte>,
+    states: Option<StateCodes>,
     layout: FrameLayout,
     direction: PhantomData<V>,
+}
+
+/// The codes of [`ReplyValue::State`]. Every other one is an error.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct StateCodes {
+    /// The drive has no torque.
+    pub stopped: u8,
+    /// The drive has torque.
+    pub running: u8,
 }
 
 /// A frame that is no reply of this layout.
@@ -66,7 +76,7 @@ impl<V: FieldValue> FieldFrame<V> {
             return Err(LayoutError::Length { bytes });
         }
         let layout = FrameLayout::compile(bytes, order, fields)?;
-        Ok(Self { id, format, sender: None, layout, direction: PhantomData })
+        Ok(Self { id, format, sender: None, states: None, layout, direction: PhantomData })
     }
 
     /// The same, known by a byte of its payload where several drives send by its identifier.
@@ -87,7 +97,8 @@ impl<V: FieldValue> FieldFrame<V> {
 
     /// Whether it has a field for a value.
     pub fn carries(&self, value: V) -> bool {
-        self.layout.carries(value.slot())
+        let is_of_state = |shown: ReplyValue| self.states.is_some() && shown.slot() == value.slot();
+        self.layout.carries(value.slot()) || is_of_state(ReplyValue::Run) || is_of_state(ReplyValue::Error)
     }
 
     /// The byte by which it is known where several drives send by its identifier.
@@ -107,6 +118,12 @@ impl FieldFrame<CommandValue> {
 }
 
 impl FieldFrame<ReplyValue> {
+    /// The same, whose field for the state has these codes: [`ReplyValue::Run`] and [`ReplyValue::Error`] come from them.
+    #[must_use]
+    pub fn with_states(self, states: StateCodes) -> Self {
+        Self { states: Some(states), ..self }
+    }
+
     /// Takes the values of a reply.
     ///
     /// # Errors
@@ -117,6 +134,13 @@ impl FieldFrame<ReplyValue> {
         if expected != received {
             return Err(ReplyError::Length { expected, received });
         }
-        self.layout.unpack(frame.payload(), &mut values.0).map_err(|field| ReplyError::NoNumber { field })
+        self.layout.unpack(frame.payload(), &mut values.0).map_err(|field| ReplyError::NoNumber { field })?;
+        if let Some(StateCodes { stopped, running }) = self.states {
+            let code = values.get(ReplyValue::State);
+            let (is_running, is_stopped) = (code == f64::from(running), code == f64::from(stopped));
+            values.set(ReplyValue::Run, f64::from(u8::from(is_running)));
+            values.set(ReplyValue::Error, if is_running || is_stopped { 0.0 } else { code });
+        }
+        Ok(())
     }
 }

@@ -6,7 +6,7 @@
 //! | state | what is sent | next state, by a reply |
 //! | --- | --- | --- |
 //! | Stopping | stop | Stopped, unless the drive shows torque |
-//! | Stopped | a command without torque, at the actual position | |
+//! | Stopped | a command without torque, at the actual position; stop, where that is a frame of its own | |
 //! | Choosing | the mode: in a command as in Stopped, or in a frame of its own | Aligning, with or without a reply |
 //! | Aligning | a command without torque, at the actual position | Starting |
 //! | Starting | start, at the actual position | Running, unless the drive shows no torque |
@@ -14,8 +14,8 @@
 //! | Telling | zero, or clear | Told |
 //! | Told | as in Stopped, until something else is wanted | |
 //!
-//! A reply may be late, and answer the frame before. A drive that shows whether it has torque has stopped when it shows none; any other
-//! one when it has replied twice while it was told to stop.
+//! A reply may be late and answer a frame before, or be corrupted. A drive has stopped when eight replies in a row have not shown torque
+//! while it was told to stop.
 //!
 //! Where anything but running is wanted, a drive is stopped first. In every cycle exactly one frame is sent.
 
@@ -42,6 +42,28 @@ pub struct ModeCodes {
     pub velocity: u8,
     /// Position.
     pub position: u8,
+}
+
+impl LifeCycle {
+    /// Whether the drive is told its mode.
+    pub(crate) fn has_modes(&self) -> bool {
+        match self {
+            Self::ByFields { modes } => modes.torque != modes.position || modes.velocity != modes.position,
+            Self::ByFrames(OwnFrames { torque, velocity, position, .. }) => {
+                [torque, velocity, position].into_iter().flatten().count() > 1
+            }
+        }
+    }
+}
+
+impl ModeCodes {
+    /// The mode with this code.
+    pub(super) fn mode(&self, code: f64) -> Option<FieldMode> {
+        let Self { torque, velocity, position } = *self;
+        let modes =
+            [(position, FieldMode::Position), (velocity, FieldMode::Velocity), (torque, FieldMode::Torque)];
+        modes.into_iter().find(|(own, _)| f64::from(*own) == code).map(|(_, mode)| mode)
+    }
 }
 
 /// A frame that is always the same.
@@ -149,14 +171,13 @@ pub enum LifeStep {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Life {
     state: LifeState,
-    /// Cycles since the last reply.
-    unanswered_cycles: u32,
-    /// Replies without a state of the drive, while it is told to stop.
+    /// Replies in a row that do not show torque, while it is told to stop.
     stop_replies: u8,
 }
 
-/// Replies to a stop of which the last cannot be that to a frame before it.
-const STOP_REPLIES: u8 = 2;
+/// Replies to a stop of which the last cannot be that to a frame before it: more than can wait for a bus. One that is behind for longer
+/// gets no more frames.
+const STOP_REPLIES: u8 = 8;
 
 impl Life {
     /// How far the drive is.
@@ -164,17 +185,11 @@ impl Life {
         self.state
     }
 
-    /// Cycles in a row in which a frame was sent and none had come back.
-    pub const fn unanswered_cycles(&self) -> u32 {
-        self.unanswered_cycles
-    }
-
     /// Takes a reply to the frame of the last cycle. `has_torque` where the drive shows it.
     pub fn receive(&mut self, has_torque: Option<bool>) {
-        self.unanswered_cycles = 0;
         self.state = match (self.state, has_torque) {
-            (LifeState::Stopping, Some(false)) => LifeState::Stopped,
-            (LifeState::Stopping, None) => {
+            // One reply may be corrupted, or be that to an older frame.
+            (LifeState::Stopping, Some(false) | None) => {
                 self.stop_replies = self.stop_replies.saturating_add(1);
                 if self.stop_replies < STOP_REPLIES { LifeState::Stopping } else { LifeState::Stopped }
             }
@@ -182,7 +197,11 @@ impl Life {
             (LifeState::Starting(mode), Some(true) | None) => LifeState::Running(mode),
             // It has taken its torque away by itself.
             (LifeState::Running(_), Some(false)) => LifeState::Stopping,
-            (state @ (LifeState::Stopping | LifeState::Starting(_) | LifeState::Running(_)), _) => state,
+            (LifeState::Stopping, Some(true)) => {
+                self.stop_replies = 0;
+                LifeState::Stopping
+            }
+            (state @ (LifeState::Starting(_) | LifeState::Running(_)), _) => state,
             // It has torque though it is to have none.
             (_, Some(true)) => LifeState::Stopping,
             (LifeState::Telling(setting), _) => LifeState::Told(setting),
@@ -192,7 +211,6 @@ impl Life {
 
     /// What the drive is sent in this cycle.
     pub fn step(&mut self, wish: LifeWish, by: &LifeCycle) -> LifeStep {
-        self.unanswered_cycles = self.unanswered_cycles.saturating_add(1);
         let before = self.state;
         self.state = next(before, wish);
         if before != LifeState::Stopping {
@@ -251,7 +269,8 @@ fn step_by_frames(before: LifeState, state: LifeState, frames: &OwnFrames) -> Li
         _ => None,
     };
     let own = match (state, new_mode) {
-        (LifeState::Stopping, _) => Some(frames.stop),
+        // Again and again: such a drive does not show that it has obeyed.
+        (LifeState::Stopping | LifeState::Stopped | LifeState::Told(_), _) => Some(frames.stop),
         (LifeState::Starting(_), _) => Some(frames.start),
         (LifeState::Telling(Setting::Zero), _) => frames.zero,
         (LifeState::Telling(Setting::Clear), _) => frames.clear,
@@ -322,51 +341,56 @@ mod tests {
     #[test]
     fn a_drive_is_started_by_its_fields_only_with_its_target_at_its_position() {
         let mut life = Life::default();
-        let steps = answered(&mut life, &BY_FIELDS, true, &[RUN; 6]);
+        let steps = answered(&mut life, &BY_FIELDS, true, &[RUN; 13]);
         let rest = "run=0 zero=0 mode=2 rest";
-        assert_eq!(
-            steps,
-            [
-                rest,
-                rest,
-                rest,
-                "run=1 zero=0 mode=2 rest",
-                "run=1 zero=0 mode=2 set",
-                "run=1 zero=0 mode=2 set"
-            ]
-        );
-        let stopped = answered(&mut life, &BY_FIELDS, true, &[LifeWish::Stop; 2]);
-        assert_eq!((stopped, life.state()), ([rest; 2].map(Into::into).to_vec(), LifeState::Stopped));
+        assert_eq!(steps[..10], [rest; 10]);
+        let (start, set) = ("run=1 zero=0 mode=2 rest", "run=1 zero=0 mode=2 set");
+        assert_eq!(steps[10..], [start, set, set]);
+        let stopped = answered(&mut life, &BY_FIELDS, true, &[LifeWish::Stop; 9]);
+        assert_eq!((stopped, life.state()), ([rest; 9].map(Into::into).to_vec(), LifeState::Stopped));
     }
 
     #[test]
     fn a_drive_is_started_by_frames_of_its_own_after_a_command_at_its_position() {
         let mut life = Life::default();
-        let steps = answered(&mut life, &by_frames(), false, &[RUN; 7]);
+        let steps = answered(&mut life, &by_frames(), false, &[RUN; 13]);
         let (rest, set) = ("run=0 zero=0 mode=0 rest", "run=1 zero=0 mode=0 set");
-        assert_eq!(steps, ["FD", "FD", "FB", rest, "FC", set, set]);
+        assert_eq!(steps[..8], ["FD"; 8]);
+        assert_eq!(steps[8..], ["FB", rest, "FC", set, set]);
         let velocity = LifeWish::Run(FieldMode::Velocity);
         assert_eq!(answered(&mut life, &by_frames(), false, &[velocity; 2]), ["FA", set]);
-        assert_eq!(answered(&mut life, &by_frames(), false, &[LifeWish::Stop; 4]), ["FD", "FD", rest, rest]);
+        assert_eq!(answered(&mut life, &by_frames(), false, &[LifeWish::Stop; 12]), ["FD"; 12]);
+        assert_eq!(life.state(), LifeState::Stopped);
     }
 
     #[test]
-    fn a_drive_that_does_not_reply_is_told_to_stop_for_ever_and_its_silence_is_counted() {
+    fn a_drive_counts_as_stopped_only_when_replies_in_a_row_have_not_shown_torque() {
+        let mut life = Life::default();
+        for torque in [false, false, true, false, false, false, false, false, false, false] {
+            life.step(LifeWish::Stop, &BY_FIELDS);
+            life.receive(Some(torque));
+            assert_eq!(life.state(), LifeState::Stopping);
+        }
+        life.step(LifeWish::Stop, &BY_FIELDS);
+        life.receive(Some(false));
+        assert_eq!(life.state(), LifeState::Stopped);
+    }
+
+    #[test]
+    fn a_drive_that_does_not_reply_is_told_to_stop_for_ever() {
         for by in [BY_FIELDS, by_frames()] {
             let mut life = Life::default();
-            for cycle in 1..100 {
+            for _ in 0..100 {
                 assert!(!matches!(life.step(RUN, &by), LifeStep::Command { run: true, .. }));
-                assert_eq!((life.state(), life.unanswered_cycles()), (LifeState::Stopping, cycle));
+                assert_eq!(life.state(), LifeState::Stopping);
             }
-            life.receive(None);
-            assert_eq!(life.unanswered_cycles(), 0);
         }
     }
 
     #[test]
     fn a_drive_that_takes_its_torque_away_by_itself_gets_no_further_set_point() {
         let mut life = Life::default();
-        answered(&mut life, &BY_FIELDS, true, &[RUN; 6]);
+        answered(&mut life, &BY_FIELDS, true, &[RUN; 13]);
         assert_eq!(life.state(), LifeState::Running(FieldMode::Position));
         life.step(RUN, &BY_FIELDS);
         life.receive(Some(false));
@@ -376,13 +400,14 @@ mod tests {
     #[test]
     fn zero_is_told_once_and_taken_back_and_only_to_a_drive_that_has_stopped() {
         let mut life = Life::default();
-        answered(&mut life, &BY_FIELDS, true, &[RUN; 6]);
-        let steps = answered(&mut life, &BY_FIELDS, true, &[LifeWish::Zero; 4]);
+        answered(&mut life, &BY_FIELDS, true, &[RUN; 13]);
+        let steps = answered(&mut life, &BY_FIELDS, true, &[LifeWish::Zero; 12]);
         let rest = "run=0 zero=0 mode=2 rest";
-        assert_eq!(steps, [rest, "run=0 zero=1 mode=2 rest", rest, rest]);
+        let zeroed = steps.iter().position(|step| step == "run=0 zero=1 mode=2 rest");
+        assert_eq!((zeroed, steps.iter().filter(|step| *step == rest).count()), (Some(8), 11));
         // It is told again where the first time is not answered.
         let mut life = Life::default();
-        answered(&mut life, &by_frames(), false, &[LifeWish::Stop; 3]);
+        answered(&mut life, &by_frames(), false, &[LifeWish::Stop; 9]);
         let told = [0; 3].map(|_| letters(life.step(LifeWish::Zero, &by_frames())));
         assert_eq!(told, ["FE"; 3]);
     }

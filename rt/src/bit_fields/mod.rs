@@ -11,8 +11,10 @@ mod layout;
 mod life_cycle;
 mod values;
 
-pub use drive::{FieldDrive, FieldDriveParameters, FieldTargets, PositionReference};
-pub use frame::{FieldFrame, ReplyError};
+pub use drive::{
+    BesideTarget, FieldDrive, FieldDriveParameters, FieldGains, FieldTargets, PositionReference, RunningMode,
+};
+pub use frame::{FieldFrame, ReplyError, StateCodes};
 pub use layout::{
     BitField, BitRange, ByteOrder, CodeRange, FieldBits, FrameLayout, LayoutError, LinearScale,
     MAX_FIELD_BYTES, MAX_FIELDS, Number,

@@ -46,11 +46,13 @@ pub enum ReplyValue {
     Sender,
     /// Nothing that is used here.
     Ignored,
+    /// A code that shows stopped, running, or an error, see [`FieldFrame::with_states`](super::FieldFrame::with_states).
+    State,
 }
 
 /// What a field may carry in one direction.
 pub trait FieldValue: Copy {
-    /// Its place among the values of its direction, below 9.
+    /// Its place among the values of its direction, below 10.
     fn slot(self) -> u8;
     /// Whether a frame may have several fields with it.
     fn may_repeat(self) -> bool;
@@ -77,7 +79,7 @@ impl FieldValue for ReplyValue {
 }
 
 /// Values in each direction.
-pub(super) const SLOTS: usize = 9;
+pub(super) const SLOTS: usize = 10;
 
 /// What a drive is to be told. Everything is zero at first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -105,5 +107,11 @@ impl ReplyValues {
     /// A value.
     pub fn get(&self, value: ReplyValue) -> f64 {
         self.0.get(usize::from(value.slot())).copied().unwrap_or(0.0)
+    }
+
+    pub(super) fn set(&mut self, value: ReplyValue, to: f64) {
+        if let Some(place) = self.0.get_mut(usize::from(value.slot())) {
+            *place = to;
+        }
     }
 }

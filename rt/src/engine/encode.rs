@@ -167,6 +167,9 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             if self.has_other_modes {
                 axis.command_other_modes();
             }
+            if let Some(frame) = axis.field_frame() {
+                shared.dropped += u64::from(batch.try_push(*frame).is_err());
+            }
             for (frame, axes) in axis.frames() {
                 let is_taken = if axes == 1 {
                     batch.try_push(frame).is_ok()

@@ -97,8 +97,8 @@ pub enum Deadline {
 
 /// The axes of a controller, in groups that each move together.
 ///
-/// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 6 kB for each axis, 5 kB for each
-/// bus, and 15 kB beside: 32 kB for two axes on one bus, 288 kB for 32 axes on 16 buses.
+/// `AXES` and `BUSES` are the most axes and buses that there is room for. An engine needs about 7 kB for each axis, 5 kB for each
+/// bus, and 15 kB beside: 34 kB for two axes on one bus, 329 kB for 32 axes on 16 buses.
 ///
 /// # The order of calls
 /// In each slot, once each: [`Engine::sync`] for every bus, and its frame is sent; [`Engine::receive`] for every frame that has
@@ -132,10 +132,12 @@ pub enum Deadline {
 ///     bus: 0,
 ///     node: 1,
 ///     node_axis: 1,
-///     commands: [CommandPdo::every_cycle(pdo(0x200, commands))].into_iter().collect(),
-///     feedback: [pdo(0x180, feedback)].into_iter().collect(),
+///     exchange: Exchange::Pdos(Pdos {
+///         commands: [CommandPdo::every_cycle(pdo(0x200, commands))].into_iter().collect(),
+///         feedback: [pdo(0x180, feedback)].into_iter().collect(),
+///         unused: Default::default(),
+///     }),
 ///     feedback_since: FeedbackSince::Sync,
-///     unused: Default::default(),
 ///     codec: Cia402Codec::default(),
 ///     controlword_spacing_cycles: 0,
 ///     law: ControlLaw::Position,
@@ -289,6 +291,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// What one cycle decides. [`Engine::encode`] makes frames of it.
     pub fn compute(&mut self, input: &CycleInput<'_>, host: &mut impl HostInterface<AXES, BUSES>) {
+        if self.shared.has_off_cycle {
+            self.take_off_cycle_reports(host);
+        }
         self.sense(input);
         self.handle_requests(host);
         self.sample_streams(input.slot_start_ns, host);

@@ -3,7 +3,8 @@
 use arrayvec::ArrayVec;
 
 use super::SEND_BATCH;
-use crate::axis::{Axis, AxisParameters, AxisParametersError, FeedbackSince, Supervision};
+use crate::axis::{Axis, AxisParameters, AxisParametersError, Exchange, FeedbackSince, Supervision};
+use crate::bit_fields::FieldDriveParameters;
 use crate::bit_set::BitSet;
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::{FrameFormat, Id};
@@ -296,7 +297,7 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
                 return Err(SetUpError::Divider { bus, divider: own.divider });
             }
             let of_bus = self.axes.iter().filter(|axis| usize::from(axis.bus) == bus);
-            let frames = OTHER_FRAMES + of_bus.map(|axis| axis.commands.len()).sum::<usize>();
+            let frames = OTHER_FRAMES + of_bus.map(|axis| axis.exchange.frames()).sum::<usize>();
             if frames > SEND_BATCH {
                 return Err(SetUpError::TooManyFrames { bus, frames, limit: SEND_BATCH });
             }
@@ -467,16 +468,24 @@ fn enter_services(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Resu
 }
 
 fn enter_process_data(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
-    for (number, pdo) in (0..).zip(&own.feedback) {
-        table.feedback(pdo, place, number)?;
+    match &own.exchange {
+        Exchange::Pdos(pdos) => {
+            for (number, pdo) in (0..).zip(&pdos.feedback) {
+                table.feedback(pdo.id, pdo.format, pdo.sender, (place, number))?;
+            }
+            for command in &pdos.commands {
+                table.foreign(command.pdo.id, command.pdo.format);
+            }
+            pdos.unused.iter().try_for_each(|id| table.unused(*id, place))
+        }
+        Exchange::BitFields(FieldDriveParameters { command, reply, .. }) => {
+            table.feedback(reply.id(), reply.format(), reply.sender(), (place, 0))?;
+            // Some drives reply by the identifier of their commands: it stays that of feedback then.
+            table.foreign(command.id(), command.format());
+            Ok(())
+        }
+        Exchange::OffCycle => Ok(()),
     }
-    for command in &own.commands {
-        table.foreign(command.pdo.id, command.pdo.format);
-    }
-    for id in &own.unused {
-        table.unused(*id, place)?;
-    }
-    Ok(())
 }
 
 const NMT: Id = Id::canopen(0x000, 0);

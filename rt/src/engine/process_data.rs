@@ -5,8 +5,9 @@ use arrayvec::ArrayVec;
 use super::parameters::OTHER_FRAMES;
 use super::targets::Rejection;
 use super::{Engine, SEND_BATCH};
-use crate::axis::{CommandPdo, Pdo};
+use crate::axis::{CommandPdo, Pdo, Pdos};
 use crate::dispatch::IdTaken;
+use crate::frame::Id;
 use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, Mapping, MappingError};
 use crate::phase::Phase;
 use crate::rejection::RejectReason;
@@ -44,25 +45,26 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             return Err(RejectReason::NoProcessData);
         };
         // The part of the others would be missing in a frame that they share.
-        if let Some(shared) = axis.parameters().commands.iter().find(|command| command.axes > 1) {
+        if let Some(shared) = axis.parameters().exchange.commands().iter().find(|command| command.axes > 1) {
             return Err(RejectReason::IdTaken { id: shared.pdo.id });
         }
-        if commands.is_empty() || feedback.is_empty() {
+        if commands.is_empty() || feedback.is_empty() || !axis.has_pdos() {
             return Err(RejectReason::NoProcessData);
         }
         let (mut changed, entry) = (table.clone(), place as u8);
         changed.forget_process_data(entry);
         for (number, pdo) in (0..).zip(&feedback) {
-            changed.feedback(pdo, entry, number).map_err(taken)?;
+            changed.feedback(pdo.id, pdo.format, pdo.sender, (entry, number)).map_err(taken)?;
         }
-        for id in data.unused.iter().flatten() {
+        let unused: ArrayVec<Id, MAX_PDOS> = data.unused.iter().flatten().copied().collect();
+        for id in &unused {
             changed.unused(*id, entry).map_err(taken)?;
         }
         for command in &commands {
             changed.foreign(command.pdo.id, command.pdo.format);
         }
         *table = changed;
-        axis.set_process_data(commands, feedback);
+        axis.set_process_data(Pdos { commands, feedback, unused });
         Ok(())
     }
 
@@ -73,7 +75,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             .iter()
             .enumerate()
             .filter(|(other, axis)| *other != place && usize::from(axis.parameters().bus) == bus);
-        OTHER_FRAMES + others.map(|(_, axis)| axis.parameters().commands.len()).sum::<usize>()
+        OTHER_FRAMES + others.map(|(_, axis)| axis.parameters().exchange.frames()).sum::<usize>()
     }
 }
 

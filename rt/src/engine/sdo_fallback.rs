@@ -1,5 +1,5 @@
-//! Stopping drives that PDOs do not reach: their controlword (object 6040) by SDO, or on a bus without SDO by the frame that carries
-//! it, from the real-time thread, before the service frames of the host. PDOs do not reach a node that another master has stopped or reset, and none while the thread is
+//! Stopping drives that PDOs do not reach: their controlword (object 6040) by SDO, or without SDO by the frame that carries it, or that
+//! means the same to a drive of bit fields, from the real-time thread, before the service frames of the host. PDOs do not reach a node that another master has stopped or reset, and none while the thread is
 //! always late or the bus always behind: the way to switch a drive off does not need a punctual set-point.
 
 use super::Engine;
@@ -65,15 +65,16 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let turns = 2 * self.axes.len() as u32;
         let repeat_slots =
             u32::try_from(ANSWER_NS.div_ceil(self.shared.period_ns)).unwrap_or(u32::MAX).max(turns);
-        if !self.shared.is_canopen(bus) {
-            return self.axes_of(bus).find_map(|axis| axis.stop_frame(repeat_slots));
-        }
+        let is_canopen = self.shared.is_canopen(bus);
         for place in self.shared.places_on(bus).iter() {
+            let has_sdo = is_canopen && self.axes.get(place).is_some_and(Axis::has_pdos);
             // The axes of a node have one SDO server, which answers one of them before it takes a request for the next.
-            if self.is_node_asked(place, repeat_slots / 2) {
+            if has_sdo && self.is_node_asked(place, repeat_slots / 2) {
                 continue;
             }
-            let frame = self.axes.get_mut(place).and_then(|axis| axis.service_frame(repeat_slots));
+            let Some(axis) = self.axes.get_mut(place) else { continue };
+            let frame =
+                if has_sdo { axis.service_frame(repeat_slots) } else { axis.stop_frame(repeat_slots) };
             if frame.is_some() {
                 return frame;
             }

@@ -6,6 +6,7 @@ use crate::axis::{Axis, FeedbackSince};
 use crate::bit_set::BitSet;
 use crate::dispatch::Destination;
 use crate::frame::Frame;
+use crate::host::HostInterface;
 use crate::port::Received;
 use crate::record::{Event, EventKind};
 
@@ -95,6 +96,17 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         };
         for axis in self.axes_of(bus).filter(|axis| node == 0 || node == axis.parameters().node) {
             axis.receive_foreign_nmt(command);
+        }
+    }
+
+    /// Takes what has been said by drives that are spoken to outside of the cycle: no more than one report of each.
+    #[cold]
+    pub(super) fn take_off_cycle_reports(&mut self, host: &mut impl HostInterface<AXES, BUSES>) {
+        for _ in 0..AXES {
+            let Some((number, report)) = host.off_cycle_report() else { return };
+            if let Some(axis) = self.axes.iter_mut().find(|axis| axis.number() == number) {
+                axis.receive_off_cycle(&report);
+            }
         }
     }
 

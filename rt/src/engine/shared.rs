@@ -9,7 +9,7 @@ use super::outbox::Outbox;
 use super::parameters::{BusParameters, EngineParameters};
 use super::slots::SlotWatch;
 use super::{Deadline, has_cycle};
-use crate::axis::Axis;
+use crate::axis::{Axis, Exchange};
 use crate::bit_set::BitSet;
 use crate::frame::Id;
 use crate::host::Snapshot;
@@ -31,6 +31,8 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) buses: ArrayVec<BusParameters, BUSES>,
     /// The axes on each bus.
     places_on: [BitSet; BUSES],
+    /// Whether there are drives that are spoken to outside of the cycle.
+    pub(super) has_off_cycle: bool,
     pub(super) requested: Requested,
     /// Whether the commands of this cycle were ready in time, as far as is known.
     pub(super) deadline: Deadline,
@@ -97,6 +99,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             }
         }
         let guards = NodeGuards::new(&parameters);
+        let has_off_cycle = parameters.axes.iter().any(|axis| axis.exchange == Exchange::OffCycle);
         Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,
@@ -122,6 +125,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             record: CycleRecord { axis_count, group_count, ..CycleRecord::default() },
             snapshot: Snapshot { axis_count, bus_count, group_count, ..Snapshot::default() },
             buses: parameters.buses,
+            has_off_cycle,
             places_on,
         }
     }

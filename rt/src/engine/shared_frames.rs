@@ -49,7 +49,7 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         axis: usize,
         own: &AxisParameters,
     ) -> Result<(), SetUpError> {
-        for command in own.commands.iter().filter(|command| command.axes != 1) {
+        for command in own.exchange.commands().iter().filter(|command| command.axes != 1) {
             if !self.can_share(axis, own, command) {
                 return Err(SetUpError::SharedCommand { axis, id: command.pdo.id });
             }
@@ -67,7 +67,7 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         };
         let (mut count, mut bits) = (0_u8, 0_u64);
         for (other_axis, other) in self.axes.iter().enumerate().filter(|(_, other)| other.bus == own.bus) {
-            let same = other.commands.iter().find(|same| same.pdo.id == command.pdo.id);
+            let same = other.exchange.commands().iter().find(|same| same.pdo.id == command.pdo.id);
             let Some(same) = same else { continue };
             let is_alike = same.axes == command.axes
                 && same.transmission == TransmissionType::EveryCycle

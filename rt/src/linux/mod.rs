@@ -3,7 +3,7 @@
 //! - [`MonotonicClock`] sleeps until an absolute time. [`PacedClock`] does the same and spins for the rest; the loop uses it.
 //!   [`SpinGuard`] computes how long the spin must be.
 //! - [`RealtimeThread`] makes the calling thread a real-time thread, step by step, and keeps the outcome of each step.
-//! - [`SocketCanPort`] is a raw CAN socket as a bus port.
+//! - [`SocketCanPort`] is a raw CAN socket as a bus port. [`SlcanPort`] is an adapter on a serial line as one.
 //!
 //! The real-time path formats nothing and allocates nothing. Failures are plain data; their texts are made elsewhere.
 #![allow(unsafe_code)] // System calls need it. Every unsafe block says why it is sound.
@@ -16,9 +16,11 @@ mod memory;
 mod paced_clock;
 mod scheduling;
 mod send_path;
+mod slcan;
 mod spin_guard;
 mod step;
 mod thread;
+mod wire_time;
 
 pub use can::{DescriptorError, SocketCanPort};
 pub use clock::MonotonicClock;
@@ -26,6 +28,7 @@ pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};
 pub use paced_clock::PacedClock;
 pub use scheduling::{Policy, Scheduling, set_nice};
+pub use slcan::SlcanPort;
 pub use spin_guard::SpinGuard;
 pub use step::{Outcome, STEP_COUNT, Step, StepResult};
 pub use thread::{RealtimeThread, ThreadConfig, ThreadReport};

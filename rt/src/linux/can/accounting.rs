@@ -2,24 +2,20 @@
 
 use arrayvec::ArrayVec;
 
+use super::super::wire_time::WireTime;
 use super::arrival::{Arrival, Sender};
 use super::batch::SEND_BATCH;
 use super::error_frame;
 use super::wire_format::Message;
 use crate::frame::{Frame, FrameKind};
 use crate::port::{BusHealth, BusState};
-use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
-use crate::wire::UnstuffedLength;
 
 /// The counters of one port and the state of its bus.
 #[derive(Clone, Debug, Default)]
 pub(super) struct TxRxAccounting {
     /// All but the time that the wire was occupied.
     health: BusHealth,
-    /// Bits on the wire at the nominal bit rate, without stuff bits.
-    nominal_bits: u64,
-    /// Bits on the wire at the bit rate of the data phase, without stuff bits.
-    data_bits: u64,
+    wire_time: WireTime,
     /// Frames that the kernel took and that have not come back from the wire.
     unconfirmed: usize,
     /// The unconfirmed frames that another socket of this process sent, oldest first. The kernel does not mark them as our
@@ -29,22 +25,17 @@ pub(super) struct TxRxAccounting {
     is_behind: bool,
     /// The overflow counter of the socket at its last reading.
     lost: u32,
-    bit_rate: u32,
-    data_bit_rate: Option<u32>,
 }
 
 impl TxRxAccounting {
     /// Accounting for a bus with these bit rates (bit/s). Only the time that the wire is occupied depends on them.
     pub(super) fn new(bit_rate: u32, data_bit_rate: Option<u32>) -> Self {
-        Self { bit_rate, data_bit_rate, ..Self::default() }
+        Self { wire_time: WireTime::new(bit_rate, data_bit_rate), ..Self::default() }
     }
 
-    /// The state of the bus and its counters. The bits become a time here, so that no frame costs a division.
+    /// The state of the bus and its counters.
     pub(super) fn health(&self) -> BusHealth {
-        let data_bit_rate = self.data_bit_rate.unwrap_or(self.bit_rate);
-        let busy_ns =
-            bits_ns(self.nominal_bits, self.bit_rate).saturating_add(bits_ns(self.data_bits, data_bit_rate));
-        BusHealth { busy_ns, ..self.health }
+        BusHealth { busy_ns: self.wire_time.busy_ns(), ..self.health }
     }
 
     /// How many own frames have not come back from the wire.
@@ -114,9 +105,7 @@ impl TxRxAccounting {
     pub(super) fn arrived(&mut self, arrival: &Arrival) -> Option<Frame> {
         self.count_losses(arrival.lost);
         if let Message::Frame(frame) = &arrival.message {
-            let UnstuffedLength { nominal_bits, data_bits } = UnstuffedLength::of(frame);
-            self.nominal_bits += u64::from(nominal_bits);
-            self.data_bits += u64::from(data_bits);
+            self.wire_time.add(frame);
         }
         match arrival.message {
             Message::Frame(frame) if self.is_own(&frame, arrival.sender) => {
@@ -194,14 +183,6 @@ impl TxRxAccounting {
         self.is_behind = false;
         self.sent_by_another.clear();
     }
-}
-
-/// How long these bits take at this bit rate, in whole nanoseconds.
-fn bits_ns(bits: u64, bit_rate: u32) -> Nanoseconds {
-    let bit_rate = u64::from(bit_rate.max(1));
-    // Whole seconds apart from the rest: the product of all bits and 10⁹ overflows after five hours of a full bus.
-    let seconds_ns = (bits / bit_rate).saturating_mul(NANOSECONDS_PER_SECOND);
-    seconds_ns.saturating_add(bits % bit_rate * NANOSECONDS_PER_SECOND / bit_rate)
 }
 
 #[cfg(test)]
@@ -408,17 +389,6 @@ mod tests {
         let mut accounting = TxRxAccounting::new(1_000_000, Some(5_000_000));
         accounting.arrived(&arrival(Message::Frame(long), Sender::Wire));
         assert_eq!(accounting.health().busy_ns, 30 * 1_000 + (5 + 512 + 25 + 7) * 200);
-    }
-
-    #[test]
-    fn the_time_that_the_wire_was_occupied_is_right_after_years_of_a_full_bus() {
-        const YEAR_S: u64 = 365 * 24 * 3_600;
-        assert_eq!(
-            bits_ns(10 * YEAR_S * 1_000_000 + 3, 1_000_000),
-            10 * YEAR_S * NANOSECONDS_PER_SECOND + 3_000
-        );
-        assert_eq!(bits_ns(u64::MAX, 1), u64::MAX);
-        assert_eq!(bits_ns(5, 0), 5 * NANOSECONDS_PER_SECOND);
     }
 
     #[test]

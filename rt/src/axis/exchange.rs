@@ -1,0 +1,173 @@
+//! What is exchanged with the drive of an axis in each cycle of its bus: PDOs, or frames of bit fields.
+
+use arrayvec::ArrayVec;
+
+use super::off_cycle::OffCycleReport;
+use crate::bit_fields::{CommandValue, FieldDriveParameters, ReplyValue};
+use crate::frame::{Frame, FrameFormat, Id};
+use crate::pdo::{
+    CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, Mapping, ProcessImage, TransmissionType,
+};
+
+/// What is exchanged with a drive in each cycle of its bus.
+#[derive(Clone, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is no allocator, and a drive of either kind needs all of it"
+)]
+pub enum Exchange {
+    /// The PDOs of a CANopen drive.
+    Pdos(Pdos),
+    /// A command and a reply of bit fields.
+    BitFields(FieldDriveParameters),
+    /// Nothing in the cycle. Somebody else speaks to the drive, as often as it can answer: it takes what is wanted of the drive from
+    /// [`AxisSnapshot`](crate::AxisSnapshot), and brings [`OffCycleReport`](crate::OffCycleReport)s. The cycle of the bus is the time
+    /// within which one is expected.
+    OffCycle,
+}
+
+/// The PDOs of a drive.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pdos {
+    /// What is sent, in order.
+    pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
+    /// What is expected.
+    pub feedback: ArrayVec<Pdo, MAX_PDOS>,
+    /// Identifiers of process data that the drive sends beside that, which carries nothing new.
+    pub unused: ArrayVec<Id, MAX_PDOS>,
+}
+
+impl Exchange {
+    /// The PDOs that are sent: none to a drive that has no PDOs.
+    pub fn commands(&self) -> &[CommandPdo] {
+        match self {
+            Self::Pdos(pdos) => &pdos.commands,
+            Self::BitFields(_) | Self::OffCycle => &[],
+        }
+    }
+
+    /// The PDOs; `None` for a drive that has none.
+    pub const fn pdos_mut(&mut self) -> Option<&mut Pdos> {
+        match self {
+            Self::Pdos(pdos) => Some(pdos),
+            Self::BitFields(_) | Self::OffCycle => None,
+        }
+    }
+
+    /// Whether the drive is sent a number.
+    pub fn sends(&self, slot: CommandSlot) -> bool {
+        let fields = match self {
+            Self::Pdos(pdos) => return pdos.commands.iter().any(|command| command.pdo.mapping.sends(slot)),
+            Self::BitFields(fields) => fields,
+            Self::OffCycle => return false,
+        };
+        match slot {
+            CommandSlot::Controlword => true,
+            CommandSlot::OperationMode => fields.life_cycle.has_modes(),
+            CommandSlot::TargetPosition => fields.command.carries(CommandValue::Position),
+            CommandSlot::TargetVelocity => fields.command.carries(CommandValue::Velocity),
+            CommandSlot::TargetTorque => fields.command.carries(CommandValue::Torque),
+            CommandSlot::VelocityOffset | CommandSlot::TorqueOffset | CommandSlot::Zero => false,
+        }
+    }
+
+    /// Which numbers the drive reports.
+    pub(super) fn reported_slots(&self) -> FeedbackSlots {
+        let fields = match self {
+            Self::Pdos(pdos) => return FeedbackSlots::of(pdos.feedback.iter().map(|pdo| &pdo.mapping)),
+            Self::BitFields(fields) => fields,
+            Self::OffCycle => return FeedbackSlots::with(OffCycleReport::SLOTS),
+        };
+        let of_reply = [
+            (ReplyValue::Velocity, FeedbackSlot::Velocity),
+            (ReplyValue::Torque, FeedbackSlot::Torque),
+            (ReplyValue::Error, FeedbackSlot::ErrorCode),
+        ];
+        let carried = of_reply.into_iter().filter(|(value, _)| fields.reply.carries(*value));
+        let always = [FeedbackSlot::Statusword, FeedbackSlot::OperationModeDisplay, FeedbackSlot::Position];
+        FeedbackSlots::with(carried.map(|(_, slot)| slot).chain(always))
+    }
+
+    /// The most frames that are sent in a cycle.
+    pub fn frames(&self) -> usize {
+        match self {
+            Self::Pdos(pdos) => pdos.commands.len(),
+            Self::BitFields(_) => 1,
+            Self::OffCycle => 0,
+        }
+    }
+
+    /// How many parts a complete feedback has.
+    pub fn reports(&self) -> usize {
+        match self {
+            Self::Pdos(pdos) => pdos.feedback.len(),
+            Self::BitFields(_) | Self::OffCycle => 1,
+        }
+    }
+}
+
+/// A frame whose payload is no feedback of the drive that it comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoFeedback;
+
+impl core::error::Error for NoFeedback {}
+
+impl core::fmt::Display for NoFeedback {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("the frame is no feedback of this drive")
+    }
+}
+
+/// A PDO: its frames and its compiled mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pdo {
+    /// The identifier.
+    pub id: Id,
+    /// The kind of its frames. CAN FD frames are received with and without bit-rate switch, whichever of the two this says.
+    pub format: FrameFormat,
+    /// The byte by which its frames are known where several drives send by this identifier. Nothing in a PDO that is sent.
+    pub sender: Option<SenderByte>,
+    /// What it carries.
+    pub mapping: Mapping,
+}
+
+/// A byte of a frame that says which drive has sent it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SenderByte {
+    /// Its place in the payload, from 0.
+    pub at: u8,
+    /// Its value in the frames of this drive.
+    pub value: u8,
+}
+
+impl Pdo {
+    /// A PDO of classic frames whose identifier is its own.
+    pub const fn classic(id: Id, mapping: Mapping) -> Self {
+        Self { id, format: FrameFormat::Classic, sender: None, mapping }
+    }
+
+    /// The frame that carries these numbers.
+    #[inline]
+    pub(crate) fn frame(&self, image: &ProcessImage) -> Frame {
+        Frame::packed(self.id, self.format, self.mapping.pack(image), self.mapping.length())
+    }
+}
+
+/// A PDO that is sent to the drive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CommandPdo {
+    /// What.
+    pub pdo: Pdo,
+    /// When.
+    pub transmission: TransmissionType,
+    /// For how many axes its frame is: 1 as a rule. Where it is for several, the drive of each takes its own part and passes over that
+    /// of the others (dummy mapping, CiA 301, 7.4.7.1), and the frame leaves when each of them has its part in it.
+    pub axes: u8,
+}
+
+impl CommandPdo {
+    /// One that is sent in every cycle of its bus.
+    pub const fn every_cycle(pdo: Pdo) -> Self {
+        Self { pdo, transmission: TransmissionType::EveryCycle, axes: 1 }
+    }
+}

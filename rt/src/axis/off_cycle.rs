@@ -1,0 +1,51 @@
+//! An axis whose drive is spoken to outside of the cycle, because it answers too slowly for it.
+
+use super::Axis;
+use crate::cia402::DriveState;
+use crate::pdo::FeedbackSlot;
+
+/// What a drive has said outside of the cycle. At the joint: rad, rad/s and N·m, or m, m/s and N.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OffCycleReport {
+    /// Its state: [`DriveState::OperationEnabled`] while it follows set-points.
+    pub state: DriveState,
+    /// The actual position.
+    pub position: f64,
+    /// The actual velocity.
+    pub velocity: f64,
+    /// The actual torque; 0 where it is not known.
+    pub torque: f64,
+    /// Its error; 0 for none.
+    pub error_code: u16,
+}
+
+impl OffCycleReport {
+    /// The numbers that it brings.
+    pub(super) const SLOTS: [FeedbackSlot; 6] = [
+        FeedbackSlot::Statusword,
+        FeedbackSlot::OperationModeDisplay,
+        FeedbackSlot::Position,
+        FeedbackSlot::Velocity,
+        FeedbackSlot::Torque,
+        FeedbackSlot::ErrorCode,
+    ];
+}
+
+impl Axis {
+    /// Takes a report of a drive that is spoken to outside of the cycle. One that carries no number changes nothing.
+    pub fn receive_off_cycle(&mut self, report: &OffCycleReport) {
+        let OffCycleReport { state, position, velocity, torque, error_code } = *report;
+        let is_number = position.is_finite() && velocity.is_finite() && torque.is_finite();
+        if !is_number || !self.is_off_cycle() {
+            return;
+        }
+        let scale = &self.parameters.scale;
+        self.feedback.take(FeedbackSlot::Statusword, state.statusword_bits().into());
+        self.feedback.take(FeedbackSlot::OperationModeDisplay, self.mode_set().into());
+        self.feedback.take(FeedbackSlot::Position, scale.position_to_counts(position));
+        self.feedback.take(FeedbackSlot::Velocity, scale.velocity_to_drive(velocity));
+        self.feedback.take(FeedbackSlot::Torque, scale.torque_to_per_mille(torque));
+        self.feedback.take(FeedbackSlot::ErrorCode, error_code.into());
+        self.reception.note_arrival(0);
+    }
+}
