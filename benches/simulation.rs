@@ -16,6 +16,7 @@ fn drive(node: u8) -> Box<dyn Drive> {
             inertia: 0.4,
             viscous_friction: 1.5,
             coulomb_friction: 4.0,
+            friction_shape: takt::config::FrictionShape::Constant,
             brake_torque: 110.0,
         },
         encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },

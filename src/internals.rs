@@ -7,6 +7,10 @@ use crate::config::Config;
 use crate::controller::{Supervisor, VirtualRun};
 use crate::error::AssembleError;
 
+pub mod bit_fields {
+    pub use crate::config::bit_fields::*;
+}
+
 pub mod canopen {
     #[cfg(feature = "cli")]
     pub mod lss {
@@ -42,7 +46,6 @@ pub mod commission {
     pub mod dictionary {
         pub use crate::family::commission::dictionary::*;
     }
-    pub use crate::family::commission::running::*;
     pub use crate::procedure::ProcedureEvent;
 }
 
@@ -75,13 +78,26 @@ pub mod family {
     pub mod erob_can {
         pub use crate::family::erob_can::*;
     }
+    pub mod erob_modbus {
+        pub use crate::family::erob_modbus::*;
+    }
     pub mod bring_up {
         pub use crate::family::bring_up::stages::*;
     }
 }
 
+pub mod hollow_lines {
+    pub use crate::hollow_lines::*;
+}
+
 pub mod link {
     pub use crate::link::interface::*;
+    pub mod modbus_line {
+        pub use crate::link::modbus_line::*;
+    }
+    pub mod serial_line {
+        pub use crate::link::serial_line::*;
+    }
     pub use crate::link::socketcan::*;
     pub mod ownership {
         pub use crate::link::ownership::*;
@@ -91,8 +107,14 @@ pub mod link {
     }
 }
 
+pub mod modbus {
+    pub use crate::modbus::*;
+}
+
 pub mod procedure {
-    pub use crate::procedure::{ErobCanSession, Procedure, ProcedureError, ProcedureEvent};
+    pub use crate::procedure::{
+        ErobCanSession, ModbusClient, ModbusSession, Procedure, ProcedureError, ProcedureEvent,
+    };
 }
 
 pub mod schedule {
@@ -102,11 +124,23 @@ pub mod schedule {
 
 pub mod sim {
     pub use crate::sim::object_dictionary::table::ObjectRow;
+    pub mod bit_fields {
+        pub use crate::sim::bit_fields::*;
+    }
     pub mod erob_can {
         pub use crate::sim::erob_can::*;
     }
+    pub mod erob_modbus {
+        pub use crate::sim::erob_modbus::*;
+    }
     pub use crate::sim::mailbox::*;
     pub use crate::sim::medium::*;
+    pub mod serial_line {
+        pub use crate::sim::serial_line::*;
+    }
+    pub mod pseudo_terminal {
+        pub use crate::sim::pseudo_terminal::*;
+    }
     pub use crate::sim::wire_length::*;
     pub mod erob {
         pub use crate::sim::erob::*;

@@ -33,8 +33,8 @@ use std::sync::Arc;
 
 use takt_rt::{
     AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CallbackRun, CycleRecord, Event,
-    ExecutionStart, Frame, HostInterface, MAX_AXES, Nanoseconds, Received, Request, RequestEnvelope,
-    RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
+    ExecutionStart, Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport, Received, Request,
+    RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
 };
 
 use callbacks::CallbackTaker;
@@ -96,6 +96,9 @@ pub enum ChannelError {
     },
 }
 
+/// Reports of each drive that can wait, of those that are spoken to outside of the cycle.
+const REPORTS_OF_AXIS: usize = 4;
+
 /// Makes the channels, and allocates and touches all their memory.
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
@@ -109,6 +112,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (giver, taker) = trajectories::trajectories();
     let (callback_giver, callback_taker) = callbacks::callbacks();
     let (observed_in, observed_out) = observed_events(sizes.events);
+    let (report_in, report_out) = ring(REPORTS_OF_AXIS * sizes.axes.max(1));
     let numbers = RequestNumbers::default();
     let (clients, taken) = client_requests(numbers.clone(), WAITING_AT_MOST, sizes.groups.len());
     let mut rt = RtSide {
@@ -120,6 +124,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         callbacks: callback_taker,
         service: service_out,
         received: received_in,
+        off_cycle_reports: report_out,
         records: record_in,
         events: event_in,
         observed: observed_in,
@@ -136,6 +141,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         streamer,
         service: service_in,
         received: received_out,
+        off_cycle_reports: report_in,
         observer: Observer { snapshot: snapshot_out },
     };
     (rt, host, LogSide { records: record_out, events: event_out })
@@ -163,6 +169,7 @@ pub struct RtSide {
     callbacks: CallbackTaker,
     service: Vec<Consumer<Frame>>,
     received: Producer<(usize, Received)>,
+    off_cycle_reports: Consumer<(u8, OffCycleReport)>,
     records: RecordProducer,
     events: Producer<Event>,
     observed: EventWriter,
@@ -184,6 +191,10 @@ impl HostInterface for RtSide {
         } else {
             self.clients.take().or_else(|| self.requests.pop())
         }
+    }
+
+    fn off_cycle_report(&mut self) -> Option<(u8, OffCycleReport)> {
+        self.off_cycle_reports.pop()
     }
 
     fn begin_stream(&mut self, group: u8) {
@@ -257,6 +268,7 @@ pub struct HostSide {
     streamer: Streamer,
     service: Vec<Producer<Frame>>,
     received: Consumer<(usize, Received)>,
+    off_cycle_reports: Producer<(u8, OffCycleReport)>,
     observer: Observer,
 }
 
@@ -369,6 +381,11 @@ impl HostSide {
         let buses = self.service.len();
         let ring = self.service.get_mut(bus).ok_or(ChannelError::NoSuchBus { bus, buses })?;
         if ring.push(frame) { Ok(()) } else { Err(ChannelError::Full) }
+    }
+
+    /// Reports what a drive has said that is spoken to outside of the cycle. Returns whether there was room.
+    pub fn report_off_cycle(&mut self, axis: u8, report: OffCycleReport) -> bool {
+        self.off_cycle_reports.push((axis, report))
     }
 
     /// The oldest received frame that is not process data, with its bus.
@@ -503,6 +520,17 @@ mod tests {
         assert_eq!(host.take_service(), Some((0, received)));
         assert_eq!(host.take_service(), Some((1, received)));
         assert_eq!(host.take_service(), None);
+    }
+
+    #[test]
+    fn reports_of_drives_outside_of_the_cycle_arrive_in_order_until_there_is_no_room() {
+        let (mut rt, mut host, _log) = channels(&sizes());
+        let report = |position| OffCycleReport { position, ..OffCycleReport::default() };
+        let most = REPORTS_OF_AXIS * 2;
+        let taken = (0..most + 3).filter(|at| host.report_off_cycle(1, report(*at as f64))).count();
+        assert_eq!(taken, most);
+        let arrived: Vec<_> = std::iter::from_fn(|| rt.off_cycle_report()).collect();
+        assert_eq!(arrived, (0..most).map(|at| (1, report(at as f64))).collect::<Vec<_>>());
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub const fn snapshot_words(groups: usize, axes: usize, buses: usize) -> usize {
 const GROUP_WORDS: usize = 3 + 5 + 4;
 
 /// The number of words of an axis of a snapshot.
-const AXIS_WORDS: usize = 11;
+const AXIS_WORDS: usize = 12;
 
 /// The snapshot before the first cycle: passive, of no axes and no buses.
 pub const NO_SNAPSHOT: Snapshot = Snapshot {
@@ -58,6 +58,8 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         current_per_mille: None,
         mode: None,
         mode_set: 0,
+        temperature: None,
+        controlword: 0,
         statusword: 0,
         drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
@@ -267,10 +269,17 @@ fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
     words.put(words_of_drive | is_heard | drive_state | unanswered);
     let current = u64::from(axis.current_per_mille.unwrap_or_default() as u16) << 16;
     let mode = u64::from(axis.mode.unwrap_or_default() as u8) << 32;
-    let are_reported = [axis.torque.is_some(), axis.current_per_mille.is_some(), axis.mode.is_some()];
+    let are_reported = [
+        axis.torque.is_some(),
+        axis.current_per_mille.is_some(),
+        axis.mode.is_some(),
+        axis.temperature.is_some(),
+    ];
     let reported = are_reported.iter().rev().fold(0, |bits, is_reported| bits << 1 | u64::from(*is_reported));
     let mode_set = u64::from(axis.mode_set as u8) << 48;
     words.put(u64::from(axis.feedback_age) | current | mode | reported << 40 | mode_set);
+    let temperature = u64::from(axis.temperature.unwrap_or_default().to_bits()) << 32;
+    words.put(u64::from(axis.controlword) | temperature);
     words.put(axis.feedback_slot);
     words.put(axis.feedback_ns);
 }
@@ -278,7 +287,7 @@ fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
 fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
     let [position_set, velocity_set, torque_set, position, velocity, following_error, torque] =
         [(); 7].map(|()| words.take_f64());
-    let (packed, reported) = (words.take(), words.take());
+    let (packed, reported, commanded) = (words.take(), words.take(), words.take());
     let is_reported = |bit: u32| reported >> (40 + bit) & 1 == 1;
     AxisSnapshot {
         position_set,
@@ -291,6 +300,8 @@ fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
         current_per_mille: is_reported(1).then_some((reported >> 16) as i16),
         mode: is_reported(2).then_some((reported >> 32) as i8),
         mode_set: (reported >> 48) as i8,
+        temperature: is_reported(3).then_some(f32::from_bits((commanded >> 32) as u32)),
+        controlword: commanded as u16,
         statusword: packed as u16,
         drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
@@ -397,13 +408,22 @@ pub(super) mod tests {
 
     fn axes() -> impl Strategy<Value = AxisSnapshot> {
         let states = prop::sample::select(&DriveState::ALL[..]);
-        let reported =
-            any::<(Option<f64>, Option<i16>, (Option<i8>, i8), u16, u16, bool, u16, u16, [u64; 2])>();
+        let reported = any::<(
+            Option<f64>,
+            Option<i16>,
+            (Option<i8>, i8),
+            (u16, u16),
+            (u16, Option<f32>),
+            bool,
+            u16,
+            u16,
+            [u64; 2],
+        )>();
         (any::<[f64; 6]>(), reported, states).prop_map(|(numbers, reported, drive_state)| {
             let [position_set, velocity_set, torque_set, position, velocity, following_error] = numbers;
-            let (torque, current_per_mille, modes, statusword, error_code, is_heard, unanswered, age, at) =
-                reported;
-            let (mode, mode_set) = modes;
+            let (torque, current_per_mille, modes, words, state, is_heard, unanswered, age, at) = reported;
+            let ((mode, mode_set), (controlword, statusword), (error_code, temperature)) =
+                (modes, words, state);
             AxisSnapshot {
                 position_set,
                 velocity_set,
@@ -415,6 +435,8 @@ pub(super) mod tests {
                 current_per_mille,
                 mode,
                 mode_set,
+                temperature,
+                controlword,
                 statusword,
                 drive_state,
                 error_code,

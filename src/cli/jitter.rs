@@ -19,7 +19,7 @@ use super::usage_error::UsageError;
 /// Measure how evenly this machine paces the loop: sleeping only, and sleeping, then spinning.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// Send SYNC to this interface in every slot: can0, vcan0, sim. Drives on it that are enabled will see it
+    /// Send SYNC to this interface in every slot: can0, vcan0, slcan:/dev/ttyACM0, sim. Drives on it that are enabled will see it
     #[arg(long, value_name = "INTERFACE", value_parser = interface)]
     bus: Option<Interface>,
     /// Period of the cycle, in whole microseconds

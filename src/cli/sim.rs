@@ -1,6 +1,10 @@
-//! `takt sim`: the configured drives, or one made from its data sheet, simulated on real interfaces.
+//! `takt sim`: the configured drives, or one made from its data sheet, simulated on real interfaces or behind adapters on
+//! pseudo-terminals.
 
+mod adapters;
 mod data_sheet;
+mod serial;
+mod serial_line;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -10,11 +14,11 @@ use std::thread;
 
 use clap::Args;
 
-use crate::config::{Config, Interface};
+use crate::config::Config;
 use crate::controller::port::open_configured;
 use crate::family::simulated_drives;
 use crate::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
-use crate::link::{OpenError, SocketCanOptions};
+use crate::link::{OpenError, RealInterface, SocketCanOptions};
 use crate::sim::LiveDrives;
 
 use super::configuration::{self, BusOverride};
@@ -22,17 +26,32 @@ use super::exit::Exit;
 use super::interruption;
 use super::lss::SimulatedDevice;
 use super::usage_error::UsageError;
+use adapters::AdapterLink;
 use data_sheet::DataSheetArguments;
+use serial::SerialKind;
+use serial_line::LineDrives;
 
-/// Put the drives of a configuration, simulated, on real interfaces, for any master to talk to.
+/// Put the drives of a configuration, simulated, on real interfaces or pseudo-terminals, for any master to talk to.
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// The configuration (TOML)
-    #[arg(required_unless_present = "sheet")]
+    #[arg(required_unless_present_any = ["sheet", "serial"])]
     config: Option<PathBuf>,
-    /// Connect a bus to another interface than the configuration says: can0, vcan0 …
+    /// Connect a bus to another interface than the configuration says: can0, vcan0 …, slcan:/dev/ttyACM0
     #[arg(long = "bus", value_name = "NAME=INTERFACE")]
     buses: Vec<BusOverride>,
+    /// Put every simulated bus behind an SLCAN adapter on a pseudo-terminal, and say its path
+    ///
+    /// Another program opens it as it would open /dev/ttyACM0: takt run CONFIG --bus NAME=slcan:/dev/pts/N. With LINK the
+    /// path has a second name, which you choose. Needs no root and no CAN support in the kernel.
+    #[arg(long = "pty", value_name = "[BUS=]LINK", num_args = 0..=1, default_missing_value = "")]
+    adapters: Vec<AdapterLink>,
+    /// Simulate what is on a serial line instead, on a pseudo-terminal: FAMILY:ADDRESS[,ADDRESS…], or a device of the hollow-shaft motors
+    ///
+    /// Devices: hollow-rs485 (the RS-485 module with motors 1 to 4), hollow-console, hollow-encoder. Any master opens the line as it would
+    /// open /dev/ttyUSB0; --pty LINK gives it a second name.
+    #[arg(long, value_name = "DRIVES", conflicts_with_all = ["config", "buses", "lss_devices", "sheet"])]
+    serial: Option<OnSerialLine>,
     /// Put a device beside the drives that has LSS and nothing else: [BUS=]IDENTITY, as in `takt lss --simulate`
     ///
     /// Without BUS it is on the first bus that has a real interface.
@@ -40,6 +59,27 @@ pub struct Arguments {
     lss_devices: Vec<LssOnBus>,
     #[command(flatten)]
     data_sheet: DataSheetArguments,
+}
+
+/// What is simulated on a serial line.
+#[derive(Clone, Debug)]
+enum OnSerialLine {
+    /// Drives of a family.
+    Drives(LineDrives),
+    /// Another device.
+    Device(SerialKind),
+}
+
+impl FromStr for OnSerialLine {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text.contains(':') {
+            text.parse().map(Self::Drives)
+        } else {
+            SerialKind::named(text).map(Self::Device)
+        }
+    }
 }
 
 /// A device with LSS, and the name of its bus.
@@ -63,6 +103,11 @@ impl FromStr for LssOnBus {
 
 /// Runs until Ctrl-C or SIGTERM.
 pub fn run(arguments: &Arguments) -> Exit {
+    match &arguments.serial {
+        Some(OnSerialLine::Drives(drives)) => return serial_line::host(drives, &arguments.adapters),
+        Some(OnSerialLine::Device(kind)) => return serial::run(*kind, &arguments.adapters),
+        None => {}
+    }
     match data_sheet::open(&arguments.data_sheet) {
         Err(error) => return error.print(false),
         Ok(Some((drives, _lock))) => return host(vec![("can".to_owned(), drives)]),
@@ -87,6 +132,10 @@ pub fn run(arguments: &Arguments) -> Exit {
         Ok(drives) => drives,
         Err(error) => return UsageError::from(error.to_string()).print(false),
     };
+    match adapters::open(&config, &arguments.adapters) {
+        Ok(behind_adapters) => drives.extend(behind_adapters),
+        Err(error) => return error.print(false),
+    }
     for LssOnBus { bus, device } in &arguments.lss_devices {
         let is_its_bus = |(name, _): &&mut (String, LiveDrives)| bus.as_ref().is_none_or(|bus| bus == name);
         match drives.iter_mut().find(is_its_bus) {
@@ -99,7 +148,11 @@ pub fn run(arguments: &Arguments) -> Exit {
         }
     }
     if drives.is_empty() {
-        say!("takt: no bus has a real interface; name one, for example: --bus {}=vcan0", first_bus(&config));
+        say!(
+            "takt: no bus has a real interface; name one, for example: --bus {}=vcan0, or put the simulated buses behind \
+             adapters: --pty",
+            first_bus(&config)
+        );
         return Exit::Usage;
     }
     let exit = host(drives);
@@ -138,11 +191,8 @@ fn host(drives: Vec<(String, LiveDrives)>) -> Exit {
 
 /// One simulator for each interface: two would play drives with duplicate node IDs.
 fn lock(config: &Config) -> Result<Vec<InterfaceLock>, ClaimError> {
-    let real = config.buses.iter().filter_map(|bus| match &bus.interface {
-        Interface::SocketCan(interface) => Some((&bus.name, interface)),
-        Interface::Simulated => None,
-    });
-    real.map(|(bus, interface)| lock_for_simulator(bus, interface)).collect()
+    let real = config.buses.iter().filter_map(|bus| Some((&bus.name, RealInterface::of(&bus.interface)?)));
+    real.map(|(bus, interface)| lock_for_simulator(bus, &interface)).collect()
 }
 
 /// The drives of every bus that has a real interface. Their port has no filters: a node on a bus receives every frame.
@@ -155,7 +205,7 @@ fn open(config: &Config) -> Result<Vec<(String, LiveDrives)>, OpenError> {
             ..SocketCanOptions::default()
         };
         if let Some(port) = open_configured(config, index, &options)? {
-            all.push((bus.name.clone(), LiveDrives::new(simulated_drives(config, index), port)));
+            all.push((bus.name.clone(), LiveDrives::new(simulated_drives(config, index), port.into_live())));
         }
     }
     Ok(all)

@@ -4,8 +4,7 @@ use std::collections::VecDeque;
 
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
 
-use super::Report;
-use super::{Procedure, ProcedureError};
+use super::{ProcedureError, Report, RunningTask};
 use crate::procedure::ProcedureEvent;
 
 /// Interval between two polls of the bus.
@@ -29,7 +28,7 @@ pub enum SessionEvent {
 /// `is_interrupted` is called at each poll; each `true` interrupts the procedure once. `see` gets every event
 /// with the time since the beginning.
 pub fn run(
-    mut procedure: Procedure,
+    mut procedure: Box<dyn RunningTask<Frame>>,
     port: &mut impl BusPort,
     clock: &mut impl Clock,
     mut is_interrupted: impl FnMut() -> bool,

@@ -14,7 +14,7 @@ pub mod bus_session;
 pub mod layer_settings;
 
 pub(crate) use crate::family::commission::{
-    CommandValue, Failure, MotionProfile, MoveKind, Procedure, ProcedureError, ReadObject, Report,
-    TargetDrive, Task, command_value, dictionary, meaning, procedure,
+    CommandValue, DriveTask, Failure, MotionProfile, MoveKind, ProcedureError, Report, RunningTask,
+    TargetDrive, Task, ValueText, command_value, dictionary,
 };
 pub(crate) use crate::procedure::{AxisReading, ProcedureEvent};

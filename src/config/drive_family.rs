@@ -5,13 +5,15 @@
 
 use std::any::Any;
 use std::fmt;
-use std::ops::Deref;
+use std::ops::{Deref, Range, RangeInclusive};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use takt_rt::{Cia402Codec, MappedObject, ModeCondition, OperationMode};
+use takt_rt::{Cia402Codec, Id, MappedObject, ModeCondition, OperationMode};
 
+use super::bounds::Bounds;
 use super::model::{Control, Identity};
+use super::quantity::Quantity;
 use super::ranges;
 use super::read::section::Section;
 use super::supervision::ErrorControl;
@@ -74,6 +76,11 @@ pub struct DriveFacts {
     pub may_ignore_sync: bool,
     /// The number of this axis among those of its drive, 1 where a drive has one axis. See [`Axis::node`](super::model::Axis::node).
     pub node_axis: u8,
+    /// Whether the drives are spoken to by frames of bit fields, see [`Family::field_drive`](crate::family::Family::field_drive). They are no
+    /// CANopen nodes then: they have neither objects nor NMT states nor PDOs.
+    pub has_field_frames: bool,
+    /// The identifiers of drives that are no CANopen nodes, and have a protocol of their own.
+    pub own_identifiers: Option<OwnIdentifiers>,
     /// How the drives show that they live, beside their feedback.
     pub error_control: ErrorControl,
     /// Whether the drives can watch the heartbeat of the controller (object 1016).
@@ -88,6 +95,35 @@ pub struct DriveFacts {
     pub controlword_spacing_ns: u64,
     /// What is plausible for such a drive.
     pub plausible: Plausible,
+}
+
+/// The 11-bit identifiers of a protocol that is not CANopen: the node ID is added to each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OwnIdentifiers {
+    /// Of the requests of the controller.
+    pub request: u16,
+    /// Of the replies of a drive.
+    pub reply: u16,
+    /// The highest node ID. The lowest is 1.
+    pub last_node: u8,
+}
+
+impl OwnIdentifiers {
+    /// The identifier of the requests to a node.
+    pub fn request_id(self, node: u8) -> Id {
+        Self::id(self.request, node)
+    }
+
+    /// The identifier of the replies of a node.
+    pub fn reply_id(self, node: u8) -> Id {
+        Self::id(self.reply, node)
+    }
+
+    fn id(base: u16, node: u8) -> Id {
+        // What is beyond 11 bits belongs to no node.
+        let highest = u32::from(base) + u32::from(node);
+        Id::base(highest.min(0x7FF)).unwrap_or(Id::canopen(base, node))
+    }
 }
 
 /// Modes of operation, a bit for each as in object 6502.
@@ -194,6 +230,8 @@ impl DriveFacts {
             reports_mode: true,
             may_ignore_sync: false,
             node_axis: 1,
+            has_field_frames: false,
+            own_identifiers: None,
             error_control: ErrorControl::Heartbeat { fixed_ms: None },
             consumes_heartbeat: true,
             sends_emergencies: true,
@@ -201,6 +239,15 @@ impl DriveFacts {
             codec: Cia402Codec::STANDARD,
             controlword_spacing_ns: 0,
             plausible: Plausible::ANYTHING,
+        }
+    }
+
+    /// Every identifier between a drive with this node ID and its master: those of its own protocol, or those that CANopen gives to
+    /// its node (CiA 301, 7.3.3).
+    pub(crate) fn identifiers(&self, node: u8) -> Vec<Id> {
+        match self.own_identifiers {
+            Some(own) => vec![own.request_id(node), own.reply_id(node)],
+            None => (1..=0xE).map(|function| Id::canopen(function << 7, node)).collect(),
         }
     }
 
@@ -285,11 +332,19 @@ pub trait ConfiguredFamily: Sync {
 /// The table of an axis, for the keys that belong to the family of its drive.
 pub struct FamilyKeys<'s, 'a> {
     section: &'s mut Section<'a>,
+    /// The table of what stands in on a simulated bus.
+    simulated: &'s mut Section<'a>,
 }
 
 impl<'s, 'a> FamilyKeys<'s, 'a> {
-    pub(super) fn of(section: &'s mut Section<'a>) -> Self {
-        Self { section }
+    pub(super) fn of(section: &'s mut Section<'a>, simulated: &'s mut Section<'a>) -> Self {
+        Self { section, simulated }
+    }
+
+    /// `true` or `false` in the table `simulated`; `false` where the key is not there. `None` if it is something else, which is
+    /// reported.
+    pub fn simulated_flag(&mut self, key: &'static str) -> Option<bool> {
+        self.simulated.get(key).map_or(Some(false), |entry| entry.boolean())
     }
 
     /// A file that the key names, relative to the configuration. `None` if the key is not there, or is no text.
@@ -309,6 +364,41 @@ impl<'s, 'a> FamilyKeys<'s, 'a> {
             None => Some(1),
             Some(entry) => entry.integer(ranges::NODE_AXIS).and_then(|number| u8::try_from(number).ok()),
         }
+    }
+
+    /// A number without a unit. `None` if the key is not there, or is something else, which is reported.
+    pub fn number(&mut self, key: &'static str, allowed: RangeInclusive<f64>) -> Option<f64> {
+        let bounds = Bounds::Between(*allowed.start(), *allowed.end());
+        self.section.get(key).and_then(|entry| entry.number(bounds))
+    }
+
+    /// A whole number. `None` if the key is not there, or is something else, which is reported.
+    pub fn integer(&mut self, key: &'static str, allowed: Range<i64>) -> Option<i64> {
+        self.section.get(key).and_then(|entry| entry.integer(allowed))
+    }
+
+    /// A quantity, in SI units. `None` if the key is not there, or is something else, which is reported.
+    pub fn quantity(
+        &mut self,
+        key: &'static str,
+        quantity: Quantity,
+        allowed: RangeInclusive<f64>,
+    ) -> Option<f64> {
+        let bounds = Bounds::Between(*allowed.start(), *allowed.end());
+        self.section.get(key).and_then(|entry| entry.quantity(quantity, bounds))
+    }
+
+    /// `true` or `false`; `false` where the key is not there. `None` if it is something else, which is reported.
+    pub fn boolean(&mut self, key: &'static str) -> Option<bool> {
+        match self.section.get(key) {
+            None => Some(false),
+            Some(entry) => entry.boolean(),
+        }
+    }
+
+    /// Leaves a key alone that may be right.
+    pub fn pass_over(&mut self, key: &'static str) {
+        let _ = self.section.get(key);
     }
 
     /// Reports that the key, for which `says` tells what it is, is missing, unless it is there.

@@ -29,8 +29,9 @@ use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 use super::defaults;
 use super::drive_family::DriveFamily;
 use super::model::{
-    Axis, Bus, CommandFrames, Config, Control, Cycle, FollowingError, Interface, Joint, Limits, Master,
-    MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry, Travel,
+    Axis, Bus, CommandFrames, Config, Control, Cycle, FollowingError, FrictionShape, Interface, Joint,
+    Limits, Master, MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry,
+    Travel,
 };
 
 impl Config {
@@ -234,6 +235,7 @@ impl SimulatedJoint {
     pub fn within(limits: &Limits, rated_torque: f64) -> Self {
         Self {
             gravity: 0.0,
+            friction: FrictionShape::Constant,
             peak_torque: defaults::PEAK_TO_RATED_TORQUE * rated_torque,
             initial_position: defaults::initial_position(limits),
             power_up: PowerUpState::default(),

@@ -1,26 +1,34 @@
 //! What a bus is connected to, as people write it.
 
 use std::fmt;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::model::Interface;
+use super::model::{Interface, SlcanLine};
 use crate::printable::excerpt;
 
 /// The longest name of a network interface of Linux (IFNAMSIZ less the final zero).
 const LONGEST_NAME: usize = 15;
+/// The longest path of Linux (PATH_MAX less the final zero).
+const LONGEST_PATH: usize = 4_095;
+/// The baud rate that the manuals of SLCAN adapters name.
+const USUAL_BAUD_RATE: u32 = 1_000_000;
+/// What chips for serial lines can do, from the slowest to the fastest.
+const BAUD_RATES: RangeInclusive<u32> = 9_600..=12_000_000;
 
 impl FromStr for Interface {
     type Err = InterfaceError;
 
-    /// `sim`, or the name of a SocketCAN interface: `can0`, `vcan0`.
+    /// `sim`, the name of a SocketCAN interface (`can0`, `vcan0`), or an SLCAN adapter: `slcan:/dev/ttyACM0`,
+    /// `slcan:/dev/ttyUSB0@2000000`.
     fn from_str(text: &str) -> Result<Self, InterfaceError> {
         if text == "sim" {
             return Ok(Self::Simulated);
         }
-        if let Some(device) = text.strip_prefix("slcan:") {
-            return Err(InterfaceError::SerialLine { device: excerpt(device) });
+        if let Some(line) = text.strip_prefix("slcan:") {
+            return line.parse().map(Self::Slcan);
         }
         let is_sound = (1..=LONGEST_NAME).contains(&text.len())
             && !matches!(text, "." | "..")
@@ -33,24 +41,62 @@ impl FromStr for Interface {
     }
 }
 
+impl FromStr for SlcanLine {
+    type Err = InterfaceError;
+
+    /// `/dev/ttyACM0`, or with a baud rate `/dev/ttyUSB0@2000000`.
+    fn from_str(text: &str) -> Result<Self, InterfaceError> {
+        let (device, baud_rate) = match text.rsplit_once('@') {
+            Some((device, rate)) => {
+                let baud_rate = rate.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
+                (device, baud_rate.ok_or_else(|| InterfaceError::BaudRate { given: excerpt(rate) })?)
+            }
+            None => (text, USUAL_BAUD_RATE),
+        };
+        let is_sound = device.starts_with('/')
+            && !device.ends_with('/')
+            && device.len() <= LONGEST_PATH
+            && !device.contains(|c: char| c.is_control() || c == '@');
+        if is_sound {
+            Ok(Self { device: device.to_owned(), baud_rate })
+        } else {
+            Err(InterfaceError::Device { given: excerpt(device) })
+        }
+    }
+}
+
+impl fmt::Display for SlcanLine {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.device)?;
+        if self.baud_rate == USUAL_BAUD_RATE { Ok(()) } else { write!(f, "@{}", self.baud_rate) }
+    }
+}
+
 impl fmt::Display for Interface {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Simulated => f.write_str("sim"),
             Self::SocketCan(name) => f.write_str(name),
+            Self::Slcan(line) => write!(f, "slcan:{line}"),
         }
     }
 }
 
-/// What is wrong with the name of an interface.
+/// What is wrong with what an interface is called.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum InterfaceError {
-    /// A serial-line adapter, which takt does not open itself.
-    #[error("takt does not open the serial adapter {device:?} itself")]
-    SerialLine {
-        /// The device.
-        device: String,
+    /// Not the path of a device.
+    #[error("{given:?} cannot be the path of a serial line")]
+    Device {
+        /// What was given.
+        given: String,
+    },
+    /// Not a baud rate.
+    #[error("{given:?} cannot be the baud rate of a serial line")]
+    BaudRate {
+        /// What was given.
+        given: String,
     },
     /// Not a name that a network interface of Linux can have.
     #[error("{name:?} cannot be the name of a network interface")]
@@ -64,13 +110,20 @@ impl InterfaceError {
     /// What to do about it.
     pub fn help(&self) -> String {
         match self {
-            Self::SerialLine { device } => format!(
-                "make a network interface of it and name that one: `slcand -o -c -s8 {device} slcan0 && ip link set \
-                 slcan0 up`, then \"slcan0\""
+            Self::Device { .. } => {
+                "name the device by its whole path: \"slcan:/dev/ttyACM0\", or \"slcan:/dev/serial/by-id/…\", which stays \
+                 the same when adapters are plugged in another order"
+                    .to_owned()
+            }
+            Self::BaudRate { .. } => format!(
+                "a whole number of {} to {} behind the path: \"slcan:/dev/ttyUSB0@2000000\"; without it the line has \
+                 {USUAL_BAUD_RATE} baud",
+                BAUD_RATES.start(),
+                BAUD_RATES.end()
             ),
             Self::Name { .. } => {
-                "\"sim\", or a name of at most 15 letters, digits and -_. as `ip link` shows it \
-                                  (\"can0\", \"vcan0\")"
+                "\"sim\", a name of at most 15 letters, digits and -_. as `ip link` shows it (\"can0\", \"vcan0\"), or \
+                 \"slcan:\" and the path of an adapter on a serial line"
                     .to_owned()
             }
         }
@@ -83,17 +136,32 @@ mod tests {
 
     #[test]
     fn interfaces_are_read_and_shown_alike() {
-        for text in ["sim", "can0", "vcan12", "slcan0", "can-left_1.0"] {
+        for text in
+            ["sim", "can0", "vcan12", "slcan0", "can-left_1.0", "slcan:/dev/ttyACM0", "slcan:/dev/ttyS1@9600"]
+        {
             assert_eq!(text.parse::<Interface>().unwrap().to_string(), text);
         }
         assert_eq!("sim".parse(), Ok(Interface::Simulated));
     }
 
     #[test]
-    fn a_serial_adapter_is_refused_with_the_way_to_make_an_interface_of_it() {
-        let refused = "slcan:/dev/ttyACM0".parse::<Interface>().unwrap_err();
-        assert_eq!(refused, InterfaceError::SerialLine { device: "/dev/ttyACM0".to_owned() });
-        assert!(refused.help().contains("slcand -o -c -s8 /dev/ttyACM0 slcan0"));
+    fn an_adapter_is_named_by_its_device_and_where_it_matters_its_baud_rate() {
+        let line =
+            |device: &str, baud_rate| Interface::Slcan(SlcanLine { device: device.to_owned(), baud_rate });
+        assert_eq!("slcan:/dev/ttyACM0".parse(), Ok(line("/dev/ttyACM0", 1_000_000)));
+        assert_eq!("slcan:/dev/ttyUSB0@2000000".parse(), Ok(line("/dev/ttyUSB0", 2_000_000)));
+    }
+
+    #[test]
+    fn what_is_no_path_of_a_device_and_no_baud_rate_is_refused() {
+        for given in ["", "ttyACM0", "/dev/", "/dev/tty\nACM0", "dev/ttyACM0", "/dev/a@b"] {
+            let refused = format!("slcan:{given}@1000000").parse::<Interface>();
+            assert!(matches!(refused, Err(InterfaceError::Device { .. })), "{given:?}: {refused:?}");
+        }
+        for given in ["", "fast", "0", "9599", "12000001", "-1", "1e6"] {
+            let refused = format!("slcan:/dev/ttyACM0@{given}").parse::<Interface>();
+            assert_eq!(refused, Err(InterfaceError::BaudRate { given: given.to_owned() }));
+        }
     }
 
     #[test]

@@ -4,12 +4,14 @@
 //! [`ConfigError`] with every problem of the file, each with its line and a way out. Quantities are bare numbers in SI
 //! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
 
+pub(crate) mod bit_fields;
 pub(crate) mod bounds;
 pub(crate) mod defaults;
 #[cfg(feature = "miette")]
 mod diagnostic;
 mod drive_family;
 mod error;
+pub(crate) mod identifiers;
 mod in_code;
 mod interface;
 mod mode_words;
@@ -30,7 +32,8 @@ use std::fmt;
 use std::path::Path;
 
 pub use drive_family::{
-    ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, ModeChangeRule, ModeSet, Plausible, VelocityUnit,
+    ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, ModeChangeRule, ModeSet, OwnIdentifiers,
+    Plausible, VelocityUnit,
 };
 pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;
@@ -58,9 +61,9 @@ impl Config {
     /// Connects a bus to another interface than the file says, as `--bus NAME=INTERFACE` does.
     pub fn override_interface(&mut self, name: &str, interface: &str) -> Result<(), OverrideError> {
         let interface: Interface = interface.parse()?;
-        if interface != Interface::Simulated
-            && let Some(owner) = self.buses.iter().find(|bus| bus.interface == interface && bus.name != name)
-        {
+        let is_its_owner =
+            |bus: &&Bus| rules::bus::is_same_device(&bus.interface, &interface) && bus.name != name;
+        if let Some(owner) = self.buses.iter().find(is_its_owner) {
             return Err(OverrideError::InterfaceTaken { interface, bus: owner.name.clone() });
         }
         let known = || self.buses.iter().map(|bus| bus.name.as_str()).collect::<Vec<_>>().join(", ");

@@ -178,6 +178,17 @@ pub enum Interface {
     Simulated,
     /// A SocketCAN network interface, by name.
     SocketCan(String),
+    /// An SLCAN adapter on a serial line.
+    Slcan(SlcanLine),
+}
+
+/// The serial line of an SLCAN adapter.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SlcanLine {
+    /// The path of the device: `/dev/ttyACM0`.
+    pub device: String,
+    /// Baud of the line. Default 1,000,000. An adapter without a chip for a serial line (`/dev/ttyACM…`) ignores it.
+    pub baud_rate: u32,
 }
 
 /// What a source may ask of the torque loop of an axis: of an impedance, and of how fast a torque changes.
@@ -473,11 +484,24 @@ pub enum PowerUpState {
     Operational,
 }
 
+/// How the Coulomb friction of a simulated joint depends on its speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FrictionShape {
+    /// It does not: it is the same at rest and in motion.
+    #[default]
+    Constant,
+    /// As measured on a joint with a harmonic drive: little of it at rest, from where it rises steeply to the whole at about 0.8 rad/s.
+    HarmonicDrive,
+}
+
 /// What stands in for an axis on a simulated bus, beside its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedJoint {
     /// The torque of gravity a quarter turn from 0, where the joint hangs: N·m (the weight of a linear axis: N). Default 0.
     pub gravity: f64,
+    /// How Coulomb friction depends on the speed. Default: it does not.
+    pub friction: FrictionShape,
     /// Peak torque: N·m (N). Default: three times the rated torque.
     pub peak_torque: f64,
     /// Position at power-up: rad (m). Default 0, or the limit nearest to it.

@@ -12,7 +12,8 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .into_iter()
         .map(|candidate| (likeness(candidate), candidate))
         .filter(|(likeness, _)| *likeness >= 0.5)
-        .max_by(|(a, _), (b, _)| a.total_cmp(b))
+        // Of equals the first one: candidates come with the usual ones first.
+        .reduce(|best, next| if next.0 > best.0 { next } else { best })
         .map(|(_, candidate)| candidate)
 }
 
@@ -27,5 +28,6 @@ mod tests {
         assert_eq!(nearest("max_torque", keys), Some("torque"));
         assert_eq!(nearest("Position", keys), Some("position"));
         assert_eq!(nearest("colour", keys), None);
+        assert_eq!(nearest("erob", ["erob-canopen", "erob-can", "erob-modbus"]), Some("erob-canopen"));
     }
 }

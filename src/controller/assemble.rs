@@ -5,13 +5,15 @@ use std::fmt;
 use arrayvec::ArrayVec;
 use takt_rt::{
     AxisLimits, AxisParameters, BusParameters, CanopenNetwork, CommandPdo, Engine, EngineParameters,
-    FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES, MAX_GROUPS,
-    MappedObject, Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, ScaleError, SetUpError,
-    SlotPlan, Supervision, TimingLadder, TorqueLimits,
+    Exchange, FeedbackSince, Follow, GroupParameters, Heartbeat, Id, LookAheadParameters, MAX_AXES,
+    MAX_GROUPS, MappedObject, Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Pdos,
+    ScaleError, SetUpError, SlotPlan, Supervision, TimingLadder, TorqueLimits,
 };
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
+use crate::config::bit_fields::{FieldDevice, ReplyMoment};
 use crate::config::{self, Axis, Compliance, Config, ConfigError, Interface};
+use crate::family;
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 
 /// How long the drives may take from the first controlword to operation enabled.
@@ -82,8 +84,8 @@ pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
         .enumerate()
         .map(|(index, axis)| axis_parameters(index, axis, config, &cycles))
         .collect::<Result<_, _>>()?;
-    let buses = config.buses.iter().map(|bus| BusParameters {
-        canopen: Some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
+    let buses = config.buses.iter().enumerate().map(|(index, bus)| BusParameters {
+        canopen: is_canopen(config, index).then_some(CanopenNetwork { sync_id: Id::canopen(0x080, 0) }),
         divider: bus.divider,
         service_frames_active: bus.service_frames_per_cycle,
         service_frames_passive: SERVICE_FRAMES_PASSIVE.max(bus.service_frames_per_cycle),
@@ -134,6 +136,12 @@ fn groups(config: &Config) -> ArrayVec<GroupParameters, MAX_GROUPS> {
     groups.collect()
 }
 
+/// Whether a bus has CANopen nodes: it has unless none of its drives has PDOs.
+fn is_canopen(config: &Config, bus: usize) -> bool {
+    let mut axes = config.axes.iter().filter(|axis| axis.bus == bus).peekable();
+    axes.peek().is_none() || axes.any(|axis| family::has_pdos(axis, config))
+}
+
 fn axis_parameters(
     index: usize,
     axis: &Axis,
@@ -147,14 +155,28 @@ fn axis_parameters(
         Ok(CommandPdo { pdo, transmission: plan.transmission, axes: plan.axes })
     };
     let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&of_first_axis(plan, axis))?));
+    let family = family::of(&axis.drive);
+    let exchange = match family.field_drive(axis) {
+        Some(fields) => Exchange::BitFields(fields),
+        None if family.off_cycle(axis, config).is_some() => Exchange::OffCycle,
+        None => Exchange::Pdos(Pdos {
+            commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
+            feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
+            unused: data.unused.iter().map(|plan| plan.id).collect(),
+        }),
+    };
+    let feedback_since = match exchange {
+        Exchange::Pdos(_) => feedback_since(&data.feedback),
+        Exchange::BitFields(_) if reports_by_itself(axis) => FeedbackSince::CommandPhase,
+        Exchange::BitFields(_) => FeedbackSince::SetPoint,
+        Exchange::OffCycle => FeedbackSince::CommandPhase,
+    };
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),
         node: axis.node,
         node_axis: axis.drive.node_axis,
-        commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
-        feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
-        feedback_since: feedback_since(&data.feedback),
-        unused: data.unused.iter().map(|plan| plan.id).collect(),
+        exchange,
+        feedback_since,
         codec: axis.drive.codec,
         controlword_spacing_cycles: u32::try_from(
             axis.drive.controlword_spacing_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1)),
@@ -222,6 +244,12 @@ fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
     } else {
         FeedbackSince::CommandPhase
     }
+}
+
+/// Whether a drive of bit fields reports without being asked.
+fn reports_by_itself(axis: &Axis) -> bool {
+    let device: Option<&FieldDevice> = axis.drive.description();
+    device.is_some_and(|device| matches!(device.description.reply_moment, ReplyMoment::Cyclic { .. }))
 }
 
 /// The stream of each group of a configuration.

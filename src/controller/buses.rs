@@ -4,11 +4,12 @@
 use takt_rt::Id;
 
 use crate::canopen::function_code;
-use crate::config::{Config, Interface};
+use crate::config::Config;
+use crate::config::identifiers::IdUse;
 use crate::family::bring_up::ProcessData;
 use crate::family::identifiers;
 use crate::link::ownership::{BusClaim, ClaimError, CommandedDrive, IfOwned, MasterTraffic, Ownership};
-use crate::link::{InterfaceSettings, SocketCanOptions};
+use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions};
 
 /// The most set-point frames of an axis in a cycle: a drive has four receive PDOs.
 const COMMANDS_PER_AXIS: usize = 4;
@@ -51,10 +52,13 @@ impl MasterTraffic {
     pub fn of(config: &Config, bus: usize) -> Self {
         let drives = config.axes.iter().filter(|axis| axis.bus == bus).map(|axis| {
             let data = ProcessData::of(axis, config);
+            let own = axis.drive.frame_identifiers(axis.node);
+            let of_use = |wanted| own.iter().filter(move |(_, used)| *used == wanted).map(|(id, _)| *id);
+            let replies = data.feedback.iter().chain(&data.unused).map(|pdo| pdo.id);
             CommandedDrive {
                 node: axis.node,
-                commands: data.commands.iter().map(|pdo| pdo.id).collect(),
-                feedback: data.feedback.iter().chain(&data.unused).map(|pdo| pdo.id).collect(),
+                commands: data.commands.iter().map(|pdo| pdo.id).chain(of_use(IdUse::Request)).collect(),
+                feedback: replies.chain(of_use(IdUse::Reply)).collect(),
             }
         });
         let sync_period_ns = config.bus_cycle(bus).period_ns;
@@ -66,10 +70,9 @@ impl BusClaim {
     /// Bus number `bus` of a configuration; `None` when it is a simulated one.
     pub fn of(config: &Config, bus: usize) -> Option<Self> {
         let settings = config.buses.get(bus)?;
-        let Interface::SocketCan(interface) = &settings.interface else { return None };
         Some(Self {
             bus: settings.name.clone(),
-            interface: interface.clone(),
+            interface: RealInterface::of(&settings.interface)?,
             settings: InterfaceSettings::of(settings),
             traffic: MasterTraffic::of(config, bus),
         })
@@ -92,6 +95,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
+    use crate::config::Interface;
 
     fn arm() -> Config {
         Config::load(Path::new("configs/arm6-erob.toml")).unwrap()

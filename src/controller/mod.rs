@@ -4,6 +4,7 @@ mod arrival;
 pub mod assemble;
 mod buses;
 mod handle;
+mod off_cycle;
 mod outcome;
 mod point_check;
 pub mod port;

@@ -2,14 +2,14 @@
 
 use arrayvec::ArrayVec;
 use takt_rt::Frame;
-use takt_rt::linux::SocketCanPort;
+use takt_rt::linux::{SlcanPort, SocketCanPort};
 use takt_rt::{BusHealth, BusPort, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 use super::buses::socket_options;
-use crate::config::{Config, Interface};
+use crate::config::Config;
 use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
 use crate::link::trace::{Trace, TracedPort, traced};
-use crate::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
+use crate::link::{InterfaceSettings, LinkPort, OpenError, RealInterface, SocketCanOptions, open_interface};
 use crate::sim::SimulatedBus;
 
 /// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
@@ -22,6 +22,8 @@ pub enum Port {
     Simulated(Box<SimulatedBus>),
     /// A CAN interface of this machine.
     SocketCan(Box<SocketCanPort>),
+    /// An SLCAN adapter on a serial line of this machine.
+    Slcan(Box<SlcanPort>),
     /// Any port whose frames are copied to the logger.
     Traced(Box<TracedPort<Port>>),
     /// Any port with injected faults.
@@ -36,7 +38,7 @@ impl Port {
     pub fn open(config: &Config, bus: usize) -> Result<Self, OpenError> {
         let options = socket_options(config, bus);
         match open_configured(config, bus, &options)? {
-            Some(port) => Ok(Self::SocketCan(Box::new(port))),
+            Some(port) => Ok(port.into()),
             None => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
         }
     }
@@ -45,7 +47,7 @@ impl Port {
     pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
         match self {
             Self::Simulated(bus) => Some(bus),
-            Self::SocketCan(_) => None,
+            Self::SocketCan(_) | Self::Slcan(_) => None,
             Self::Traced(port) => port.inner_mut().simulated_mut(),
             Self::Faulty(port) => port.inner_mut().simulated_mut(),
         }
@@ -67,10 +69,19 @@ pub fn open_configured(
     config: &Config,
     bus: usize,
     options: &SocketCanOptions,
-) -> Result<Option<SocketCanPort>, OpenError> {
+) -> Result<Option<LinkPort>, OpenError> {
     let Some(bus) = config.buses.get(bus) else { return Ok(None) };
-    let Interface::SocketCan(interface) = &bus.interface else { return Ok(None) };
-    open_interface(&bus.name, interface, &InterfaceSettings::of(bus), options).map(Some)
+    let Some(interface) = RealInterface::of(&bus.interface) else { return Ok(None) };
+    open_interface(&bus.name, &interface, &InterfaceSettings::of(bus), options).map(Some)
+}
+
+impl From<LinkPort> for Port {
+    fn from(port: LinkPort) -> Self {
+        match port {
+            LinkPort::SocketCan(port) => Self::SocketCan(port),
+            LinkPort::Slcan(port) => Self::Slcan(port),
+        }
+    }
 }
 
 impl From<FaultyPort<Port>> for Port {
@@ -84,6 +95,7 @@ impl BusPort for Port {
         match self {
             Self::Simulated(port) => port.send(now_ns, frames),
             Self::SocketCan(port) => port.send(now_ns, frames),
+            Self::Slcan(port) => port.send(now_ns, frames),
             Self::Traced(port) => port.send(now_ns, frames),
             Self::Faulty(port) => port.send(now_ns, frames),
         }
@@ -97,6 +109,7 @@ impl BusPort for Port {
                 Self::SocketCan(port) => sockets.push(Outgoing { port: port.as_mut(), frames, taken }),
                 Self::Traced(port) => traced.push(Outgoing { port: port.as_mut(), frames, taken }),
                 Self::Simulated(port) => **taken = port.send(now_ns, frames),
+                Self::Slcan(port) => **taken = port.send(now_ns, frames),
                 Self::Faulty(port) => **taken = port.send(now_ns, frames),
             }
         }
@@ -112,6 +125,7 @@ impl BusPort for Port {
         match self {
             Self::Simulated(port) => port.receive(now_ns, batch),
             Self::SocketCan(port) => port.receive(now_ns, batch),
+            Self::Slcan(port) => port.receive(now_ns, batch),
             Self::Traced(port) => port.receive(now_ns, batch),
             Self::Faulty(port) => port.receive(now_ns, batch),
         }
@@ -121,6 +135,7 @@ impl BusPort for Port {
         match self {
             Self::Simulated(port) => port.unconfirmed(now_ns),
             Self::SocketCan(port) => port.unconfirmed(now_ns),
+            Self::Slcan(port) => port.unconfirmed(now_ns),
             Self::Traced(port) => port.unconfirmed(now_ns),
             Self::Faulty(port) => port.unconfirmed(now_ns),
         }
@@ -130,6 +145,7 @@ impl BusPort for Port {
         match self {
             Self::Simulated(port) => port.health(),
             Self::SocketCan(port) => port.health(),
+            Self::Slcan(port) => port.health(),
             Self::Traced(port) => port.health(),
             Self::Faulty(port) => port.health(),
         }
@@ -144,6 +160,10 @@ impl Injectable for Port {
                 port.send(now_ns, &[*frame]);
                 Delivery::ToOthers
             }
+            Self::Slcan(port) => {
+                port.send(now_ns, &[*frame]);
+                Delivery::ToOthers
+            }
             Self::Traced(port) => port.send_foreign(now_ns, frame),
             Self::Faulty(port) => port.send_foreign(now_ns, frame),
         }
@@ -152,7 +172,7 @@ impl Injectable for Port {
     fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
         match self {
             Self::Simulated(port) => port.inject(node, effect, is_present),
-            Self::SocketCan(_) => Err(InjectError::NotSimulated),
+            Self::SocketCan(_) | Self::Slcan(_) => Err(InjectError::NotSimulated),
             Self::Traced(port) => port.inject(node, effect, is_present),
             Self::Faulty(port) => port.inject(node, effect, is_present),
         }

@@ -18,10 +18,12 @@ use takt_rt::{
 use tracing::{info, warn};
 
 use super::arrival::{ARRIVAL_NS, Arrival};
+use super::off_cycle::OffCycleDrives;
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramRunner, ProgramStep};
 use crate::channels::{HostSide, RequestNumbers};
 use crate::config::Config;
+use crate::family;
 use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
 
@@ -72,6 +74,9 @@ pub struct Supervisor {
     stage: Stage,
     stage_since_ns: Option<u64>,
     bring_up: BringUp,
+    off_cycle: OffCycleDrives,
+    /// Whether the drive of an axis tells its position at bring-up.
+    tells_position: Vec<bool>,
     shutdown: Shutdown,
     /// The program of each group.
     programs: Vec<ProgramRunner>,
@@ -101,6 +106,8 @@ impl Supervisor {
             stage: Stage::Configure,
             stage_since_ns: None,
             bring_up: BringUp::new(config),
+            off_cycle: OffCycleDrives::new(config),
+            tells_position: config.axes.iter().map(|axis| family::has_pdos(axis, config)).collect(),
             shutdown: Shutdown::new(config),
             programs: (0..config.groups.len().max(1))
                 .map(|group| {
@@ -172,6 +179,7 @@ impl Supervisor {
     pub fn poll(&mut self, now_ns: u64, host: &mut HostSide) {
         while let Some((bus, received)) = host.take_service() {
             self.bring_up.receive(bus, &received.frame);
+            self.off_cycle.receive(now_ns, bus, &received.frame);
             self.shutdown.receive(bus, &received.frame);
         }
         let snapshot = host.snapshot();
@@ -180,6 +188,9 @@ impl Supervisor {
         self.handle_interrupt(now_ns);
         let since_ns = *self.stage_since_ns.get_or_insert(now_ns);
         self.step(now_ns, now_ns.saturating_sub(since_ns), &snapshot, host);
+        if !matches!(self.stage, Stage::Configure | Stage::Start | Stage::Done) {
+            self.off_cycle.poll(now_ns, &snapshot, host);
+        }
         while let Some(request) = self.outgoing.front() {
             if host.submit(*request).is_err() {
                 break;
@@ -265,10 +276,11 @@ impl Supervisor {
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
                 // Some drives send feedback by process data only after they have received a target.
-                let positions = (0..)
-                    .zip(&facts)
-                    .map(|(axis, facts)| Request::Position { axis, counts: facts.position_counts });
-                positions.for_each(|position| self.request(position));
+                let told = (0..).zip(&facts).zip(&self.tells_position).filter(|(_, tells)| **tells);
+                let positions: Vec<_> = told
+                    .map(|((axis, facts), _)| Request::Position { axis, counts: facts.position_counts })
+                    .collect();
+                positions.into_iter().for_each(|position| self.request(position));
                 // Every node is operational now. Each answers the first SYNC, or is a drive that always answers late.
                 self.request(Request::Sync(true));
                 self.request(Request::Activate);

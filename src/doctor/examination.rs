@@ -8,7 +8,7 @@ use super::self_test::{Grade, SelfTest};
 use super::source::Source;
 use super::subject::Subject;
 use super::threads::threads;
-use super::{can, isolation, kernel, memory, processor, rights};
+use super::{can, isolation, kernel, memory, processor, rights, serial};
 
 /// The result of all checks.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,6 +40,7 @@ pub fn examine(source: &Source, subject: &Subject, attempt: &ThreadReport) -> Ex
     checks.extend(super::threads::findings(&threads, cpu, priority.unwrap_or(1), std::process::id()));
     checks.extend(memory::findings(source));
     checks.extend(can::findings(source, subject, &threads));
+    checks.extend(serial::findings(source));
     let verdict = checks.iter().map(|check| check.verdict).max().unwrap_or(Verdict::NotKnown);
     Examination { verdict, cpu, priority, cycle_ns: subject.period_ns, checks, self_test: None }
 }

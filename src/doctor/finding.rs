@@ -32,6 +32,8 @@ pub enum Group {
     Memory,
     /// A CAN interface.
     Can,
+    /// A serial adapter.
+    Serial,
 }
 
 /// A check: the parts that do not depend on its result.
@@ -56,7 +58,7 @@ pub struct Finding {
     pub check: &'static str,
     /// Its subject.
     pub group: Group,
-    /// The CAN interface, if it is a check of one.
+    /// The CAN interface or the serial adapter, if it is a check of one.
     pub interface: Option<String>,
     /// Its title.
     pub title: &'static str,

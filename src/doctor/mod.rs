@@ -5,9 +5,9 @@
 //! runs the loop.
 //!
 //! ```text
-//! Source ──▶ kernel, isolation, processor, memory, rights, threads, can ──▶ Finding ─┐
-//! attempt ─▶ rights                                                                  ├─▶ Examination ─▶ JSON, text
-//! jitter ──▶ SelfTest ───────────────────────────────────────────────────────────────┘
+//! Source ──▶ kernel, isolation, processor, memory, rights, threads, can, serial ──▶ Finding ─┐
+//! attempt ─▶ rights                                                                          ├─▶ Examination ─▶ JSON, text
+//! jitter ──▶ SelfTest ───────────────────────────────────────────────────────────────────────┘
 //! ```
 
 mod attempt;
@@ -24,6 +24,7 @@ mod processor;
 mod render;
 mod rights;
 mod self_test;
+mod serial;
 mod source;
 mod subject;
 mod threads;

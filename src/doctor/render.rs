@@ -67,6 +67,7 @@ fn section_of(check: &Finding) -> String {
         (None, Group::Isolation) => "a CPU for the loop alone".to_owned(),
         (None, Group::Memory) => "memory".to_owned(),
         (None, Group::Can) => "CAN".to_owned(),
+        (None, Group::Serial) => "serial adapters".to_owned(),
     }
 }
 

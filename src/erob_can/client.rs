@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use takt_rt::{Frame, Nanoseconds};
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::entries;
 use super::error_code::ErrorCode;
@@ -45,6 +45,16 @@ pub enum RequestFailure {
     WrongReply(Reply),
 }
 
+impl RequestError {
+    /// What the manual advises.
+    pub const fn cure(&self) -> Option<&'static str> {
+        match self.failure {
+            RequestFailure::Refused(Some(code)) => code.cure(),
+            RequestFailure::NoReply | RequestFailure::Refused(None) | RequestFailure::WrongReply(_) => None,
+        }
+    }
+}
+
 impl std::error::Error for RequestError {}
 
 impl fmt::Display for RequestError {
@@ -52,7 +62,11 @@ impl fmt::Display for RequestError {
         let name = entries::describe(self.request.address());
         match self.request {
             Request::Read(_) => write!(f, "reading {name}: ")?,
-            Request::Write(_, value) => write!(f, "writing {value} to {name}: ")?,
+            Request::Write(address, value) => {
+                let shown =
+                    entries::find(address).map_or_else(|| value.to_string(), |entry| entry.show(value));
+                write!(f, "writing {shown} to {name}: ")?;
+            }
             Request::Command(_) => write!(f, "command {name}: ")?,
         }
         match self.failure {
@@ -92,7 +106,10 @@ enum State {
         retries: u8,
         at_ns: Nanoseconds,
     },
-    Over(Result<Answer, RequestError>),
+    Over {
+        request: Request,
+        outcome: Result<Answer, RequestError>,
+    },
 }
 
 /// The client of one node.
@@ -105,12 +122,43 @@ pub struct RequestClient {
     /// No request is sent before this time.
     free_ns: Nanoseconds,
     unusable: u32,
+    probe: Probe,
+}
+
+/// A question to the node in another protocol.
+#[derive(Clone, Copy, Debug)]
+enum Probe {
+    None,
+    /// It is to be sent; the answer has this identifier.
+    Due {
+        question: Frame,
+        answer: Id,
+    },
+    Sent {
+        answer: Id,
+    },
+    Answered,
 }
 
 impl RequestClient {
     /// The client for a node ID (1 to 64).
     pub const fn new(node: u8, timing: RequestTiming) -> Self {
-        Self { node, timing, state: State::Idle, free_ns: 0, unusable: 0 }
+        Self { node, timing, state: State::Idle, free_ns: 0, unusable: 0, probe: Probe::None }
+    }
+
+    /// Turns to another node, and asks it so often and with such patience. The request that is under way is forgotten.
+    pub fn turn_to(&mut self, node: u8, timing: RequestTiming) {
+        *self = Self { free_ns: self.free_ns, ..Self::new(node, timing) };
+    }
+
+    /// Asks the node in another protocol: it is sent this frame, and answers under this identifier.
+    pub const fn probe(&mut self, question: Frame, answer: Id) {
+        self.probe = Probe::Due { question, answer };
+    }
+
+    /// Whether the last probe has an answer.
+    pub const fn has_probe_answer(&self) -> bool {
+        matches!(self.probe, Probe::Answered)
     }
 
     /// The node ID.
@@ -136,16 +184,12 @@ impl RequestClient {
         Ok(())
     }
 
-    /// Forgets a request that was given up. A reply to it that still comes is not taken for that of the next one.
-    pub fn reset(&mut self, now_ns: Nanoseconds) {
-        if matches!(self.state, State::Sent { .. }) {
-            self.free_ns = now_ns.saturating_add(self.timing.silence_ns);
-        }
-        self.state = State::Idle;
-    }
-
     /// The frame that is to be sent now, if there is one.
     pub fn poll(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
+        if let Probe::Due { question, answer } = self.probe {
+            self.probe = Probe::Sent { answer };
+            return Some(question);
+        }
         if let State::Sent { request, retries, at_ns } = self.state
             && now_ns >= at_ns.saturating_add(self.timing.timeout_ns)
         {
@@ -165,26 +209,44 @@ impl RequestClient {
         self.free_ns = from_ns;
         self.state = match retries.checked_sub(1) {
             Some(retries) => State::Due { request, retries, from_ns },
-            None => State::Over(Err(RequestError { request, failure: RequestFailure::NoReply })),
+            None => {
+                let outcome = Err(RequestError { request, failure: RequestFailure::NoReply });
+                State::Over { request, outcome }
+            }
         };
     }
 
     /// Takes a received frame. What is no reply of this node is ignored; what cannot be used is counted.
     pub fn receive(&mut self, frame: &Frame) {
+        if matches!(self.probe, Probe::Sent { answer } if answer == frame.id()) {
+            self.probe = Probe::Answered;
+        }
         if replying_node(frame) != Some(self.node) {
             return;
         }
         match (self.state, Reply::decode(frame.payload())) {
-            (State::Sent { request, .. }, Some(reply)) => self.state = State::Over(answer(request, reply)),
+            (State::Sent { request, .. }, Some(reply)) => {
+                self.state = State::Over { request, outcome: answer(request, reply) };
+            }
             _ => self.unusable = self.unusable.saturating_add(1),
         }
     }
 
     /// Removes and returns the outcome of the request, once it is there.
     pub fn take_outcome(&mut self) -> Option<Result<Answer, RequestError>> {
-        let State::Over(outcome) = self.state else { return None };
+        self.take_answered().map(|(_, outcome)| outcome)
+    }
+
+    /// As [`RequestClient::take_outcome`], with the request.
+    pub fn take_answered(&mut self) -> Option<(Request, Result<Answer, RequestError>)> {
+        let State::Over { request, outcome } = self.state else { return None };
         self.state = State::Idle;
-        Some(outcome)
+        Some((request, outcome))
+    }
+
+    /// Whether a request may begin.
+    pub const fn is_free(&self) -> bool {
+        matches!(self.state, State::Idle)
     }
 }
 
@@ -272,15 +334,16 @@ mod tests {
     }
 
     #[test]
-    fn a_refusal_names_the_entry_the_code_and_the_cure() {
+    fn a_refusal_names_the_entry_and_the_code_and_has_the_cure() {
         let error = RequestError {
             request: Request::Write(EntryAddress::new(0x0204), 10_000),
             failure: RequestFailure::Refused(Some(ErrorCode::ENABLED)),
         };
         assert_eq!(
             error.to_string(),
-            "writing 10000 to torque-mode velocity limit (0x0204): error 0x0016, not allowed while the motor is enabled \
-             (disable the motor first)"
+            "writing 10000 count/s to torque-mode velocity limit (0x0204): error 0x0016, not allowed while the motor is \
+             enabled"
         );
+        assert_eq!(error.cure(), Some("disable the motor first"));
     }
 }

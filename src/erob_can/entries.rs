@@ -54,8 +54,12 @@ impl EntryAccess {
 pub enum Unit {
     /// None: a plain number.
     None,
-    /// Counts at the output: 524288 are a turn.
+    /// A position in counts at the output: 524288 are a turn.
     Counts,
+    /// A distance in counts at the output.
+    DistanceCounts,
+    /// Counts of one of the two encoders.
+    EncoderCounts,
     /// Counts per second.
     CountsPerSecond,
     /// Counts per second squared.
@@ -81,7 +85,7 @@ impl Unit {
     pub const fn symbol(self) -> &'static str {
         match self {
             Self::None => "",
-            Self::Counts => "count",
+            Self::Counts | Self::DistanceCounts | Self::EncoderCounts => "count",
             Self::CountsPerSecond => "count/s",
             Self::CountsPerSecondSquared => "count/s²",
             Self::Milliamperes => "mA",
@@ -120,10 +124,18 @@ impl std::error::Error for ValueError {}
 impl fmt::Display for ValueError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} cannot be {}: it takes ", self.entry, self.value)?;
-        match self.entry.values {
-            Values::Any => write!(f, "any number"),
-            Values::Range(lowest, highest) => write!(f, "{lowest} to {highest}"),
-            Values::Named(names) => {
+        self.entry.values.fmt(f)
+    }
+}
+
+impl fmt::Display for Values {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Any => write!(f, "any number"),
+            Self::Range(lowest, i32::MAX) => write!(f, "{lowest} and more"),
+            Self::Range(lowest, highest) if lowest == highest => write!(f, "{lowest}"),
+            Self::Range(lowest, highest) => write!(f, "{lowest} to {highest}"),
+            Self::Named(names) => {
                 for (place, (value, name)) in names.iter().enumerate() {
                     write!(f, "{}{value} ({name})", if place > 0 { ", " } else { "" })?;
                 }
@@ -147,14 +159,16 @@ impl Entry {
         if is_taken { Ok(()) } else { Err(ValueError { entry: *self, value }) }
     }
 
+    /// What a value means, where the entry has words for its values.
+    pub fn meaning(&self, value: i32) -> Option<&'static str> {
+        let Values::Named(names) = self.values else { return None };
+        names.iter().find(|(known, _)| *known == value).map(|(_, meaning)| *meaning)
+    }
+
     /// A value in words: with its unit, or its meaning.
     pub fn show(&self, value: i32) -> String {
-        let meaning = match self.values {
-            Values::Named(names) => names.iter().find(|(known, _)| *known == value),
-            Values::Any | Values::Range(..) => None,
-        };
-        match (meaning, self.unit.symbol()) {
-            (Some((_, meaning)), _) => format!("{value} ({meaning})"),
+        match (self.meaning(value), self.unit.symbol()) {
+            (Some(meaning), _) => format!("{value} ({meaning})"),
             (None, "") => value.to_string(),
             (None, unit) => format!("{value} {unit}"),
         }
@@ -283,7 +297,7 @@ pub const POSITION_LIMIT_MINIMUM: Entry = set(0x0052, "position limit minimum", 
 /// Position limit maximum.
 pub const POSITION_LIMIT_MAXIMUM: Entry = set(0x0053, "position limit maximum", Unit::Counts);
 /// Maximum position error.
-pub const MAXIMUM_POSITION_ERROR: Entry = set(0x0054, "maximum position error", Unit::Counts)
+pub const MAXIMUM_POSITION_ERROR: Entry = set(0x0054, "maximum position error", Unit::DistanceCounts)
     .values(NOT_NEGATIVE)
     .note("a fault beyond it; from the factory 5242 to 10484, of the eRob142 1800 to 4320");
 /// Maximum velocity error.
@@ -328,8 +342,8 @@ pub const STOP_MOTION: Entry = command(0x0084, "stop motion").note("with the pro
 pub const TARGET_POSITION: Entry =
     set(0x0086, "absolute target position", Unit::Counts).note("the relative position must be 0");
 /// Relative position.
-pub const RELATIVE_POSITION: Entry =
-    set(0x0087, "relative position", Unit::Counts).note("0 for an absolute move; the sign is the direction");
+pub const RELATIVE_POSITION: Entry = set(0x0087, "relative position", Unit::DistanceCounts)
+    .note("0 for an absolute move; the sign is the direction");
 /// Profile acceleration.
 pub const PROFILE_ACCELERATION: Entry = set(0x0088, "profile acceleration", Unit::CountsPerSecondSquared)
     .values(NOT_NEGATIVE)
@@ -369,13 +383,13 @@ pub const DWELL_TIME: Entry = set(0x0093, "dwell time", Unit::Milliseconds)
     .note("at each reversal of reciprocating motion");
 /// Motor angle.
 pub const MOTOR_ANGLE: Entry =
-    read(0x009C, "motor angle", Unit::Counts).note("of the encoder on the motor's side");
+    read(0x009C, "motor angle", Unit::EncoderCounts).note("of the encoder on the motor's side");
 /// Apply acceleration limits to all motion.
 pub const LIMITS_APPLY: Entry =
     set(0x009E, "apply acceleration limits to all motion", Unit::None).values(YES_NO);
 /// Load angle.
 pub const LOAD_ANGLE: Entry =
-    read(0x009F, "load angle", Unit::Counts).note("of the single-turn encoder on the load's side");
+    read(0x009F, "load angle", Unit::EncoderCounts).note("of the single-turn encoder on the load's side");
 /// Save parameters.
 pub const SAVE: Entry = command(0x00E8, "save parameters").note("leave the power on for 3 s");
 /// Three-phase current sum error.
@@ -392,7 +406,7 @@ pub const MOTOR_ENABLE: Entry = command(0x0100, "motor enable")
     .values(Values::Named(&[(0, "disable"), (1, "enable")]));
 /// Positioning-complete threshold.
 pub const POSITIONED_THRESHOLD: Entry =
-    set(0x0109, "positioning-complete threshold", Unit::Counts).values(NOT_NEGATIVE);
+    set(0x0109, "positioning-complete threshold", Unit::DistanceCounts).values(NOT_NEGATIVE);
 /// Positioning-complete time.
 pub const POSITIONED_TIME: Entry =
     set(0x010A, "positioning-complete time", Unit::Milliseconds).values(NOT_NEGATIVE);
@@ -418,7 +432,7 @@ pub const RESET_LOAD_ENCODER: Entry = command(0x0114, "reset load-side encoder")
         "WIPES THE MULTI-TURN COUNT: home the joint again; only after a battery alarm of a multi-turn model",
     );
 /// Encoder difference.
-pub const ENCODER_DIFFERENCE: Entry = read(0x0119, "encoder difference", Unit::Counts)
+pub const ENCODER_DIFFERENCE: Entry = read(0x0119, "encoder difference", Unit::EncoderCounts)
     .note("between the two encoders, a measure of the torque; in no table of the manual, read by a program of the vendor");
 /// Allow loop changes over the bus.
 pub const LOOP_CHANGES: Entry = set(0x0124, "allow loop changes over the bus", Unit::None).values(YES_NO);

@@ -84,7 +84,6 @@ impl ErrorCode {
 impl fmt::Display for ErrorCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "error 0x{:04X}", self.0)?;
-        self.words().map_or(Ok(()), |words| write!(f, ", {words}"))?;
-        self.cure().map_or(Ok(()), |cure| write!(f, " ({cure})"))
+        self.words().map_or(Ok(()), |words| write!(f, ", {words}"))
     }
 }

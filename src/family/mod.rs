@@ -4,14 +4,22 @@
 //! its errors, and the drive that simulates it. Nothing outside its folder and `sim/` says its name. [`register`] adds a family
 //! of your own, so that configurations may name it.
 
+mod adapter_warning;
+pub(crate) mod bit_fields;
 pub mod bring_up;
 pub mod cia402;
 pub mod commission;
 mod data_sheet;
-#[cfg_attr(not(feature = "internals"), allow(dead_code, unnameable_types, reason = "no family uses it yet"))]
 pub(crate) mod erob_can;
 pub(crate) mod erob_canopen;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
+)]
+pub(crate) mod erob_modbus;
 mod error_words;
+pub(crate) mod hollow;
+mod off_cycle;
 mod registry;
 mod simulated_bus;
 mod warning;
@@ -19,17 +27,21 @@ pub(crate) mod yz_aim;
 
 use std::pin::Pin;
 
-use takt_rt::{Frame, Id, MappedObject};
+use takt_rt::{FieldDriveParameters, Frame, Id, MappedObject};
 
-pub use crate::procedure::{AxisReading, CanopenClient, CanopenSession, ProcedureSession, SdoQuirks};
+pub use crate::procedure::{
+    AxisReading, CanopenClient, CanopenSession, Client, Procedure, ProcedureEvent, ProcedureSession,
+    SdoQuirks,
+};
 pub use data_sheet::DataSheet;
 pub(crate) use error_words::{drive_error_words, own_error_words, own_errors};
 pub use error_words::{error_cure, error_words};
+pub use off_cycle::{OffCycleBudget, OffCycleDrive, OffCycleTarget, OffCycleWish};
 pub use registry::{NameTaken, all, register};
 pub(crate) use registry::{named, of};
 pub(crate) use simulated_bus::simulated_drives;
 pub(crate) use warning::is_rounded;
-pub use warning::{Warning, WarningKind};
+pub use warning::{Warning, WarningKind, WarningSubject};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
@@ -37,17 +49,15 @@ use crate::canopen::objects::PdoDirection;
 use crate::canopen::sdo::SdoTiming;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
+pub use crate::family::commission::NamedEntry;
 use crate::family::commission::dictionary::ObjectEntry;
-use crate::family::commission::{Failure, Report, SdoSession, TargetDrive, Task};
-use crate::sim::Drive;
+use crate::family::commission::{DriveTask, Failure, TargetDrive, Task};
+use crate::sim::{DevicesOnLine, Drive};
 
 /// ZeroErr eRob with CANopen firmware.
 pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACTS);
 /// YZ-AIM integrated servo, CANopen edition.
 pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
-
-/// A task of commissioning that is under way.
-pub type CarryingOut<'a> = Pin<Box<dyn Future<Output = Result<Report, Failure>> + 'a>>;
 
 /// A part of bring-up or shutdown that is under way.
 pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + 'a>>;
@@ -62,6 +72,22 @@ pub trait Family: ConfiguredFamily {
     fn process_data(&self, axis: &Axis) -> ProcessData {
         let written = ProcessData::mapped_freely(axis);
         if axis.mapping == PdoMapping::AsStored { written.padded() } else { written }
+    }
+
+    /// How the drive of an axis is spoken to in each cycle where it has no PDOs, but frames of bit fields. Its values are in SI units at the
+    /// joint.
+    fn field_drive(&self, _axis: &Axis) -> Option<FieldDriveParameters> {
+        None
+    }
+
+    /// Who speaks to the drive of an axis where it answers too slowly for the cycle; `None` where it is spoken to in the cycle.
+    fn off_cycle(&self, _axis: &Axis, _config: &Config) -> Option<Box<dyn OffCycleDrive>> {
+        None
+    }
+
+    /// What [`off_cycle`](Self::off_cycle) asks of the bus of an axis.
+    fn off_cycle_budget(&self, _axis: &Axis, _config: &Config) -> Option<OffCycleBudget> {
+        None
     }
 
     /// The identifier that a PDO (counted from 1) of the drive of an axis has by its data sheet, where that gives one. It is asked for the
@@ -135,6 +161,11 @@ pub trait Family: ConfiguredFamily {
         &[]
     }
 
+    /// What commissioning knows by name in a drive.
+    fn entries(&self, drive: &DriveFamily) -> Vec<NamedEntry> {
+        commission::dictionary::entries(drive)
+    }
+
     /// The meaning of an object's value in words, if it has one beyond its number.
     fn meaning(&self, _drive: &DriveFamily, _object: &Object, _value: i64) -> Option<String> {
         None
@@ -145,13 +176,30 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
-    /// Carries out a task of commissioning, other than reading and writing objects, which are the same for every family.
-    fn carry_out<'a>(
-        &'a self,
-        session: &'a SdoSession,
-        target: &'a TargetDrive,
-        task: Task,
-    ) -> CarryingOut<'a>;
+    /// A task of commissioning with a drive, in the protocol that the drive speaks. For drives with an object dictionary,
+    /// [`over_sdo`](commission::over_sdo) makes it.
+    ///
+    /// # Errors
+    /// The task cannot be done with such a drive, or a name or a value in it is wrong. Nothing has been sent then.
+    fn commission(&self, target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failure>;
+
+    /// A task with a drive on a serial line of this bit rate; `None` where the drives of the family are on a CAN bus.
+    fn commission_on_line(
+        &self,
+        _target: TargetDrive,
+        _task: Task,
+        _bit_rate: u32,
+    ) -> Option<Result<DriveTask<Vec<u8>>, Failure>> {
+        None
+    }
+
+    /// Drives with these addresses on a simulated serial line; `None` where the drives of the family are on a CAN bus.
+    ///
+    /// # Errors
+    /// An address is none, or not one of its own: a sentence for people.
+    fn simulated_line(&self, _addresses: &[u8]) -> Option<Result<Box<dyn DevicesOnLine>, String>> {
+        None
+    }
 
     /// The drive that stands in for an axis on a simulated bus, and for the other axes of its node, where the drive has several.
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive>;
@@ -167,6 +215,12 @@ pub enum MappingMatch {
     ByNumber,
 }
 
+/// Whether the drive of an axis has PDOs.
+pub(crate) fn has_pdos(axis: &Axis, config: &Config) -> bool {
+    let family = of(&axis.drive);
+    family.field_drive(axis).is_none() && family.off_cycle(axis, config).is_none()
+}
+
 /// A protocol of the vendor that a drive may speak instead of CANopen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OtherProtocol {
@@ -176,6 +230,8 @@ pub struct OtherProtocol {
     pub request: Frame,
     /// The identifier of the reply.
     pub answer: Id,
+    /// What to do with a drive that answers it.
+    pub cure: &'static str,
 }
 
 /// The quirks of the SDO server of a drive, with this timing; the drive gets at least the time to answer that its data sheet
@@ -188,12 +244,11 @@ pub(crate) fn sdo_quirks(drive: &DriveFamily, mut timing: SdoTiming) -> SdoQuirk
     SdoQuirks { timing, ..family.sdo_quirks() }
 }
 
-/// Every identifier between a drive and its master: those that CANopen gives to its node (CiA 301, 7.3.3), and those of
-/// the vendor's own protocol.
+/// Every identifier between a drive and its master: those of its frames, and those of another protocol that it may speak.
 pub(crate) fn identifiers(family: &DriveFamily, node: u8) -> Vec<Id> {
-    let canopen = (1..=0xE).map(|function| Id::canopen(function << 7, node));
+    let own = family.frame_identifiers(node).into_iter().map(|(id, _)| id);
     let other = of(family).other_protocol(node);
-    canopen.chain(other.into_iter().flat_map(|other| [other.request.id(), other.answer])).collect()
+    own.chain(other.into_iter().flat_map(|other| [other.request.id(), other.answer])).collect()
 }
 
 #[cfg(test)]

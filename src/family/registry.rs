@@ -2,11 +2,20 @@
 
 use std::sync::{PoisonError, RwLock};
 
-use super::{Family, cia402, erob_canopen, yz_aim};
+use super::{Family, bit_fields, cia402, erob_can, erob_canopen, erob_modbus, hollow, yz_aim};
 use crate::config::DriveFamily;
 
 /// The families that come with takt.
-static SHIPPED: [&dyn Family; 3] = [&erob_canopen::ErobCanopen, &yz_aim::YzAim, &cia402::Cia402];
+static SHIPPED: [&dyn Family; 8] = [
+    &erob_canopen::ErobCanopen,
+    &yz_aim::YzAim,
+    &cia402::Cia402,
+    &erob_can::ErobCan,
+    &erob_modbus::ErobModbus,
+    &hollow::CAN,
+    &hollow::CAN_FD,
+    &bit_fields::FROM_FILE,
+];
 /// Those of the program that embeds takt.
 static REGISTERED: RwLock<Vec<&dyn Family>> = RwLock::new(vec![]);
 

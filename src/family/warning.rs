@@ -5,26 +5,45 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use crate::canopen::object::ObjectAddress;
+use crate::config::bit_fields::FieldDevice;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Short;
-use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Travel};
-use crate::family::{bring_up, registry};
+use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Quantity, Travel};
+use crate::family::{adapter_warning, bring_up, registry};
 
 /// A rotary axis that goes round more often than this is unusual.
 const USUAL_TURNS: f64 = 2.0;
 /// A drive that rounds a velocity by less than this share runs as commanded.
 const ROUNDING: f64 = 0.01;
 
-/// A value that is possible, and implausible for its drive or joint.
+/// A value that is possible, and implausible or of consequence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Warning {
-    /// The name of the axis.
-    pub axis: String,
-    /// What is implausible.
+    /// What it is about.
+    pub subject: WarningSubject,
+    /// What is implausible or of consequence.
     pub kind: WarningKind,
 }
 
-/// What is implausible.
+/// What a warning is about, by its name.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum WarningSubject {
+    /// An axis.
+    Axis(String),
+    /// A bus.
+    Bus(String),
+}
+
+impl fmt::Display for WarningSubject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Axis(name) => write!(f, "axis `{name}`"),
+            Self::Bus(name) => write!(f, "bus `{name}`"),
+        }
+    }
+}
+
+/// What is implausible or of consequence.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum WarningKind {
@@ -56,11 +75,20 @@ pub enum WarningKind {
         /// The limit.
         velocity: f64,
     },
+    /// A drive that is spoken to outside of the cycle reports too seldom for the cycle of its bus.
+    SlowReports {
+        /// From one report to the next, at the longest.
+        report_ns: u64,
+        /// For so long feedback may be missing.
+        allowed_ns: u64,
+    },
     /// A value of the configuration file that bring-up overwrites, because the controller needs another one.
     Overwritten {
         /// The object.
         object: ObjectAddress,
     },
+    /// The drive goes on with its last command when no more come.
+    NoWatchdog,
     /// A velocity of a program that the drive cannot have exactly.
     RoundedVelocity {
         /// What is commanded, with its unit.
@@ -68,11 +96,29 @@ pub enum WarningKind {
         /// What the drive gets, with its unit.
         rounded: String,
     },
+    /// The bus is behind an SLCAN adapter.
+    Adapter {
+        /// The interface.
+        interface: String,
+    },
+    /// The serial line to an adapter does not carry the frames of a cycle.
+    SlowLine {
+        /// The device.
+        device: String,
+        /// Baud of the line.
+        baud_rate: u32,
+        /// How long the frames of a cycle are on it.
+        line_ns: u64,
+        /// The period of the cycle.
+        period_ns: u64,
+        /// The baud rate that would be enough.
+        needed: u64,
+    },
 }
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "axis `{}`: {}", self.axis, self.kind)
+        write!(f, "{}: {}", self.subject, self.kind)
     }
 }
 
@@ -120,9 +166,38 @@ impl fmt::Display for WarningKind {
                 f,
                 "bring-up overwrites the value that `dcf` has for {object}, because the controller needs another one"
             ),
+            Self::NoWatchdog => f.write_str(
+                "its drive has no watchdog: if this program or its computer dies, the motor goes on with its last command, in velocity and \
+                 torque mode for ever; have its supply cut by a relay that opens when the controller's output or heartbeat stops",
+            ),
+            Self::SlowReports { report_ns, allowed_ns } => {
+                let show = |ns: u64| Quantity::DURATION.show(ns as f64 / 1e9);
+                write!(
+                    f,
+                    "its drive is spoken to beside the cycle, and reports every {} at the longest; after {} without a report \
+                     the group stops, so that one lost frame may be enough: give it a bus with a longer `period` (10 ms), or \
+                     more `missed_feedback_cycles`",
+                    show(*report_ns),
+                    show(*allowed_ns)
+                )
+            }
             Self::RoundedVelocity { commanded, rounded } => write!(
                 f,
                 "its drive takes whole numbers of r/min only: the program's velocity of {commanded} becomes {rounded}"
+            ),
+            Self::Adapter { interface } => write!(
+                f,
+                "its adapter is on USB, and USB is not hard real time: SYNC and set-points may be late by milliseconds, and \
+                 no frame is confirmed by the bus. `takt jitter --bus {interface}` shows what your machine does; a CAN \
+                 interface of Linux has neither weakness"
+            ),
+            Self::SlowLine { device, baud_rate, line_ns, period_ns, needed } => write!(
+                f,
+                "the frames of a cycle are {} on a serial line of {baud_rate} baud, and a cycle has {}. A chip for a \
+                 serial line needs {needed} baud or more: interface = \"slcan:{device}@{}\"; or choose a longer period",
+                Quantity::DURATION.show(*line_ns as f64 / 1e9),
+                Quantity::DURATION.show(*period_ns as f64 / 1e9),
+                needed.next_multiple_of(1_000_000)
             ),
         }
     }
@@ -135,9 +210,16 @@ impl Config {
         for (index, axis) in self.axes.iter().enumerate() {
             let mut kinds = of_axis(axis);
             kinds.extend(self.rounded_velocities(index, axis));
+            kinds.extend(self.slow_reports(axis));
             let overwritten = bring_up::overwritten(self, axis);
             kinds.extend(overwritten.into_iter().map(|object| WarningKind::Overwritten { object }));
-            warnings.extend(kinds.into_iter().map(|kind| Warning { axis: axis.name.clone(), kind }));
+            let subject = WarningSubject::Axis(axis.name.clone());
+            warnings.extend(kinds.into_iter().map(|kind| Warning { subject: subject.clone(), kind }));
+        }
+        for (index, bus) in self.buses.iter().enumerate() {
+            let subject = WarningSubject::Bus(bus.name.clone());
+            let kinds = adapter_warning::of_bus(self, index).into_iter();
+            warnings.extend(kinds.map(|kind| Warning { subject: subject.clone(), kind }));
         }
         warnings
     }
@@ -146,10 +228,27 @@ impl Config {
     /// them.
     pub fn losses(&self) -> Vec<String> {
         let of_axis = |axis: &Axis| {
-            let losses = registry::of(&axis.drive).remarks(axis).into_iter();
+            let family = registry::of(&axis.drive);
+            let beside_the_cycle = family.off_cycle_budget(axis, self).map(|budget| {
+                format!(
+                    "it is spoken to beside the cycle: at most {} requests in a second, {} of its bus; a report every {} at the \
+                     longest",
+                    budget.requests_per_s.round(),
+                    Quantity::FRACTION.show(budget.bus_share),
+                    Quantity::DURATION.show(budget.report_ns as f64 / 1e9)
+                )
+            });
+            let losses = family.remarks(axis).into_iter().map(str::to_owned).chain(beside_the_cycle);
             losses.map(|loss| format!("axis `{}`: {loss}", axis.name)).collect::<Vec<_>>()
         };
         self.axes.iter().flat_map(of_axis).collect()
+    }
+
+    /// A lost frame costs a drive that is spoken to beside the cycle about as much time as a report.
+    fn slow_reports(&self, axis: &Axis) -> Option<WarningKind> {
+        let report_ns = registry::of(&axis.drive).off_cycle_budget(axis, self)?.report_ns;
+        let allowed_ns = self.bus_cycle(axis.bus).period_ns * u64::from(axis.missed_feedback_cycles);
+        (allowed_ns < 2 * report_ns).then_some(WarningKind::SlowReports { report_ns, allowed_ns })
     }
 
     /// The velocities of the program that the drive of an axis cannot have, each once.
@@ -189,6 +288,9 @@ pub(crate) fn is_rounded(commanded: f64, rounded: f64) -> bool {
 fn of_axis(axis: &Axis) -> Vec<WarningKind> {
     let Axis { drive, limits, gear_ratio, travel, .. } = axis;
     let mut kinds = vec![];
+    if drive.description::<FieldDevice>().is_some_and(|device| !device.description.has_watchdog) {
+        kinds.push(WarningKind::NoWatchdog);
+    }
     let turns_per_s = limits.velocity * Counting::of(axis).turns_per_unit();
     let Plausible { fastest_turns_per_s: fastest, usual_velocity, inner_gear_from } = drive.plausible;
     if turns_per_s > fastest {

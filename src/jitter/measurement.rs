@@ -198,7 +198,11 @@ fn config(options: &JitterOptions) -> Result<Config, ConfigError> {
     let mut config = Config::parse("takt jitter", &text)?;
     if let (Some(bus), Some(interface)) = (config.buses.first_mut(), &options.interface) {
         bus.interface = interface.clone();
-        bus.name = interface.to_string();
+        // The path of an adapter is no name.
+        bus.name = match interface {
+            Interface::Slcan(_) => "slcan".to_owned(),
+            interface => interface.to_string(),
+        };
         // SYNC is the same at any bit rate: a bus that is up is taken as it is.
         if let Ok(status) = interface_status(&bus.name)
             && let Some(timing) = status.timing.filter(|_| status.is_up)
@@ -226,6 +230,14 @@ mod tests {
         assert_eq!((config.cycle.period_ns, &config.buses[0].interface), (2_000_000, &interface));
         assert_eq!(config.master.heartbeat_ns, None);
         assert_eq!(assemble::engine(&config).unwrap().bus_count(), 1);
+    }
+
+    #[test]
+    fn the_passive_machine_runs_behind_an_adapter_too() {
+        let interface: Interface = "slcan:/dev/ttyACM0".parse().unwrap();
+        let options = JitterOptions { interface: Some(interface.clone()), ..JitterOptions::default() };
+        let config = config(&options).unwrap();
+        assert_eq!((config.validate().is_ok(), &config.buses[0].interface), (true, &interface));
     }
 
     #[test]

@@ -1,8 +1,25 @@
 //! The buses: what they are connected to, and who commands them.
 
 pub(crate) mod interface;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
+)]
+pub(crate) mod modbus_line;
 mod open;
 pub(crate) mod ownership;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unnameable_types, reason = "it becomes the port of a controller")
+)]
+mod port;
+pub(crate) mod real_interface;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
+)]
+pub(crate) mod serial_line;
+mod slcan;
 pub(crate) mod socketcan;
 pub(crate) mod trace;
 
@@ -15,6 +32,10 @@ pub(crate) use open::open_interface;
 pub use ownership::{
     ClaimError, HeardMaster, IfOwned, LockError, MasterActivity, Process, ReleaseError, Role, TakeOverError,
 };
+pub(crate) use port::LinkPort;
+pub(crate) use real_interface::RealInterface;
+pub use serial_line::SerialLineError;
+pub use slcan::SlcanError;
 pub use socketcan::SocketCanError;
-pub(crate) use socketcan::{SocketCanOptions, open_socketcan};
+pub(crate) use socketcan::SocketCanOptions;
 pub use trace::{Trace, TracedFrame, TracedHealth, TracedPort};

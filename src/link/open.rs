@@ -1,9 +1,10 @@
-//! Opens an interface for a bus: brings it up as far as that is permitted, and opens a socket on it.
+//! Opens an interface for a bus: brings it up as far as that is permitted, and opens a port on it.
 
-use takt_rt::linux::SocketCanPort;
-
-use super::interface::{InterfaceError, InterfaceSettings, prepare_interface};
-use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
+use super::interface::{InterfaceError, InterfaceSettings};
+use super::port::LinkPort;
+use super::real_interface::RealInterface;
+use super::slcan::SlcanError;
+use super::socketcan::{SocketCanError, SocketCanOptions};
 
 /// A bus that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -27,34 +28,27 @@ pub enum OpenError {
         #[source]
         error: SocketCanError,
     },
+    /// The adapter on the serial line cannot be used.
+    #[error("bus `{bus}`: {error}")]
+    Slcan {
+        /// The name of the bus.
+        bus: String,
+        /// The reason.
+        #[source]
+        error: SlcanError,
+    },
 }
 
-/// Prepares an interface and opens a socket on it, for the bus of this name.
+/// Prepares an interface and opens a port on it, for the bus of this name.
 ///
 /// # Errors
 /// See [`OpenError`].
 pub fn open_interface(
     bus: &str,
-    interface: &str,
+    interface: &RealInterface,
     settings: &InterfaceSettings,
     options: &SocketCanOptions,
-) -> Result<SocketCanPort, OpenError> {
-    prepare(bus, interface, settings)?;
-    open_socket(bus, interface, options)
-}
-
-/// Brings an interface up with these settings, or checks that it has them.
-pub(super) fn prepare(bus: &str, interface: &str, settings: &InterfaceSettings) -> Result<(), OpenError> {
-    match prepare_interface(interface, settings) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(OpenError::Interface { bus: bus.to_owned(), error }),
-    }
-}
-
-pub(super) fn open_socket(
-    bus: &str,
-    interface: &str,
-    options: &SocketCanOptions,
-) -> Result<SocketCanPort, OpenError> {
-    open_socketcan(interface, options).map_err(|error| OpenError::Socket { bus: bus.to_owned(), error })
+) -> Result<LinkPort, OpenError> {
+    interface.prepare(bus, settings)?;
+    interface.open_prepared(bus, settings, options)
 }

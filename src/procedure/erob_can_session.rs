@@ -1,12 +1,12 @@
 //! What the code of a procedure does with a drive that speaks eRob's own CAN protocol: reads, writes and commands.
 
-use takt_rt::{Frame, Nanoseconds};
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::client::Client;
 use super::session::ProcedureSession;
-use crate::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure};
+use crate::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure, RequestTiming};
 use crate::erob_can::entries::Entry;
-use crate::erob_can::frame::{Reply, Request};
+use crate::erob_can::frame::{EntryAddress, Reply, Request};
 
 impl Client for RequestClient {
     type Message = Frame;
@@ -34,7 +34,15 @@ impl ErobCanSession {
     /// # Errors
     /// The drive refuses, or does not reply.
     pub async fn read(&self, entry: &Entry) -> Result<i32, RequestError> {
-        let request = Request::Read(entry.address);
+        self.read_at(entry.address).await
+    }
+
+    /// As [`ErobCanSession::read`], by its address.
+    ///
+    /// # Errors
+    /// The drive refuses, or does not reply.
+    pub async fn read_at(&self, address: EntryAddress) -> Result<i32, RequestError> {
+        let request = Request::Read(address);
         match self.exchange(request).await? {
             Answer::Value(value) => Ok(value),
             Answer::Done => Err(RequestError { request, failure: RequestFailure::WrongReply(Reply::Done) }),
@@ -46,7 +54,15 @@ impl ErobCanSession {
     /// # Errors
     /// The drive refuses, or does not reply.
     pub async fn write(&self, entry: &Entry, value: i32) -> Result<(), RequestError> {
-        self.exchange(Request::Write(entry.address, value)).await.map(|_| ())
+        self.write_at(entry.address, value).await
+    }
+
+    /// As [`ErobCanSession::write`], by its address.
+    ///
+    /// # Errors
+    /// The drive refuses, or does not reply.
+    pub async fn write_at(&self, address: EntryAddress, value: i32) -> Result<(), RequestError> {
+        self.exchange(Request::Write(address, value)).await.map(|_| ())
     }
 
     /// Sends a command without an argument.
@@ -58,7 +74,7 @@ impl ErobCanSession {
     }
 
     async fn exchange(&self, request: Request) -> Result<Answer, RequestError> {
-        // The client is free: every request is awaited to its end here, or reset when it is given up.
+        // The client is free: every request is awaited to its end here.
         let started = self.client_mut().start(request);
         debug_assert!(started.is_ok());
         let answer = self.until(|| self.client_mut().take_outcome()).await?;
@@ -66,9 +82,16 @@ impl ErobCanSession {
         Ok(answer)
     }
 
-    /// Forgets a request that was given up.
-    pub fn reset_request(&self) {
-        let now_ns = self.now_ns();
-        self.client_mut().reset(now_ns);
+    /// Turns to another node, and asks it so often and with such patience.
+    pub fn turn_to(&self, node: u8, timing: RequestTiming) {
+        self.client_mut().turn_to(node, timing);
+    }
+
+    /// Asks the node in another protocol: whether it answers this frame under this identifier within this time.
+    pub async fn answers(&self, question: Frame, answer: Id, within_ns: Nanoseconds) -> bool {
+        self.client_mut().probe(question, answer);
+        let end_ns = self.now_ns().saturating_add(within_ns);
+        let has_answer = self.until(|| self.client().has_probe_answer().then_some(()));
+        self.give_up_when(|| self.now_ns() >= end_ns, has_answer).await.is_some()
     }
 }

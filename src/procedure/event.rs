@@ -28,8 +28,15 @@ pub struct AxisReading {
     pub torque: Option<f64>,
     /// Motor current in A, if the drive reports it.
     pub current_a: Option<f64>,
-    /// The statusword.
-    pub statusword: u16,
-    /// The state in the statusword, as a name.
+    /// The statusword, if the drive has one.
+    pub statusword: Option<u16>,
+    /// The state of the drive, as a name.
     pub state: &'static str,
+}
+
+impl AxisReading {
+    /// The bits of the statusword; 0 where the drive has none.
+    pub fn status_bits(&self) -> u16 {
+        self.statusword.unwrap_or(0)
+    }
 }

@@ -13,7 +13,8 @@
 //!    │
 //! client ── one protocol with one drive: frames, or bytes
 //!    ├── canopen_client, canopen_session ── SDO, NMT, EMCY, heartbeat
-//!    └── erob_can_session ── reads, writes and commands of eRob's own protocol
+//!    ├── erob_can_session ── reads, writes and commands of eRob's own protocol
+//!    └── modbus_session ── registers of a slave on a Modbus line
 //! ```
 //!
 //! A waiting procedure is given up by dropping its code: [`ProcedureSession::give_up_when`], or the whole [`Procedure`].
@@ -23,10 +24,18 @@ mod access;
 mod canopen_client;
 mod canopen_session;
 mod client;
-#[cfg_attr(not(feature = "internals"), allow(dead_code, unnameable_types, reason = "no family uses it yet"))]
 mod erob_can_session;
 mod event;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
+)]
+mod modbus_session;
 mod parallel;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unnameable_types, reason = "it is the error of commissioning, which is for the program")
+)]
 mod running;
 mod sdo_quirks;
 mod session;
@@ -34,8 +43,10 @@ mod session;
 pub use access::Access;
 pub use canopen_client::CanopenClient;
 pub use canopen_session::{CanopenSession, POLL_NS};
+pub use client::Client;
 pub use erob_can_session::ErobCanSession;
 pub use event::{AxisReading, ProcedureEvent};
+pub use modbus_session::{ModbusClient, ModbusSession};
 pub use parallel::Parallel;
 pub use running::{Procedure, ProcedureError};
 pub use sdo_quirks::SdoQuirks;

@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 
 use serde::Serialize;
-use takt_rt::{FrameKind, Id, TIME_ID, TransmissionType};
+use takt_rt::{FrameFormat, FrameKind, Id, TIME_ID, TransmissionType};
 
 use crate::canopen::function_code;
+use crate::config::bit_fields::{DescribedLifeCycle, FieldDevice, ReplyMoment};
 use crate::config::{Axis, Config, Master, Supervision};
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 use crate::frame_time::FrameShape;
@@ -25,10 +26,16 @@ pub enum MessageKind {
     SetPoint,
     /// TPDO with which a drive answers a set-point at once.
     Answer,
+    /// Reply of a drive of bit fields to the request of the cycle, some time after it.
+    Reply,
     /// Answer of a drive's SDO server.
     SdoResponse,
     /// Request of the controller's SDO client.
     SdoRequest,
+    /// Answer of a drive that speaks a protocol of its own, beside the cycle.
+    OwnReply,
+    /// Request of the controller in such a protocol.
+    OwnRequest,
     /// Heartbeat of a drive (7.2.8).
     DriveHeartbeat,
     /// Request of the controller for the state of a drive: node guarding.
@@ -48,12 +55,16 @@ impl MessageKind {
         match self {
             Self::SdoResponse
             | Self::SdoRequest
+            | Self::OwnReply
+            | Self::OwnRequest
             | Self::DriveHeartbeat
             | Self::GuardRequest
             | Self::GuardReply
             | Self::MasterHeartbeat
             | Self::Time => true,
-            Self::Sync | Self::Emergency | Self::Feedback | Self::SetPoint | Self::Answer => false,
+            Self::Sync | Self::Emergency | Self::Feedback | Self::SetPoint | Self::Answer | Self::Reply => {
+                false
+            }
         }
     }
 
@@ -64,6 +75,7 @@ impl MessageKind {
             Self::Sync
                 | Self::SetPoint
                 | Self::SdoRequest
+                | Self::OwnRequest
                 | Self::GuardRequest
                 | Self::MasterHeartbeat
                 | Self::Time
@@ -101,7 +113,9 @@ pub(super) struct BusMessage {
 /// Shortest time between two emergency messages: the first one stops the group, so that a later one disturbs nothing.
 const EMERGENCY_INTERVAL_NS: u64 = 1_000_000_000;
 
-const SDO_BYTES: usize = 8;
+/// Frames of bit fields with a meaning of their own.
+const FIXED_BYTES: usize = 8;
+const SERVICE_BYTES: usize = 8;
 const EMERGENCY_BYTES: usize = 8;
 const HEARTBEAT_BYTES: usize = 1;
 const TIME_BYTES: usize = 6;
@@ -112,8 +126,14 @@ const LAST_SYNCHRONOUS_TYPE: u8 = 240;
 pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     let Some(bus) = config.buses.get(bus_index) else { return vec![] };
     let period_ns = config.bus_cycle(bus_index).period_ns;
-    let mut messages = vec![message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns)];
+    let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
+    // What CANopen sends to all nodes is sent where there are nodes.
+    let is_node = |axis: &Axis| !axis.drive.has_field_frames && axis.drive.own_identifiers.is_none();
+    let is_canopen = axes().next().is_none() || axes().any(|(_, axis)| is_node(axis));
+    let sync = || message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns);
+    let mut messages: Vec<BusMessage> = is_canopen.then(sync).into_iter().collect();
     let Master { node, heartbeat_ns, time_ns, .. } = config.master;
+    let (heartbeat_ns, time_ns) = (heartbeat_ns.filter(|_| is_canopen), time_ns.filter(|_| is_canopen));
     let heartbeat = heartbeat_ns.map(|period_ns| {
         message(
             MessageKind::MasterHeartbeat,
@@ -127,11 +147,10 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     // They are sent in a cycle of the controller, so up to one cycle late.
     let own = heartbeat.into_iter().chain(time);
     messages.extend(own.map(|message| BusMessage { jitter_ns: config.cycle.period_ns, ..message }));
-    let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
     let is_guarded = |axis: &Axis| matches!(axis.supervision(&config.master), Supervision::Guarding { .. });
     // What a node sends for all of its axes counts once, with the first of them.
     let nodes = || {
-        axes().filter(|(index, axis)| {
+        axes().filter(|(_, axis)| !axis.drive.has_field_frames).filter(|(index, axis)| {
             let is_its = |(_, other): &(usize, &Axis)| other.node == axis.node;
             axes().find(is_its).is_some_and(|(first, _)| first == *index)
         })
@@ -144,8 +163,13 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
         messages.extend(emergency(index, axis));
         messages.extend(error_control(index, axis, config, guarded));
     }
+    // Drives with a protocol of their own are spoken to while they are enabled, too.
+    let has_own = |(_, axis): &(usize, &Axis)| axis.drive.own_identifiers.is_some();
+    let served = nodes().filter(has_own).chain(nodes().filter(|node| !has_own(node)));
     messages.extend(
-        nodes().take(bus.service_frames_per_cycle).flat_map(|(i, axis)| sdo(i, axis, config.cycle.period_ns)),
+        served
+            .take(bus.service_frames_per_cycle)
+            .flat_map(|(i, axis)| service(i, axis, config.cycle.period_ns)),
     );
     // A frame that axes share counts once, with the first of them.
     let mut set_points = HashSet::new();
@@ -168,6 +192,9 @@ fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period
 }
 
 fn axis_messages(index: usize, axis: &Axis, config: &Config, period_ns: u64) -> Vec<BusMessage> {
+    if let Some(device) = axis.drive.description() {
+        return field_messages(index, axis, device, period_ns);
+    }
     let data = ProcessData::of(axis, config);
     let of_axis =
         |kind, pdo: &PdoPlan, period_ns| message(kind, Some(index), pdo.id, pdo.length(), period_ns);
@@ -196,6 +223,41 @@ fn axis_messages(index: usize, axis: &Axis, config: &Config, period_ns: u64) -> 
     messages
 }
 
+/// The request of each cycle to a drive of bit fields, and what it sends. A frame of its own in place of a command is no longer than that.
+fn field_messages(index: usize, axis: &Axis, device: &FieldDevice, period_ns: u64) -> Vec<BusMessage> {
+    let (command, reply) = (&device.description.command, &device.description.reply);
+    let shape = |format: FrameFormat, id: Id, length| FrameShape {
+        kind: device.format(format).kind(),
+        is_extended: id.is_extended(),
+        length,
+    };
+    let (id, reply_id) = (device.id(&command.id, axis.node), device.reply_id(axis.node));
+    let request = BusMessage {
+        shape: shape(command.format, id, longest_request(device)),
+        ..message(MessageKind::SetPoint, Some(index), id, command.bytes, period_ns)
+    };
+    let (kind, reply_ns, delay_ns) = match device.description.reply_moment {
+        ReplyMoment::AfterCommand { delay_ns } => (MessageKind::Reply, period_ns, delay_ns),
+        ReplyMoment::Cyclic { period_ns } => (MessageKind::Feedback, period_ns, 0),
+    };
+    let reply = BusMessage {
+        shape: shape(reply.format, reply_id, reply.bytes),
+        jitter_ns: delay_ns,
+        is_asynchronous: kind == MessageKind::Feedback,
+        ..message(kind, Some(index), reply_id, reply.bytes, reply_ns)
+    };
+    vec![request, reply]
+}
+
+/// The length of the longest frame that may be the request of a cycle.
+fn longest_request(device: &FieldDevice) -> usize {
+    let bytes = device.description.command.bytes;
+    match device.description.life_cycle {
+        DescribedLifeCycle::ByFields(_) => bytes,
+        DescribedLifeCycle::ByFrames(_) => bytes.max(FIXED_BYTES),
+    }
+}
+
 fn emergency(index: usize, axis: &Axis) -> Option<BusMessage> {
     let (id, kind) = (Id::canopen(0x080, axis.node), MessageKind::Emergency);
     axis.drive
@@ -221,24 +283,24 @@ fn error_control(index: usize, axis: &Axis, config: &Config, guarded: usize) -> 
     }
 }
 
+/// Requests and replies beside the cycle: those of SDO, or of the drive's own protocol, whose frames are no longer.
+///
 /// One transfer at a time for each node, at most one request in a cycle for each service frame that the bus allows;
 /// the controller's heartbeat comes in addition.
 /// A drive answers after 0.3 to 1 ms, so two of its answers may follow each other more closely than a cycle.
-fn sdo(index: usize, axis: &Axis, period_ns: u64) -> [BusMessage; 2] {
-    let request = message(
-        MessageKind::SdoRequest,
-        Some(index),
-        Id::canopen(function_code::SDO_REQUEST, axis.node),
-        SDO_BYTES,
-        period_ns,
-    );
-    let response = message(
-        MessageKind::SdoResponse,
-        Some(index),
-        Id::canopen(function_code::SDO_RESPONSE, axis.node),
-        SDO_BYTES,
-        period_ns,
-    );
+fn service(index: usize, axis: &Axis, period_ns: u64) -> [BusMessage; 2] {
+    let node = axis.node;
+    let [(request, request_id), (reply, reply_id)] = match axis.drive.own_identifiers {
+        Some(own) => {
+            [(MessageKind::OwnRequest, own.request_id(node)), (MessageKind::OwnReply, own.reply_id(node))]
+        }
+        None => [
+            (MessageKind::SdoRequest, Id::canopen(function_code::SDO_REQUEST, node)),
+            (MessageKind::SdoResponse, Id::canopen(function_code::SDO_RESPONSE, node)),
+        ],
+    };
+    let request = message(request, Some(index), request_id, SERVICE_BYTES, period_ns);
+    let response = message(reply, Some(index), reply_id, SERVICE_BYTES, period_ns);
     [
         BusMessage { deadline_ns: None, ..request },
         BusMessage { deadline_ns: None, jitter_ns: period_ns, ..response },

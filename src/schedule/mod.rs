@@ -164,6 +164,13 @@ pub enum Shortfall {
         /// When they must have been.
         period_ns: u64,
     },
+    /// Replies of drives of bit fields can arrive after the next requests have been made.
+    RepliesLate {
+        /// When all of them have arrived, counted from the start of the slot of their requests.
+        done_ns: u64,
+        /// When they must have: at the command phase of the next slot.
+        next_command_phase_ns: u64,
+    },
     /// Another message can take longer than it may.
     MessageLate {
         /// What it is.
@@ -216,7 +223,7 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
     let is_sent_while_enabled = |message: &BusMessage| allows_sdo || !message.kind.is_sdo();
     let enabled: Vec<&BusMessage> = all.iter().filter(|message| is_sent_while_enabled(message)).collect();
 
-    let on_bus = config.axes.iter().filter(|axis| axis.bus == index);
+    let on_bus = config.axes.iter().filter(|axis| axis.bus == index && !axis.drive.has_field_frames);
     let feedback_delay_ns = on_bus.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
     let slot = slot::worst_slot(&enabled, feedback_delay_ns, cycle, cycles, rates);
     let is_queue_empty_at_sync = slot.is_queue_empty_at_sync;
@@ -280,6 +287,7 @@ fn in_slot(
             (Some(done_ns), Some(cycle.period_ns))
         }
         MessageKind::Answer => (Some(slot.set_points_done_ns), Some(cycle.period_ns)),
+        MessageKind::Reply => (Some(slot.replies_done_ns), Some(cycle.period_ns + cycle.command_phase_ns)),
         _ => (None, message.deadline_ns),
     }
 }
@@ -298,6 +306,9 @@ fn shortfalls(messages: &[MessageSchedule], slot: &Slot, cycle: Cycle) -> Vec<Sh
         .then_some(Shortfall::FeedbackLate { done_ns: slot.feedback_done_ns, command_phase_ns });
     let set_points = (slot.set_points_done_ns > period_ns)
         .then_some(Shortfall::SetPointsLate { done_ns: slot.set_points_done_ns, period_ns });
+    let next_command_phase_ns = period_ns + command_phase_ns;
+    let replies = (slot.replies_done_ns > next_command_phase_ns)
+        .then_some(Shortfall::RepliesLate { done_ns: slot.replies_done_ns, next_command_phase_ns });
     let others = messages.iter().filter_map(|message| {
         let deadline_ns = message.deadline_ns.filter(|_| message.kind.is_background())?;
         let is_late = message.response_ns.is_none_or(|response| response > deadline_ns);
@@ -308,7 +319,7 @@ fn shortfalls(messages: &[MessageSchedule], slot: &Slot, cycle: Cycle) -> Vec<Sh
             deadline_ns,
         })
     });
-    feedback.into_iter().chain(set_points).chain(others).collect()
+    feedback.into_iter().chain(set_points).chain(replies).chain(others).collect()
 }
 
 /// The messages that count for the response time of one message, and the place of that message among them. An emergency

@@ -9,6 +9,9 @@
 //! room for all of them before the next SYNC, that SYNC and the feedback meet background frames of the drives alone;
 //! where it does not, they stand in the queue before SYNC and wait there for everything else.
 //!
+//! A drive of bit fields replies to each request, some time after it: mostly in the next slot. Its replies are due when the next requests are
+//! made. They may meet SYNC and feedback, which then wait for them.
+//!
 //! The sums are those of a punctual controller. What is left of the slot is its reserve: for SYNC that leaves late,
 //! and for waking up, computing and handing over the set-points. Within it everything
 //! is in time.
@@ -41,6 +44,13 @@ pub struct Slot {
     pub set_points_ns: u64,
     /// When all set-points have been sent.
     pub set_points_done_ns: u64,
+    /// The longest time that a drive of bit fields takes to have its reply ready.
+    pub reply_delay_ns: u64,
+    /// All replies of drives of bit fields together.
+    pub replies_ns: u64,
+    /// When all of them have arrived, which is after the end of the slot. They must be there before the command phase of the next one;
+    /// 0 without such drives.
+    pub replies_done_ns: u64,
     /// The longest emergency message: what one of them delays all this by.
     pub emergency_ns: u64,
     /// SYNC, feedback and set-points alone.
@@ -127,6 +137,38 @@ impl Timeline {
     }
 }
 
+/// The replies of drives of bit fields.
+struct Replies {
+    all_ns: u64,
+    /// The longest time from a request until its reply is ready.
+    delay_ns: u64,
+    /// What may get onto the wire between the requests.
+    between_requests_ns: u64,
+    /// From when the last reply is ready until it has arrived.
+    last_ns: u64,
+}
+
+impl Replies {
+    /// A reply that is no longer than a request is gone before the next one is ready: requests come no closer after each other than they
+    /// are long. Where replies are longer than that, or come while requests are still being sent, all of them may be before the last.
+    fn of(messages: &[&BusMessage], requests_ns: u64, rates: BitRates) -> Self {
+        let of_kind = |kind| messages.iter().filter(move |message| message.kind == kind);
+        let times: Vec<u64> = of_kind(MessageKind::Reply).map(|message| time(message, rates)).collect();
+        let (all_ns, longest_ns) = (times.iter().sum(), times.iter().copied().max().unwrap_or(0));
+        let delays = || of_kind(MessageKind::Reply).map(|message| message.jitter_ns);
+        let shortest_request_ns =
+            of_kind(MessageKind::SetPoint).map(|message| time(message, rates)).min().unwrap_or(0);
+        let are_between = requests_ns > delays().min().unwrap_or(u64::MAX);
+        let are_apart = longest_ns <= shortest_request_ns && !are_between;
+        Self {
+            all_ns,
+            delay_ns: delays().max().unwrap_or(0),
+            between_requests_ns: if are_between { all_ns } else { 0 },
+            last_ns: if are_apart { longest_ns } else { all_ns },
+        }
+    }
+}
+
 /// The worst slot, given the messages that are sent while the axes are enabled. It is so many cycles of the controller long.
 pub(super) fn worst_slot(
     messages: &[&BusMessage],
@@ -142,6 +184,7 @@ pub(super) fn worst_slot(
     let (sync_ns, feedback_ns) = (total(MessageKind::Sync), total(MessageKind::Feedback));
     // What answers a set-point must be sent in the same time, and has precedence over the set-points behind it.
     let set_points_ns = total(MessageKind::SetPoint) + total(MessageKind::Answer);
+    let replies = Replies::of(messages, set_points_ns, rates);
     let emergency_ns =
         times(&|message| message.kind == MessageKind::Emergency).into_iter().max().unwrap_or(0);
     let background = Background::of(messages, cycle.period_ns, cycles, rates);
@@ -149,7 +192,7 @@ pub(super) fn worst_slot(
     // Feedback that comes on events of the drives has precedence over set-points by its identifier.
     let asynchronous = times(&|message| message.kind == MessageKind::Feedback && message.is_asynchronous);
     let asynchronous_ns: u64 = asynchronous.iter().sum();
-    let wait_before_set_points_ns = background.longest_ns + asynchronous_ns;
+    let wait_before_set_points_ns = background.longest_ns + asynchronous_ns + replies.between_requests_ns;
 
     let timeline = |before_sync_ns: u64, before_feedback_ns: u64, rest_ns: u64| Timeline {
         before_sync_ns,
@@ -160,8 +203,10 @@ pub(super) fn worst_slot(
     let set_points_rest_ns = wait_before_set_points_ns + set_points_ns;
     let queue_rest_ns = set_points_ns + asynchronous_ns + background.all_ns;
     let empty_rest_ns = if background.has_ours { queue_rest_ns } else { set_points_rest_ns };
-    let empty_queue = timeline(background.longest_ns, background.second_ns, empty_rest_ns);
-    let full_queue = timeline(background.all_ns, 0, set_points_rest_ns);
+    // On a bus without SYNC nothing waits for the replies of the slot before.
+    let beside_sync_ns = if sync_ns + feedback_ns > 0 { replies.all_ns } else { 0 };
+    let empty_queue = timeline(background.longest_ns + beside_sync_ns, background.second_ns, empty_rest_ns);
+    let full_queue = timeline(background.all_ns + beside_sync_ns, 0, set_points_rest_ns);
 
     let (period_ns, phase_ns) = (cycle.period_ns, cycle.command_phase_ns);
     // Set-points that are queued before all feedback has arrived leave after it.
@@ -182,8 +227,17 @@ pub(super) fn worst_slot(
         wait_before_set_points_ns,
         set_points_ns,
         set_points_done_ns: phase_ns + set_points_rest_ns,
+        reply_delay_ns: replies.delay_ns,
+        replies_ns: replies.all_ns,
+        replies_done_ns: match replies.all_ns {
+            0 => 0,
+            _ => {
+                let others_ns = sync_ns + feedback_ns + background.longest_ns;
+                phase_ns + set_points_rest_ns + replies.delay_ns + replies.last_ns + others_ns
+            }
+        },
         emergency_ns,
-        process_data_ns: sync_ns + feedback_ns + set_points_ns,
+        process_data_ns: sync_ns + feedback_ns + set_points_ns + replies.all_ns,
         sync_reserve_ns: phase_ns.saturating_sub(actual.earliest_ns),
         set_points_reserve_ns: period_ns.saturating_sub(phase_ns + actual.rest_ns),
         earliest_command_phase_ns: possible.earliest_ns,

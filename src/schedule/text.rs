@@ -19,8 +19,11 @@ pub fn message_name(kind: MessageKind) -> &'static str {
         MessageKind::Feedback => "feedback",
         MessageKind::SetPoint => "set-point",
         MessageKind::Answer => "answer",
+        MessageKind::Reply => "reply",
         MessageKind::SdoResponse => "SDO answer",
         MessageKind::SdoRequest => "SDO request",
+        MessageKind::OwnReply => "answer",
+        MessageKind::OwnRequest => "request",
         MessageKind::DriveHeartbeat => "heartbeat",
         MessageKind::GuardRequest => "guard request",
         MessageKind::GuardReply => "guard reply",
@@ -46,12 +49,18 @@ pub fn sums(bus: &BusSchedule) -> Vec<String> {
             format!("{} µs LATE", us(done - until))
         }
     };
-    let process_data = format!(
-        "process data  {} µs = {}, in {} µs",
-        us(slot.process_data_ns),
-        sum(&[(slot.sync_ns, "SYNC"), (slot.feedback_ns, "feedback"), (slot.set_points_ns, "set-points")]),
-        us(bus.period_ns),
-    );
+    let parts = sum(&[
+        (slot.sync_ns, "SYNC"),
+        (slot.feedback_ns, "feedback"),
+        (slot.set_points_ns, "set-points"),
+        (slot.replies_ns, "replies"),
+    ]);
+    let process_data = match parts.is_empty() {
+        true => "process data  none in the cycle".to_owned(),
+        false => {
+            format!("process data  {} µs = {parts}, in {} µs", us(slot.process_data_ns), us(bus.period_ns))
+        }
+    };
     let feedback = format!(
         "feedback      {} µs = {}; command phase at {} µs: {}",
         us(slot.feedback_done_ns),
@@ -76,7 +85,27 @@ pub fn sums(bus: &BusSchedule) -> Vec<String> {
         us(bus.period_ns),
         verdict(slot.set_points_done_ns, bus.period_ns),
     );
-    vec![process_data, feedback, set_points]
+    let next_phase_ns = bus.period_ns + bus.command_phase_ns;
+    let replies = || {
+        let last_ns = slot.replies_done_ns.saturating_sub(slot.set_points_done_ns + slot.reply_delay_ns);
+        format!(
+            "replies       {} µs = {}; next command phase at {} µs: {}",
+            us(slot.replies_done_ns),
+            sum(&[
+                (slot.set_points_done_ns, "requests"),
+                (slot.reply_delay_ns, "drives' delay"),
+                (last_ns, "wait and reply")
+            ]),
+            us(next_phase_ns),
+            verdict(slot.replies_done_ns, next_phase_ns),
+        )
+    };
+    let has_feedback = slot.feedback_done_ns > 0;
+    let mut lines = vec![process_data];
+    lines.extend(has_feedback.then_some(feedback));
+    lines.push(set_points);
+    lines.extend((slot.replies_ns > 0).then(replies));
+    lines
 }
 
 /// The reserve of the slot, and the effect of an emergency message. Empty for a bus that does not fit.
@@ -133,6 +162,11 @@ pub fn shortfall(shortfall: &Shortfall) -> String {
             "set-points can take until {} µs, but the next SYNC is due at {} µs",
             us(*done_ns),
             us(*period_ns)
+        ),
+        Shortfall::RepliesLate { done_ns, next_command_phase_ns } => format!(
+            "replies of the drives can arrive until {} µs, but are needed at the next command phase, {} µs",
+            us(*done_ns),
+            us(*next_command_phase_ns)
         ),
         Shortfall::MessageLate { kind, axis, response_ns, deadline_ns } => {
             let of = axis.as_ref().map(|axis| format!(" of {axis}")).unwrap_or_default();

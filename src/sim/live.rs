@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use takt_rt::Frame;
-use takt_rt::linux::{MonotonicClock, SocketCanPort};
+use takt_rt::linux::{MonotonicClock, SlcanPort, SocketCanPort};
 use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::drive::Drive;
@@ -14,10 +14,28 @@ use super::port::DRIVE_MAILBOX;
 /// Longest wait, so that a request to stop is noticed.
 const LONGEST_WAIT_NS: Nanoseconds = 20_000_000;
 
+/// The interface of drives that react to frames.
+pub trait LivePort: BusPort + Send {
+    /// Waits until something has arrived, but not longer than `timeout_ns`.
+    fn wait(&self, timeout_ns: Nanoseconds);
+}
+
+impl LivePort for SocketCanPort {
+    fn wait(&self, timeout_ns: Nanoseconds) {
+        self.wait(timeout_ns);
+    }
+}
+
+impl LivePort for SlcanPort {
+    fn wait(&self, timeout_ns: Nanoseconds) {
+        self.wait(timeout_ns);
+    }
+}
+
 /// Drives that share one interface. Their frames are sent in the order of bus arbitration. Frames that the interface
 /// has no room for wait.
 pub struct LiveDrives {
-    port: SocketCanPort,
+    port: Box<dyn LivePort>,
     stations: Vec<(Box<dyn Drive>, Mailbox)>,
     /// Devices that have LSS and nothing else. Their frames follow those of the drives.
     lss_devices: Vec<(LssDevice, Mailbox)>,
@@ -29,7 +47,7 @@ pub struct LiveDrives {
 
 impl LiveDrives {
     /// These drives on an interface. The supply is switched on now.
-    pub fn new(drives: Vec<Box<dyn Drive>>, port: SocketCanPort) -> Self {
+    pub fn new(drives: Vec<Box<dyn Drive>>, port: Box<dyn LivePort>) -> Self {
         let stations =
             drives.into_iter().map(|drive| (drive, Mailbox::new(QueueOrder::Priority, DRIVE_MAILBOX)));
         Self {
@@ -165,7 +183,7 @@ mod tests {
         let drives = on_bus.map(|axis| -> Box<dyn Drive> {
             Box::new(ErobJoint::new(ErobParameters::of(axis, &config.simulation)))
         });
-        (LiveDrives::new(drives.collect(), port(&ours)), port(&theirs))
+        (LiveDrives::new(drives.collect(), Box::new(port(&ours))), port(&theirs))
     }
 
     /// Runs until the master has received `count` frames.

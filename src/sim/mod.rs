@@ -8,10 +8,13 @@
 //!     arbitration           │
 //!     who sends, when       │
 //!     mailbox  wire        cia402 ── any CiA 402 drive, made from its electronic data sheet
+//!                          bit_fields ── any drive of bit fields, made from its description
 //!                          erob, erob_can, yz_aim ── drives of their own, by their manuals and field experience
 //!     frames   bits,        │
 //!     waiting  stuffing     ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
 //!                           │     canopen_node ── these together, for the drives with CiA 402
+//!                         erob_modbus ── a drive on a serial line, with its line; profile_motions ── what both protocols of its maker do
+//!                           │
 //!                         motion ── ramps, profiles, interpolation; servo ── position, velocity and torque loops
 //!                           │
 //!                         plant ── inertia, friction, brake, end stops, encoder; homing switches
@@ -39,17 +42,29 @@
 //! # Ok::<(), takt::ConfigError>(())
 //! ```
 
+pub(crate) mod bit_fields;
 mod canopen_node;
 pub mod cia402;
 mod defect;
 mod drive;
 pub(crate) mod erob;
-#[cfg_attr(not(feature = "internals"), allow(dead_code, unnameable_types, reason = "no family uses it yet"))]
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
+)]
 pub(crate) mod erob_can;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
+)]
+pub(crate) mod erob_modbus;
 mod errors;
 mod feedback_defects;
+#[cfg(feature = "cli")]
+pub(crate) mod hollow_lines;
 pub mod homing_switches;
 #[cfg(feature = "cli")]
+#[cfg_attr(not(feature = "internals"), allow(unnameable_types, reason = "only the port of a link names it"))]
 pub(crate) mod live;
 mod loops;
 #[cfg(feature = "cli")]
@@ -62,18 +77,27 @@ pub(crate) mod object_dictionary;
 mod pdo_engine;
 pub mod plant;
 mod port;
+mod profile_motions;
+pub(crate) mod pseudo_terminal;
 pub(crate) mod random;
 mod sdo_reply;
 mod sdo_server;
+#[cfg(feature = "cli")]
+pub(crate) mod serial_device;
+#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "`takt sim` hosts them"))]
+pub(crate) mod serial_line;
 mod servo;
+#[cfg(feature = "cli")]
+pub(crate) mod slcan_adapter;
 pub(crate) mod wire_length;
 pub(crate) mod yz_aim;
 
 pub use defect::{Defect, Unsupported};
 pub use drive::{Drive, DriveFault, NodeState, Observation};
 #[cfg(feature = "cli")]
-pub(crate) use live::LiveDrives;
+pub(crate) use live::{LiveDrives, LivePort};
 pub use mailbox::{Mailbox, QueueOrder};
 pub use medium::WireBitRates;
 pub use plant::Gravity;
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
+pub use serial_line::DevicesOnLine;

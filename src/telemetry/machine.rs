@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use serde::Serialize;
 use takt_rt::ControlLaw;
 
-use crate::config::{Axis, Config, Interface, Travel};
+use crate::config::{Axis, Config, Travel};
 use crate::family;
 
 /// Names and units of a controller.
@@ -98,10 +98,7 @@ impl Machine {
     pub fn of(config: &Config) -> Self {
         let bus = |bus: &crate::config::Bus| BusDescription {
             name: bus.name.clone(),
-            interface: match &bus.interface {
-                Interface::Simulated => "sim".to_owned(),
-                Interface::SocketCan(interface) => interface.clone(),
-            },
+            interface: bus.interface.to_string(),
         };
         Self {
             name: config.name.clone(),

@@ -1,6 +1,7 @@
 //! What an axis does when the controller is gone, by `kill -9` or by a broken cable, until its drive acts.
 
 use crate::config::{Axis, Config, Control};
+use crate::family;
 use serde::Serialize;
 
 /// What an axis does without the controller.
@@ -51,16 +52,24 @@ impl Unattended {
 
     fn in_mode(control: &Control, axis: &Axis, config: &Config) -> Self {
         let (limits, master) = (&axis.limits, &config.master);
+        // A drive that is spoken to beside the cycle is told velocities, whatever the mode of its axis.
+        let off_cycle = family::of(&axis.drive).off_cycle_budget(axis, config);
         match *control {
-            Control::Position | Control::Interpolated => {
+            Control::Position | Control::Interpolated if off_cycle.is_none() => {
                 let cycle_s = config.bus_cycle(axis.bus).period_ns as f64 / 1e9;
                 Self::HoldsLastSetPoint { travel: axis.following_error.limit + limits.velocity * cycle_s }
             }
-            Control::ProfilePosition => Self::EndsItsMove,
+            Control::ProfilePosition if off_cycle.is_none() => Self::EndsItsMove,
             control => {
-                let Some(timeout_ns) = axis.controller_timeout_ns(master) else {
+                let watchdog_ns = match off_cycle {
+                    Some(budget) => budget.watchdog_ns,
+                    None => axis.controller_timeout_ns(master),
+                };
+                let Some(timeout_ns) = watchdog_ns else {
                     return Self::GoesOnForEver {
                         because: match master.heartbeat_ns {
+                            _ if off_cycle.is_some() => "the drive has no watchdog on its controller",
+                            _ if axis.drive.has_field_frames => "the drive has no watchdog",
                             None => "[master] heartbeat is off",
                             Some(_) => "the drive has neither a consumer heartbeat (1016) nor node guarding",
                         },

@@ -4,9 +4,8 @@ use std::time::Duration;
 
 use clap::{Args, Subcommand};
 
-use crate::canopen::object::{DataType, Object};
-use crate::commission::dictionary::{self, SelectedObject};
-use crate::commission::{Failure, ReadObject, TargetDrive, Task};
+use crate::canopen::object::DataType;
+use crate::commission::{Task, ValueText, dictionary};
 
 use super::super::configuration;
 
@@ -15,6 +14,8 @@ use super::super::configuration;
 pub enum Action {
     /// Show the identity, the state and the errors of the drive
     Info,
+    /// Find the drives on the bus that speak the same protocol
+    Scan,
     /// Read objects, by index:subindex or by name
     Read(Read),
     /// Write an object and read it back
@@ -65,6 +66,7 @@ impl Action {
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Info => "info",
+            Self::Scan => "scan",
             Self::Read(_) => "read",
             Self::Write(_) => "write",
             Self::Watch(_) => "watch",
@@ -72,65 +74,20 @@ impl Action {
     }
 
     /// The task to the drive.
-    pub fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
+    pub fn task(&self, is_raw: bool) -> Task {
         match self {
-            Self::Info => Ok(Task::Info),
-            Self::Read(read) => read.task(target),
-            Self::Write(write) => write.task(target, is_raw),
-            Self::Watch(watch) => Ok(Task::Watch {
+            Self::Info => Task::Info,
+            Self::Scan => Task::Scan,
+            Self::Read(read) => Task::Read { names: read.objects.clone(), data_type: read.data_type },
+            Self::Write(write) => Task::Write {
+                name: write.object.clone(),
+                value: ValueText { text: write.value.clone(), is_raw },
+                data_type: write.data_type,
+            },
+            Self::Watch(watch) => Task::Watch {
                 every_ns: watch.interval.as_nanos() as u64,
                 duration_ns: watch.duration.map(|duration| duration.as_nanos() as u64),
-            }),
+            },
         }
-    }
-}
-
-impl Read {
-    fn task(&self, target: &TargetDrive) -> Result<Task, Failure> {
-        let objects = self.objects.iter().map(|text| {
-            Ok(match dictionary::find(&target.drive, text)? {
-                SelectedObject::Known(entry) => ReadObject {
-                    address: entry.object.address,
-                    entry: Some(entry),
-                    data_type: self.data_type,
-                },
-                SelectedObject::Unknown(address) => {
-                    ReadObject { address, entry: None, data_type: self.data_type }
-                }
-            })
-        });
-        Ok(Task::Read { objects: objects.collect::<Result<_, Failure>>()? })
-    }
-}
-
-impl Write {
-    fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
-        let found = dictionary::find(&target.drive, &self.object)?;
-        let (object, entry) = match (found, self.data_type) {
-            (SelectedObject::Known(entry), None) => (entry.object, Some(entry)),
-            (SelectedObject::Known(entry), Some(data_type)) if data_type == entry.object.data_type => {
-                (entry.object, Some(entry))
-            }
-            (SelectedObject::Known(entry), Some(_)) => {
-                return Err(Failure::Unsuitable(format!(
-                    "{} is {:?}, not what --type says",
-                    entry.object, entry.object.data_type
-                )));
-            }
-            (SelectedObject::Unknown(address), Some(data_type)) => {
-                (Object { address, data_type, name: "object" }, None)
-            }
-            (SelectedObject::Unknown(address), None) => {
-                return Err(Failure::Unsuitable(format!(
-                    "nothing is known of {address}: say its type with --type (u8, i8, u16, i16, u32, i32)"
-                )));
-            }
-        };
-        let value = match entry {
-            Some(entry) => entry.parse(target, &self.value, is_raw)?,
-            None => dictionary::integer(&self.value)
-                .ok_or_else(|| Failure::Unsuitable(format!("`{}` is no whole number", self.value)))?,
-        };
-        Ok(Task::Write { object, value, entry })
     }
 }

@@ -1,6 +1,8 @@
 //! `takt drive`: commissioning of a single drive.
 
+mod entries;
 mod inspection;
+mod line;
 mod motion;
 mod output;
 mod session;
@@ -13,13 +15,15 @@ use crate::commission::{Failure, TargetDrive, Task};
 
 use super::exit::Exit;
 use super::ownership::if_owned;
+use target::Place;
 
 /// Commission one drive: inspect it, move it, set it up
 ///
 /// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
-/// one), or a node on an interface (`takt drive --bus can0 --node 1 --family FAMILY …`), of which no limits are
-/// known; a drive without a family of its own is named by its data sheet (`--eds drive.eds`). Values have a unit and are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the
-/// drive's own. Every motion ends at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
+/// one), or a node on an interface (`takt drive --bus can0 --node 1 --family FAMILY …`) or on a serial line
+/// (`takt drive --bus serial:/dev/ttyUSB0 --node 1 --family FAMILY …`), of which no limits are
+/// known; a drive without a family of its own is named by its data sheet (`--eds drive.eds`). Values have a unit and
+/// are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the drive's own. Every motion ends at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
 #[derive(Args, Debug)]
 #[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
 pub struct Arguments {
@@ -53,6 +57,14 @@ struct Options {
 
 #[derive(Subcommand, Debug)]
 enum Action {
+    Entries(entries::Arguments),
+    #[command(flatten)]
+    Task(TaskAction),
+}
+
+/// An action that needs the drive.
+#[derive(Subcommand, Debug)]
+enum TaskAction {
     #[command(flatten)]
     Inspect(inspection::Action),
     #[command(flatten)]
@@ -61,7 +73,7 @@ enum Action {
     Upkeep(upkeep::Action),
 }
 
-impl Action {
+impl TaskAction {
     /// Its name on the command line.
     const fn name(&self) -> &'static str {
         match self {
@@ -73,7 +85,7 @@ impl Action {
 
     fn task(&self, target: &TargetDrive, is_raw: bool) -> Result<Task, Failure> {
         match self {
-            Self::Inspect(action) => action.task(target, is_raw),
+            Self::Inspect(action) => Ok(action.task(is_raw)),
             Self::Motion(action) => action.task(target, is_raw),
             Self::Upkeep(action) => action.task(is_raw),
         }
@@ -82,16 +94,37 @@ impl Action {
 
 /// Runs it.
 pub fn run(arguments: &Arguments) -> Exit {
-    let (target, bus) = match arguments.target.resolve() {
+    let action = match &arguments.action {
+        Action::Entries(entries) => {
+            return entries::run(entries, arguments.target.drive(), arguments.options.json);
+        }
+        Action::Task(action) => action,
+    };
+    let is_scan = matches!(action, TaskAction::Inspect(inspection::Action::Scan));
+    let (target, place) = match arguments.target.resolve(is_scan) {
         Ok(resolved) => resolved,
         Err(error) => return error.print(arguments.options.json),
     };
-    let mut output = output::Output::new(&target, arguments.action.name(), arguments.options);
-    match arguments.action.task(&target, arguments.options.raw) {
-        Ok(task) => {
-            let if_owned = if_owned(arguments.take_over);
-            session::run(target, task, bus, if_owned, arguments.options, output)
+    let mut output = output::Output::new(&target, action.name(), arguments.options);
+    let task = match action.task(&target, arguments.options.raw) {
+        Ok(task) => task,
+        Err(failure) => return output.refuse(&failure),
+    };
+    let run = |task, output: &mut _| match &place {
+        Place::Bus(bus) => {
+            session::run(&target, task, bus, if_owned(arguments.take_over), arguments.options, output)
         }
-        Err(failure) => output.refuse(&failure),
+        Place::Line(line) => line::run(&target, task, line, arguments.options, output),
+    };
+    let mut outcome = run(task.clone(), &mut output);
+    if let Ok(Err(failed)) = &outcome
+        && let Failure::NeedsConsent { consequence, .. } = failed.failure
+        && output.asks_for(consequence)
+    {
+        outcome = run(task.confirmed(), &mut output);
+    }
+    match outcome {
+        Ok(outcome) => output.finish(&outcome),
+        Err(exit) => exit,
     }
 }

@@ -73,6 +73,9 @@ enum MoveKindArguments {
         /// The number of repetitions
         #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
         times: u32,
+        /// Go on until Ctrl-C
+        #[arg(long, conflicts_with = "times")]
+        endless: bool,
         /// Seconds of standstill at each end
         #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
         dwell: Option<Duration>,
@@ -137,7 +140,7 @@ pub struct Velocity {
 
 #[derive(Args, Debug)]
 pub struct Torque {
-    /// "2.5 Nm"; --raw: per mille of the rated torque
+    /// "2.5 Nm"; --raw: the drive's unit, for CiA 402 drives per mille of the rated torque
     #[arg(allow_hyphen_values = true)]
     torque: String,
     /// The axis is stopped above this velocity: "10 deg/s" [default: a quarter of the axis' limit]
@@ -217,9 +220,10 @@ impl MoveKindArguments {
             Self::Relative { distance, profile } => {
                 (MoveKind::Relative(read(distance, position, is_raw)?), profile)
             }
-            Self::Reciprocate { position: to, times, dwell, profile } => {
+            Self::Reciprocate { position: to, times, endless, dwell, profile } => {
                 let dwell_ns = nanoseconds(*dwell).unwrap_or(0);
-                (MoveKind::Reciprocate { to: read(to, position, is_raw)?, times: *times, dwell_ns }, profile)
+                let times = (!endless).then_some(*times);
+                (MoveKind::Reciprocate { to: read(to, position, is_raw)?, times, dwell_ns }, profile)
             }
             Self::Continuous { direction, duration, profile } => {
                 let is_forward = matches!(direction, Direction::Forward);

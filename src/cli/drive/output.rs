@@ -1,18 +1,21 @@
 //! The output of a procedure: progress, frames, and the result.
 
-use std::io::{IsTerminal, stderr};
+use std::io::{BufRead, IsTerminal, Read, stderr, stdin};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use serde_json::json;
 
 use crate::commission::bus_session::SessionEvent;
-use crate::commission::{AxisReading, Failure, ProcedureError, ProcedureEvent, Report, TargetDrive, meaning};
+use crate::commission::{AxisReading, Failure, ProcedureError, ProcedureEvent, Report, TargetDrive};
 use takt_rt::{Frame, Nanoseconds};
 
 use super::super::exit::Exit;
 use super::super::print;
 use super::Options;
+
+/// Bytes of an answer to a question.
+const LONGEST_ANSWER: u64 = 100;
 
 /// Shows a procedure and its result.
 pub struct Output {
@@ -22,6 +25,8 @@ pub struct Output {
     line: ProgressBar,
     step: &'static str,
     notes: Vec<String>,
+    /// Describes a frame.
+    words: Box<dyn FnMut(&Frame) -> String>,
     /// The exit code if readings can no longer be printed.
     unshown: Option<Exit>,
 }
@@ -55,7 +60,26 @@ impl Output {
         } else {
             ProgressBar::hidden()
         };
-        Self { target: target.clone(), action, options, line, step: "", notes: vec![], unshown: None }
+        let words = Box::new(|_: &Frame| String::new());
+        Self { target: target.clone(), action, options, line, step: "", notes: vec![], words, unshown: None }
+    }
+
+    /// Describes frames from now on like this.
+    pub fn describe_frames(&mut self, words: Box<dyn FnMut(&Frame) -> String>) {
+        self.words = words;
+    }
+
+    /// Asks the user whether to do what has this consequence. Without a terminal there is nobody to ask.
+    pub fn asks_for(&self, consequence: &str) -> bool {
+        if self.options.json || !stdin().is_terminal() || !stderr().is_terminal() {
+            return false;
+        }
+        self.line.suspend(|| {
+            say!("{consequence}\nDo it? [y/N]");
+            let mut answer = String::new();
+            let is_read = stdin().lock().take(LONGEST_ANSWER).read_line(&mut answer).is_ok();
+            is_read && matches!(answer.trim().to_lowercase().as_str(), "y" | "yes")
+        })
     }
 
     /// Shows what has just happened. Returns whether readings can still be printed.
@@ -84,9 +108,9 @@ impl Output {
         }
     }
 
-    fn frame(&self, at_ns: Nanoseconds, direction: char, frame: &Frame) {
+    fn frame(&mut self, at_ns: Nanoseconds, direction: char, frame: &Frame) {
         if self.options.verbose {
-            let (frame, words) = (format!("{frame:?}"), meaning::of(&self.target, frame));
+            let (frame, words) = (format!("{frame:?}"), (self.words)(frame));
             say!("{} {direction} {frame:<21}  {words}", seconds(at_ns));
         }
     }
@@ -129,7 +153,8 @@ impl Output {
         if let Some(current) = reading.current_a {
             words = format!("{words}  {current:.3} A");
         }
-        format!("{words}  0x{:04X} {}", reading.statusword, reading.state)
+        let statusword = reading.statusword.map_or_else(String::new, |word| format!("0x{word:04X} "));
+        format!("{words}  {statusword}{}", reading.state)
     }
 
     /// Reports that the procedure was not begun.

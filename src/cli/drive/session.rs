@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
-use crate::commission::{Failure, TargetDrive, Task, bus_session, procedure};
+use crate::commission::{DriveTask, Failure, ProcedureError, Report, TargetDrive, Task, bus_session};
 use crate::controller::VirtualClock;
 use crate::controller::port::{Port, open_configured};
 use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
@@ -23,34 +23,38 @@ use super::target::Bus;
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
 
-/// Runs a task on a drive.
+/// Runs a task on a drive. The error is the end of the program: there was no bus to run it on.
 pub fn run(
-    target: TargetDrive,
+    target: &TargetDrive,
     task: Task,
-    bus: Bus,
+    bus: &Bus,
     if_owned: IfOwned,
     options: Options,
-    mut output: Output,
-) -> Exit {
+    output: &mut Output,
+) -> Result<Result<Report, ProcedureError>, Exit> {
+    let DriveTask { procedure, words } = match target.family().commission(target.clone(), task) {
+        Ok(task) => task,
+        Err(failure) => return Ok(Err(ProcedureError { step: "command line", failure })),
+    };
+    output.describe_frames(words);
     // Reading needs it, too: a drive has room for the SDO requests of one master, and a silent one is sent an NMT command.
-    let claim = claim(&bus, target.node);
+    let claim = claim(bus, target.node);
     let mut ownership = match Ownership::claim(claim.into_iter().collect(), if_owned) {
         Ok(ownership) => ownership,
-        Err(error) => return ownership::usage_error(&error).print(options.json),
+        Err(error) => return Err(ownership::usage_error(&error).print(options.json)),
     };
-    let mut port = match open(&bus) {
+    let mut port = match open(bus) {
         Ok(port) => port,
-        Err(error) => return UsageError::from(error.to_string()).print(options.json),
+        Err(error) => return Err(UsageError::from(error.to_string()).print(options.json)),
     };
     let interrupted = match interruption::watch() {
         Ok(interrupted) => interrupted,
         Err(error) => {
             say!("takt: cannot watch for Ctrl-C: {error}");
-            return Exit::Stopped;
+            return Err(Exit::Stopped);
         }
     };
     let is_simulated = matches!(port, Port::Simulated(_));
-    let procedure = procedure(target, task);
     let taken_over_by = Cell::new(None);
     let is_interrupted = || {
         let asking = ownership.poll_release_request();
@@ -78,7 +82,7 @@ pub fn run(
              bit rate right?",
         );
     }
-    output.finish(&outcome)
+    Ok(outcome)
 }
 
 /// Whether no frame that was sent has been acknowledged.
@@ -90,9 +94,9 @@ fn is_unacknowledged(port: &mut Port) -> bool {
 fn claim(bus: &Bus, node: u8) -> Option<BusClaim> {
     match bus {
         Bus::Configured { config, bus } => BusClaim::of(config, *bus),
-        Bus::Interface { name, bit_rate } => Some(BusClaim {
-            bus: name.clone(),
-            interface: name.clone(),
+        Bus::Interface { interface, bit_rate } => Some(BusClaim {
+            bus: interface.to_string(),
+            interface: interface.clone(),
             settings: settings(*bit_rate),
             traffic: MasterTraffic::without_configuration(Some(node)),
         }),
@@ -113,13 +117,13 @@ fn open(bus: &Bus) -> Result<Port, OpenError> {
                 ..of_bit_rate(settings.map(|bus| bus.bit_rate))
             };
             Ok(match open_configured(config, *bus, &socket)? {
-                Some(port) => Port::SocketCan(Box::new(port)),
+                Some(port) => port.into(),
                 None => Port::Simulated(Box::new(SimulatedBus::new(config, *bus))),
             })
         }
-        Bus::Interface { name, bit_rate } => {
-            let port = open_interface(name, name, &settings(*bit_rate), &of_bit_rate(Some(*bit_rate)))?;
-            Ok(Port::SocketCan(Box::new(port)))
+        Bus::Interface { interface, bit_rate } => {
+            let (name, options) = (interface.to_string(), of_bit_rate(Some(*bit_rate)));
+            open_interface(&name, interface, &settings(*bit_rate), &options).map(Port::from)
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The drive that is addressed: an axis of a configuration, or a node on an interface.
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use clap::Args;
 
@@ -8,6 +9,7 @@ use crate::commission::TargetDrive;
 use crate::config::{Config, DriveFamily, Interface, Quantity};
 use crate::family;
 use crate::family::cia402::{self, Device};
+use crate::link::RealInterface;
 
 use super::super::configuration;
 use super::super::usage_error::UsageError;
@@ -19,7 +21,7 @@ pub struct Target {
     config: Option<PathBuf>,
     /// The name of the axis; may be left out if there is only one
     axis: Option<String>,
-    /// The interface: can0, vcan0 …; with a configuration also NAME=INTERFACE or sim
+    /// The interface: can0, vcan0 …, slcan:/dev/ttyACM0; with a configuration also NAME=INTERFACE or sim; serial:/dev/ttyUSB0 for a drive on a serial line
     #[arg(long, value_name = "INTERFACE", global = true)]
     bus: Option<String>,
     /// The node ID
@@ -47,6 +49,47 @@ fn bit_rate(text: &str) -> Result<u32, String> {
     rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 1 Mbit/s".to_owned())
 }
 
+/// How a serial line begins.
+const SERIAL: &str = "serial:";
+/// The bit rate of a serial line that says none.
+const USUAL_LINE_RATE: u32 = 115_200;
+
+/// What the drive is connected to.
+pub enum Place {
+    /// A CAN bus.
+    Bus(Bus),
+    /// A serial line of this machine.
+    Line(Line),
+}
+
+/// A serial line of this machine.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Line {
+    /// The path of the device.
+    pub device: String,
+    /// bit/s
+    pub bit_rate: u32,
+}
+
+impl FromStr for Line {
+    type Err = String;
+
+    /// `/dev/ttyUSB0`, or with a bit rate `/dev/ttyUSB0@19200`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (device, bit_rate) = match text.rsplit_once('@') {
+            Some((device, rate)) => (device, rate.parse().ok().filter(|rate| *rate > 0)),
+            None => (text, Some(USUAL_LINE_RATE)),
+        };
+        match bit_rate {
+            Some(bit_rate) if device.starts_with('/') => Ok(Self { device: device.to_owned(), bit_rate }),
+            _ => Err(format!(
+                "--bus {SERIAL}{text}: write the path of the device, and behind it a bit rate other than {USUAL_LINE_RATE}: \
+                 {SERIAL}/dev/ttyUSB0@19200"
+            )),
+        }
+    }
+}
+
 /// The bus of the drive.
 pub enum Bus {
     /// A bus of a configuration.
@@ -58,8 +101,8 @@ pub enum Bus {
     },
     /// An interface of this machine.
     Interface {
-        /// Its name.
-        name: String,
+        /// The interface.
+        interface: RealInterface,
         /// bit/s
         bit_rate: u32,
     },
@@ -80,30 +123,45 @@ fn family(text: &str) -> Result<DriveFamily, String> {
 
 impl Target {
     /// The drive and its bus.
-    pub fn resolve(&self) -> Result<(TargetDrive, Bus), UsageError> {
-        let (target, bus) = match &self.config {
-            Some(config) => self.of_configuration(config)?,
-            None => self.of_interface()?,
-        };
-        Ok((target, bus))
+    ///
+    /// A scan asks every node ID, so it needs none.
+    pub fn resolve(&self, is_scan: bool) -> Result<(TargetDrive, Place), UsageError> {
+        match &self.config {
+            Some(config) => self.of_configuration(config),
+            None => self.of_interface(is_scan.then_some(1)),
+        }
     }
 
-    fn of_interface(&self) -> Result<(TargetDrive, Bus), UsageError> {
+    /// The drive without its bus.
+    pub fn drive(&self) -> Result<DriveFamily, UsageError> {
+        if self.config.is_some() {
+            return Ok(self.resolve(false)?.0.drive);
+        }
+        self.unconfigured_drive()?
+            .ok_or_else(|| "name the drive: CONFIG AXIS, or --family FAMILY (or --eds FILE)".into())
+    }
+
+    fn of_interface(&self, usual_node: Option<u8>) -> Result<(TargetDrive, Place), UsageError> {
         let family = self.unconfigured_drive()?;
-        let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node, &family) else {
+        let (Some(bus), Some(node), Some(family)) = (&self.bus, self.node.or(usual_node), &family) else {
             return Err(
                 "name the drive: CONFIG AXIS, or --bus INTERFACE --node N --family FAMILY (or --eds FILE)"
                     .into(),
             );
         };
-        let interface = bus.parse::<Interface>();
+        let unconfigured = || {
+            TargetDrive::unconfigured(node, family.clone())
+                .map_err(|error| format!("the units cannot be converted ({error:?})"))
+        };
+        if let Some(line) = bus.strip_prefix(SERIAL) {
+            return Ok((unconfigured()?, Place::Line(line.parse()?)));
+        }
+        let interface = bus.parse::<Interface>().map(|interface| RealInterface::of(&interface));
         match interface {
-            Ok(Interface::SocketCan(name)) => {
-                let target = TargetDrive::unconfigured(node, family.clone())
-                    .map_err(|error| format!("the units cannot be converted ({error:?})"))?;
-                Ok((target, Bus::Interface { name, bit_rate: self.bit_rate }))
+            Ok(Some(interface)) => {
+                Ok((unconfigured()?, Place::Bus(Bus::Interface { interface, bit_rate: self.bit_rate })))
             }
-            Ok(Interface::Simulated) => {
+            Ok(None) => {
                 Err("a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …"
                     .into())
             }
@@ -125,7 +183,7 @@ impl Target {
         Ok(Some(cia402::drive_with(device, counts_per_turn)))
     }
 
-    fn of_configuration(&self, path: &Path) -> Result<(TargetDrive, Bus), UsageError> {
+    fn of_configuration(&self, path: &Path) -> Result<(TargetDrive, Place), UsageError> {
         if self.eds.is_some() {
             return Err(
                 "--eds names a drive without a configuration; in one, the axis says `eds = \"…\"`".into()
@@ -158,6 +216,6 @@ impl Target {
         }
         // A drive that still has the factory's node ID is addressed by that ID.
         target.node = self.node.unwrap_or(target.node);
-        Ok((target, Bus::Configured { config: Box::new(config), bus: axis.bus }))
+        Ok((target, Place::Bus(Bus::Configured { config: Box::new(config), bus: axis.bus })))
     }
 }

@@ -1,4 +1,4 @@
-//! `takt drive … zero | save | restore | set-id | set-bitrate | clear-fault | gains | gear | auto-home | interpolation`
+//! `takt drive … zero | save | restore | set-id | set-bitrate | release-brake | clear-fault | gains | gear | auto-home | interpolation`
 
 use clap::{Args, Subcommand, ValueEnum};
 
@@ -26,6 +26,8 @@ pub enum Action {
         /// "500 kbit/s"
         rate: String,
     },
+    /// Release the brake without torque, until Ctrl-C: nothing holds the joint meanwhile (some drives)
+    ReleaseBrake(Agreement),
     /// Clear the fault or alarm that the drive is in
     ClearFault(Agreement),
     /// Read the gains of the loops, or change some (some drives)
@@ -106,6 +108,7 @@ impl Action {
             Self::Restore(_) => "restore",
             Self::SetId { .. } => "set-id",
             Self::SetBitRate { .. } => "set-bitrate",
+            Self::ReleaseBrake(_) => "release-brake",
             Self::ClearFault(_) => "clear-fault",
             Self::Gains(_) => "gains",
             Self::Gear { .. } => "gear",
@@ -122,6 +125,7 @@ impl Action {
             Self::Restore(agreement) => Task::Restore { is_confirmed: agreement.yes },
             Self::SetId { id } => Task::SetId { node: *id },
             Self::SetBitRate { rate } => Task::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
+            Self::ReleaseBrake(agreement) => Task::ReleaseBrake { is_confirmed: agreement.yes },
             Self::ClearFault(agreement) => Task::ClearFault { is_confirmed: agreement.yes },
             Self::Gains(gains) => Task::Gains {
                 position_proportional: gains.position_proportional.map(i64::from),

@@ -13,7 +13,7 @@ use crate::config::{Interface, Quantity};
 use crate::controller::VirtualClock;
 use crate::family;
 use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
-use crate::link::{InterfaceSettings, SocketCanOptions, open_socketcan};
+use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions, open_interface};
 use crate::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds};
@@ -44,7 +44,7 @@ const MOST_DEVICES: usize = 127;
 #[derive(Args, Debug)]
 #[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions", after_help = families_without_lss())]
 pub struct Arguments {
-    /// The interface: can0, vcan0 …; or sim, with the devices of --simulate
+    /// The interface: can0, vcan0 …, slcan:/dev/ttyACM0; or sim, with the devices of --simulate
     #[arg(long, value_name = "INTERFACE")]
     bus: Interface,
     /// The bit rate of the interface
@@ -152,24 +152,24 @@ pub fn run(arguments: &Arguments) -> Exit {
     };
     let is_interrupted = || interrupted.load(Ordering::Relaxed);
     let refuse = |words: String| UsageError::from(words).print(arguments.json);
-    match &arguments.bus {
-        Interface::Simulated if arguments.simulate.is_empty() => {
+    match RealInterface::of(&arguments.bus) {
+        None if arguments.simulate.is_empty() => {
             refuse("a simulated bus has no devices of its own: add --simulate IDENTITY".to_owned())
         }
-        Interface::Simulated => {
+        None => {
             let devices = arguments.simulate.iter();
             let mut bus = LssBus::new(devices.copied().map(LssDevice::from));
             lead(arguments, &mut bus, &mut VirtualClock::default(), is_interrupted)
         }
-        Interface::SocketCan(_) if !arguments.simulate.is_empty() => {
+        Some(_) if !arguments.simulate.is_empty() => {
             refuse("--simulate is for a simulated bus: --bus sim".to_owned())
         }
-        Interface::SocketCan(name) => {
-            let bit_rate = arguments.bit_rate;
+        Some(interface) => {
+            let (name, bit_rate) = (interface.to_string(), arguments.bit_rate);
             let settings = InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
             let claim = BusClaim {
                 bus: name.clone(),
-                interface: name.clone(),
+                interface: interface.clone(),
                 settings,
                 traffic: MasterTraffic::without_configuration(None),
             };
@@ -182,9 +182,10 @@ pub fn run(arguments: &Arguments) -> Exit {
                 is_taken_over |= ownership.poll_release_request().is_some();
                 is_taken_over || is_interrupted()
             };
-            match open_socketcan(name, &SocketCanOptions { bit_rate, ..SocketCanOptions::default() }) {
+            let options = SocketCanOptions { bit_rate, ..SocketCanOptions::default() };
+            match open_interface(&name, &interface, &settings, &options) {
                 Ok(mut port) => lead(arguments, &mut port, &mut MonotonicClock::default(), is_interrupted),
-                Err(error) => refuse(format!("bus {name}: {error}")),
+                Err(error) => refuse(error.to_string()),
             }
         }
     }

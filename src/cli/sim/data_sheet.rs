@@ -5,9 +5,11 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::canopen::eds;
+use crate::config::FrictionShape;
 use crate::config::quirks::{self, Quirks};
+use crate::config::{Interface, InterfaceError};
 use crate::link::ownership::{InterfaceLock, lock_for_simulator};
-use crate::link::{InterfaceSettings, SocketCanOptions, open_interface};
+use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions, open_interface};
 use crate::sim::LiveDrives;
 use crate::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters, counts_per_turn};
 use crate::sim::homing_switches::{ReferenceSwitches, Switch};
@@ -24,14 +26,14 @@ const RESTART_MS: u32 = 100;
 pub struct DataSheetArguments {
     /// Put one CiA 402 drive on an interface that is made from this EDS or DCF file, instead of a configuration's
     #[arg(long = "eds", value_name = "FILE", requires_all = ["node", "interface"])]
-    #[arg(conflicts_with_all = ["config", "buses", "lss_devices"])]
+    #[arg(conflicts_with_all = ["config", "buses", "adapters", "lss_devices"])]
     sheet: Option<PathBuf>,
     /// Its node ID
     #[arg(long, value_name = "N", requires = "sheet", value_parser = clap::value_parser!(u8).range(1..=127))]
     node: Option<u8>,
-    /// The interface: can0, vcan0 …
-    #[arg(long, requires = "sheet")]
-    interface: Option<String>,
+    /// The interface: can0, vcan0 …, slcan:/dev/ttyACM0
+    #[arg(long, requires = "sheet", value_parser = real_interface)]
+    interface: Option<RealInterface>,
     /// Its quirks, as in drives/*.toml
     #[arg(long, value_name = "FILE", requires = "sheet")]
     quirks: Option<PathBuf>,
@@ -45,6 +47,12 @@ pub struct DataSheetArguments {
     /// Bit/s
     #[arg(long, requires = "sheet", default_value_t = 1_000_000)]
     bit_rate: u32,
+}
+
+fn real_interface(text: &str) -> Result<RealInterface, String> {
+    let interface: Interface =
+        text.parse().map_err(|error: InterfaceError| format!("{error}: {}", error.help()))?;
+    RealInterface::of(&interface).ok_or_else(|| "a simulated bus is inside one process alone".to_owned())
 }
 
 /// The drive on its interface; the lock is held until the drive is gone. `None` without `--eds`.
@@ -73,12 +81,13 @@ pub fn open(arguments: &DataSheetArguments) -> Result<Option<(LiveDrives, Interf
         seed: 1,
     };
     let drive = Cia402Drive::new(parameters).map_err(|error| words(&error))?;
-    let lock = lock_for_simulator(interface, interface).map_err(|error| words(&error))?;
+    let name = interface.to_string();
+    let lock = lock_for_simulator(&name, interface).map_err(|error| words(&error))?;
     let settings =
         InterfaceSettings { bit_rate: arguments.bit_rate, data_bit_rate: None, restart_ms: RESTART_MS };
     let options = SocketCanOptions { bit_rate: arguments.bit_rate, ..SocketCanOptions::default() };
-    let port = open_interface(interface, interface, &settings, &options).map_err(|error| words(&error))?;
-    Ok(Some((LiveDrives::new(vec![Box::new(drive)], port), lock)))
+    let port = open_interface(&name, interface, &settings, &options).map_err(|error| words(&error))?;
+    Ok(Some((LiveDrives::new(vec![Box::new(drive)], port.into_live()), lock)))
 }
 
 /// A small joint: a motor of 0.5 kW with 15 turns of travel between its limit switches, and a home switch at its middle.
@@ -89,6 +98,7 @@ fn joint(counts_per_turn: f64) -> Cia402AxisParameters {
             inertia: 0.005,
             viscous_friction: 0.002,
             coulomb_friction: 0.05,
+            friction_shape: FrictionShape::Constant,
             brake_torque: 10.0,
         },
         encoder: Encoder { counts_per_unit: counts_per_turn / TURN, zero_counts: 0.0 },

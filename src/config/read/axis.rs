@@ -15,8 +15,8 @@ use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use crate::config::model::{
-    Axis, FeedForward, Feedback, Follow, Identity, Interface, Joint, Limits, PdoMapping, PowerUpState,
-    SimulatedJoint, Travel,
+    Axis, FeedForward, Feedback, Follow, FrictionShape, Identity, Interface, Joint, Limits, PdoMapping,
+    PowerUpState, SimulatedJoint, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -108,7 +108,9 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let family = section
         .require("drive", format!("the family of the drive: drive = \"{example}\""))
         .and_then(|entry| entry.choice(&families));
-    let family_drive = family.and_then(|family| family.read(&mut FamilyKeys::of(&mut section)));
+    let mut simulated_section = section.section("simulated");
+    let family_drive =
+        family.and_then(|family| family.read(&mut FamilyKeys::of(&mut section, &mut simulated_section)));
     let drive = family_drive.as_deref();
     if let Some((entry, node)) = node_entry.as_ref().zip(node) {
         check_node(entry, node, drive, bus, machine, earlier);
@@ -128,8 +130,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let mut joint_section = section.section("joint");
     let joint = joint(&mut joint_section, q);
     let rated_torque = joint.rated_torque.or(limits.map(|limits| limits.torque)).unwrap_or(1.0);
-    let simulated =
-        simulated(section.section("simulated"), q, limits.as_ref(), rated_torque, drive, name.as_deref());
+    let simulated = simulated(simulated_section, q, limits.as_ref(), rated_torque, drive, name.as_deref());
     let transmission_type = transmission_type(&mut section);
     let period_ns = machine.period_ns(bus);
     let surroundings = period_ns.map(|period_ns| {
@@ -171,7 +172,6 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
     let identity = identity(section.section("identity"), drive);
     let dcf = section.get("dcf").and_then(|entry| dcf(&entry, node));
-    section.finish();
 
     let place = bus.zip(node);
     let build = || {
@@ -215,6 +215,13 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         })
     };
     let axis = build();
+    if let Some(axis) = &axis {
+        let at = |key: &str| section.spot(key);
+        rules::bit_fields::axis(axis, machine.bus(bus).and_then(|bus| bus.bus.as_ref()), at);
+        let others = earlier.iter().filter_map(|other| Some((other.axis.as_ref()?, Some(&other.header))));
+        rules::identifiers::axis(axis, others, machine.master_node, at);
+    }
+    section.finish();
     ReadAxis { name, quantities: q, limits, axis, place, drive: family_drive, header }
 }
 
@@ -236,7 +243,21 @@ fn check_node(
     machine: &Machine<'_>,
     earlier: &[ReadAxis],
 ) {
+    if let Some(drive) = drive {
+        rules::axis::own_node(&entry.spot, drive, node);
+    }
     let Some(bus) = bus else { return };
+    for other in earlier {
+        if let (Some(drive), Some(theirs), Some((other_bus, other_node))) =
+            (drive, other.drive.as_deref(), other.place)
+            && other_bus == bus
+            && other_node != node
+            && let Some(kind) =
+                rules::axis::shared_identifier(&entry.spot, (drive, node), (theirs, other_node))
+        {
+            entry.spot.report_against(kind, &other.header);
+        }
+    }
     let bus_name = machine.bus(Some(bus)).and_then(|bus| bus.name.as_deref()).unwrap_or_default();
     let kind = rules::axis::duplicate_node(bus_name, node);
     let is_other = |axis: &&ReadAxis| {
@@ -282,6 +303,12 @@ fn simulated(
         rules::simulation::initial_position(&entry.spot, position, q, limits, name);
         Some(position)
     });
+    let friction = section.get("friction").and_then(|entry| {
+        entry.choice(&[
+            ("constant", FrictionShape::Constant),
+            ("harmonic-drive", FrictionShape::HarmonicDrive),
+        ])
+    });
     let power_up = section.get("power_up").and_then(|entry| {
         let choices =
             [("pre-operational", PowerUpState::PreOperational), ("operational", PowerUpState::Operational)];
@@ -302,6 +329,7 @@ fn simulated(
     section.finish();
     SimulatedJoint {
         gravity: gravity.unwrap_or(0.0),
+        friction: friction.unwrap_or_default(),
         peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
         initial_position: initial.unwrap_or_else(|| limits.map_or(0.0, defaults::initial_position)),
         power_up: power_up.unwrap_or_default(),

@@ -67,7 +67,13 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> 
         .and_then(|entry| rules::bus::bit_rate(&entry.spot, entry.unbounded(Quantity::BIT_RATE)?));
     let bit_rate = bit_rate.unwrap_or(defaults::BIT_RATE);
     let data_bit_rate = section.get("data_bit_rate").and_then(|entry| {
-        rules::bus::data_bit_rate(&entry.spot, entry.unbounded(Quantity::BIT_RATE)?, bit_rate)
+        let rate = entry.unbounded(Quantity::BIT_RATE)?;
+        rules::bus::data_bit_rate(
+            &entry.spot,
+            rate,
+            bit_rate,
+            interface.as_ref().unwrap_or(&Interface::Simulated),
+        )
     });
     let divider = section.get("period").map_or(Some(1), |entry| divider(&entry, cycle_ns));
     let restart_ms = section.get("restart_ms").and_then(|entry| entry.integer(ranges::RESTART_MS));

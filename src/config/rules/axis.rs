@@ -3,7 +3,7 @@
 use takt_rt::{MAX_AXES, OperationMode};
 
 use super::loops::Surroundings;
-use super::{Fields, limits, loops, master, name, simulation};
+use super::{Fields, bit_fields, identifiers, limits, loops, master, name, simulation};
 use crate::config::drive_family::{DriveFacts, ModeChangeRule};
 use crate::config::mode_words::{MODES, mode_word};
 use crate::config::model::{
@@ -37,6 +37,9 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
         validate_place(axis, earlier, config, &fields);
         validate_motion(axis, config, &fields);
         validate_process_data(axis, &fields);
+        let at = |key: &str| fields.at(key);
+        bit_fields::axis(axis, config.buses.get(axis.bus), at);
+        identifiers::axis(axis, earlier.iter().map(|other| (other, None)), config.master.node, at);
     }
 }
 
@@ -66,7 +69,50 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
             }
         }
     }
+    own_node(&spot, &axis.drive, axis.node);
+    let others = earlier.iter().filter(|other| other.bus == axis.bus && other.node != axis.node);
+    for other in others {
+        if let Some(kind) = shared_identifier(&spot, (&axis.drive, axis.node), (&other.drive, other.node)) {
+            spot.report(kind);
+        }
+    }
     bit_rate(&fields.at("bus.bit_rate"), &axis.drive, bus.bit_rate);
+}
+
+/// A protocol that is not CANopen may have room for fewer node IDs.
+pub fn own_node(spot: &Spot<'_>, drive: &DriveFacts, node: u8) {
+    if let Some(own) = drive.own_identifiers.filter(|own| node > own.last_node) {
+        spot.report_range(
+            node.to_string(),
+            format!("1 to {}, the node IDs of an {}", own.last_node, drive.name),
+        );
+    }
+}
+
+/// What is wrong with two drives of one bus of which one does not speak CANopen, and that have an identifier in common.
+pub fn shared_identifier(
+    spot: &Spot<'_>,
+    (drive, node): (&DriveFacts, u8),
+    (other, other_node): (&DriveFacts, u8),
+) -> Option<ProblemKind> {
+    if drive.own_identifiers.is_none() && other.own_identifiers.is_none() {
+        return None;
+    }
+    // Theirs are those of their descriptions: `rules::identifiers` looks at them.
+    if drive.has_field_frames || other.has_field_frames {
+        return None;
+    }
+    let theirs = other.identifiers(other_node);
+    let id = drive.identifiers(node).into_iter().find(|id| theirs.contains(id))?;
+    Some(ProblemKind::OutOfRange {
+        key: spot.key.clone(),
+        value: format!(
+            "{node}, by which the {} and node {other_node} both use {:03X}",
+            drive.name,
+            id.value()
+        ),
+        allowed: "a node ID whose identifiers no other drive on the bus has".to_owned(),
+    })
 }
 
 pub fn unknown_bus(given: &str, known: &[&str]) -> ProblemKind {

@@ -1,6 +1,7 @@
 //! The buses.
 
 use takt_rt::MAX_BUSES;
+use takt_rt::slcan::DataBitRate;
 
 use super::{Fields, name};
 use crate::config::bounds::Bounds;
@@ -34,7 +35,7 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
         divider(&fields.at("period"), bus.divider, config.cycle.period_ns);
         bit_rate(&fields.at("bit_rate"), f64::from(bus.bit_rate));
         if let Some(rate) = bus.data_bit_rate {
-            data_bit_rate(&fields.at("data_bit_rate"), f64::from(rate), bus.bit_rate);
+            data_bit_rate(&fields.at("data_bit_rate"), f64::from(rate), bus.bit_rate, &bus.interface);
         }
         fields.at("restart_ms").integer(bus.restart_ms, &ranges::RESTART_MS);
         let service_frames = fields.at("service_frames_per_cycle");
@@ -56,16 +57,23 @@ pub fn duplicate_interface(interface: &Interface) -> ProblemKind {
 
 /// Simulated buses are each a bus of their own.
 pub fn is_same_device(one: &Interface, other: &Interface) -> bool {
-    one == other && *one != Interface::Simulated
+    match (one, other) {
+        (Interface::Slcan(one), Interface::Slcan(other)) => one.device == other.device,
+        _ => one == other && *one != Interface::Simulated,
+    }
 }
 
 /// A name that was set in code is one that could have been read.
 fn interface(spot: &Spot<'_>, interface: &Interface) {
-    let Interface::SocketCan(given) = interface else { return };
+    let given = match interface {
+        Interface::Simulated => return,
+        Interface::SocketCan(name) => name.clone(),
+        Interface::Slcan(_) => interface.to_string(),
+    };
     match given.parse::<Interface>() {
         Ok(parsed) if parsed == *interface => {}
         Ok(_) => {
-            spot.report_range(format!("{given:?}"), "Interface::Simulated, which is not SocketCAN".to_owned())
+            spot.report_range(format!("{given:?}"), "what Interface::from_str makes of this text".to_owned())
         }
         Err(reason) => spot.report(ProblemKind::Interface { reason }),
     }
@@ -87,8 +95,15 @@ pub fn bit_rate(spot: &Spot<'_>, rate: f64) -> Option<u32> {
     found
 }
 
-/// The data phase is at least as fast as the arbitration phase.
-pub fn data_bit_rate(spot: &Spot<'_>, rate: f64, bit_rate: u32) -> Option<u32> {
+/// The data phase is at least as fast as the arbitration phase. An SLCAN adapter has some bit rates alone.
+pub fn data_bit_rate(spot: &Spot<'_>, rate: f64, bit_rate: u32, interface: &Interface) -> Option<u32> {
     let bounds = Bounds::Between(bit_rate.into(), ranges::DATA_BIT_RATE_AT_MOST);
-    spot.quantity(rate, Quantity::BIT_RATE, bounds).map(|rate| rate.round() as u32)
+    let rate = spot.quantity(rate, Quantity::BIT_RATE, bounds).map(|rate| rate.round() as u32)?;
+    if matches!(interface, Interface::Slcan(_)) && DataBitRate::of(rate).is_none() {
+        let show = |rate: u32| Quantity::BIT_RATE.show(rate.into());
+        let allowed = DataBitRate::all().map(show).join(", ");
+        spot.report_range(show(rate), format!("a bit rate that SLCAN adapters have: {allowed}"));
+        return None;
+    }
+    Some(rate)
 }

@@ -2,9 +2,11 @@
 //! [`Config::validate`] to a field.
 
 pub mod axis;
+pub mod bit_fields;
 pub mod bus;
 pub mod cycle;
 pub mod group;
+pub mod identifiers;
 pub mod limits;
 mod loop_stability;
 pub mod loops;

@@ -8,7 +8,7 @@
 
 use std::cell::{Cell, Ref, RefCell};
 
-use takt_rt::{MappedObject, Nanoseconds};
+use takt_rt::{Frame, MappedObject, Nanoseconds};
 
 use super::check::Check;
 use super::facts::AxisFacts;
@@ -234,6 +234,13 @@ impl<'a> AxisSession<'a> {
             self.bus.sleep(POLL_NS).await;
         };
         self.settled(awaited)
+    }
+
+    /// Sends a frame; not in a dry run.
+    pub fn send(&self, frame: Frame) {
+        if !self.is_dry_run() {
+            self.bus.send(frame);
+        }
     }
 
     /// Waits for a time; not in a dry run.

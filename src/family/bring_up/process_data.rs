@@ -75,7 +75,7 @@ impl PdoPlan {
 }
 
 /// The PDOs of one axis.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ProcessData {
     /// The PDOs that the controller sends (RPDOs of the drive).
     pub commands: Vec<PdoPlan>,

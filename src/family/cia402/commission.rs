@@ -39,6 +39,9 @@ fn unsupported(task: &Task) -> Failure {
         Task::Gains { .. } => {
             ("the gains are the vendor's own objects", "`read` and `write` them by index:subindex")
         }
+        Task::ReleaseBrake { .. } => {
+            ("how a brake is released is not part of the drive profile", "`enable` releases it, with torque")
+        }
         _ => (
             "this is done with a YZ-AIM only",
             "`read` and `write` the objects of this drive by index:subindex",

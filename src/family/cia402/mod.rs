@@ -16,12 +16,12 @@ pub use starting::starting_configuration;
 
 use std::path::PathBuf;
 
-use takt_rt::{Id, MappedObject};
+use takt_rt::{Frame, Id, MappedObject};
 
 use super::bring_up::AxisSession;
 use super::commission::dictionary::ObjectEntry;
-use super::commission::{SdoSession, TargetDrive, Task, profile};
-use super::{CarryingOut, DataSheet, Family, SettingUp};
+use super::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
+use super::{DataSheet, Family, SettingUp};
 use crate::canopen::object::Object;
 use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
@@ -134,13 +134,8 @@ impl Family for Cia402 {
         profile::objects::meaning(drive, object, value)
     }
 
-    fn carry_out<'a>(
-        &'a self,
-        session: &'a SdoSession,
-        target: &'a TargetDrive,
-        task: Task,
-    ) -> CarryingOut<'a> {
-        Box::pin(commission::carry_out(session, target, task))
+    fn commission(&self, target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failure> {
+        over_sdo(target, task, commission::carry_out)
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

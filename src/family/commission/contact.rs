@@ -1,6 +1,6 @@
 //! First contact with a drive: checks that it answers SDO requests, and that its vendor ID is the expected one.
 
-use super::failure::Failure;
+use super::failure::{AnsweredProtocol, Failure};
 use super::report::Report;
 use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
@@ -77,10 +77,10 @@ pub async fn report_identity(c: &SdoSession, s: &TargetDrive, report: &mut Repor
 }
 
 /// Checks for firmware without CANopen, by a request in the vendor's own protocol that changes nothing.
-async fn other_protocol(c: &SdoSession, target: &TargetDrive) -> Result<Option<&'static str>, Failure> {
+async fn other_protocol(c: &SdoSession, target: &TargetDrive) -> Result<Option<AnsweredProtocol>, Failure> {
     let Some(other) = target.family().other_protocol(target.node) else { return Ok(None) };
     c.send(other.request);
     let collected = c.collect_frames(OTHER_PROTOCOL_NS).await?;
     let has_answered = collected.iter().any(|frame| frame.id() == other.answer);
-    Ok(has_answered.then_some(other.name))
+    Ok(has_answered.then_some(AnsweredProtocol { name: other.name, cure: other.cure }))
 }

@@ -40,6 +40,22 @@ pub enum ObjectUnit {
     Of(f64, &'static str),
 }
 
+impl ObjectUnit {
+    /// The unit in words; empty for a plain number.
+    fn words(self) -> String {
+        match self {
+            Self::None => String::new(),
+            Self::Position | Self::Distance => "count".to_owned(),
+            Self::Velocity => "the drive's unit of velocity".to_owned(),
+            Self::VelocityTenth => "a tenth of the drive's unit of velocity".to_owned(),
+            Self::ProfileVelocity => "the drive's unit of profile velocity".to_owned(),
+            Self::Acceleration => "the drive's unit of acceleration".to_owned(),
+            Self::Torque => "per mille of the rated torque".to_owned(),
+            Self::Of(factor, unit) => format!("{factor} {unit}"),
+        }
+    }
+}
+
 /// An object dictionary entry with its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectEntry {
@@ -131,6 +147,40 @@ impl ObjectEntry {
             _ => target.acceleration_raw(value),
         })
     }
+}
+
+/// What can be read or written by its name, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NamedEntry {
+    /// Where it is, as the user may write it.
+    pub address: String,
+    /// Its name.
+    pub name: &'static str,
+    /// What may be done with it: "read", "read, write", "write" or "command".
+    pub access: &'static str,
+    /// The unit of its number in the drive; empty for a plain number.
+    pub unit: String,
+    /// Which numbers it takes or shows, with their meanings; empty if any.
+    pub values: String,
+    /// What else must be known of it; empty if nothing.
+    pub note: &'static str,
+}
+
+/// The objects that the family of a drive knows by name.
+pub fn entries(drive: &DriveFamily) -> Vec<NamedEntry> {
+    let known = family::of(drive).objects().iter().filter_map(|known| entry(drive, known.object.address));
+    let named = known.map(|entry| NamedEntry {
+        address: entry.object.address.to_string(),
+        name: entry.object.name,
+        access: match entry.permission {
+            Permission::Read => "read",
+            Permission::Write => "read, write",
+        },
+        unit: entry.unit.words(),
+        values: String::new(),
+        note: "",
+    });
+    named.collect()
 }
 
 /// An object selected by the user.

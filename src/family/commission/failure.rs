@@ -23,7 +23,7 @@ pub enum Failure {
         /// The last NMT state that it has reported.
         reported: Option<NmtState>,
         /// Another protocol that did get an answer.
-        other_protocol: Option<&'static str>,
+        other_protocol: Option<AnsweredProtocol>,
     },
     /// A transfer failed.
     #[error("{}: {error}", access.words(object))]
@@ -35,7 +35,15 @@ pub enum Failure {
         /// Why it failed.
         error: SdoError,
     },
-    /// AxisReading a text or bytes failed.
+    /// A request in a protocol without an object dictionary failed.
+    #[error("{what}")]
+    Request {
+        /// The request, and why it failed.
+        what: String,
+        /// What to do about it.
+        cure: Option<&'static str>,
+    },
+    /// Reading a text or bytes failed.
     #[error("reading {object}: {error}")]
     TextTransfer {
         /// The object.
@@ -187,10 +195,18 @@ fn nmt_words(reported: Option<NmtState>) -> String {
     reported.map_or_else(String::new, |state| format!("; the last state that it has reported is {state}"))
 }
 
-fn other_words(name: Option<&'static str>) -> String {
-    name.map_or_else(String::new, |name| {
-        format!(", but it did answer the {name}: it has no CANopen firmware")
-    })
+fn other_words(answered: Option<AnsweredProtocol>) -> String {
+    answered
+        .map_or_else(String::new, |AnsweredProtocol { name, .. }| format!(", but it did answer the {name}"))
+}
+
+/// A protocol in which a drive did answer, other than the expected one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AnsweredProtocol {
+    /// Its name.
+    pub name: &'static str,
+    /// What to do then.
+    pub cure: &'static str,
 }
 
 fn advice_words(advice: &Option<&'static str>) -> String {
@@ -222,7 +238,7 @@ impl Failure {
     /// The remedy.
     pub fn advice(&self) -> Option<&'static str> {
         match self {
-            Self::Silent { other_protocol: Some(_), .. } => Some("load CANopen firmware into the drive"),
+            Self::Silent { other_protocol: Some(answered), .. } => Some(answered.cure),
             Self::Silent { .. } => Some(
                 "check the node ID (`--node`), the drive's supply, the wiring and the termination of the bus, and \
                  its bit rate",
@@ -237,6 +253,7 @@ impl Failure {
                 Some("the drive has no such object")
             }
             Self::Faulted { advice: None, .. } => Some("clear it with `clear-fault`"),
+            Self::Request { cure, .. } => *cure,
             Self::OtherDrive { .. } => Some("check the node ID and the family"),
             _ => None,
         }

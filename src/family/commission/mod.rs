@@ -3,42 +3,41 @@
 //! ```text
 //! task ── procedure ── takes the time and frames; returns frames, events and an outcome
 //!            │
-//!       sdo_session ── transfers, pauses and conditions to await, each of which may be interrupted
+//!         family ── one folder a family: entries, errors, motions of its own, and the client of its protocol
 //!            │
 //!        profile ── the tasks of every drive that keeps to CiA 402
-//!         family ── one folder a family: objects, alarms, motions of its own
+//!       sdo_task ── a task of a drive with an object dictionary
+//!    sdo_session ── transfers, pauses and conditions to await, each of which may be interrupted
 //!            │
 //!     target, motion_profile ── units and limits of the axis
 //! ```
 //!
-//! `meaning` describes the frames of a procedure.
+//! `meaning` describes the frames of a CANopen node.
 
 pub(crate) mod command_value;
 pub(super) mod contact;
 pub(crate) mod dictionary;
 pub(super) mod failure;
 pub(super) mod guarded;
-#[cfg(feature = "cli")]
-pub(crate) mod meaning;
+mod meaning;
 pub(super) mod motion_profile;
-#[cfg(feature = "cli")]
-pub(super) mod objects;
+mod objects;
 pub(super) mod polling;
 pub(super) mod profile;
 pub(super) mod report;
-#[cfg(feature = "cli")]
-pub(crate) mod running;
+mod running;
 pub(super) mod scan;
 pub(super) mod sdo_session;
+mod sdo_task;
 pub(super) mod target;
 pub(super) mod task;
 
-pub use dictionary::{ObjectEntry, ObjectUnit, Permission};
-pub use failure::Failure;
+pub use dictionary::{NamedEntry, ObjectEntry, ObjectUnit, Permission};
+pub use failure::{AnsweredProtocol, Failure};
 pub use motion_profile::{DEFAULT_SHARE, DriveProfile, MotionProfile};
 pub use report::{Report, ReportItem};
-#[cfg(feature = "cli")]
-pub(crate) use running::{Procedure, ProcedureError, procedure};
+pub use running::{DriveTask, ProcedureError, RunningTask};
 pub use sdo_session::SdoSession;
+pub use sdo_task::over_sdo;
 pub use target::{CommandValue, TargetDrive};
-pub use task::{MoveKind, ReadObject, Task};
+pub use task::{MoveKind, Task, ValueText};

@@ -3,14 +3,87 @@
 use serde_json::json;
 
 use super::contact;
-use super::dictionary::{ObjectEntry, Permission};
+use super::dictionary::{self, ObjectEntry, Permission, SelectedObject};
 use super::failure::Failure;
 use super::report::Report;
 use super::sdo_session::{SdoSession, number};
 use super::target::TargetDrive;
-use super::task::ReadObject;
-use crate::canopen::object::Object;
+use super::task::ValueText;
+use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::canopen::sdo::Uploaded;
+
+/// An object to read.
+pub struct ReadObject {
+    address: ObjectAddress,
+    /// Its dictionary entry, if it is known.
+    entry: Option<ObjectEntry>,
+    /// The data type given by the user.
+    data_type: Option<DataType>,
+}
+
+/// An object to write.
+pub struct WriteObject {
+    object: Object,
+    value: i64,
+    /// Its dictionary entry, if it is known.
+    entry: Option<ObjectEntry>,
+}
+
+/// Finds the objects that the user named.
+pub fn to_read(
+    target: &TargetDrive,
+    names: &[String],
+    data_type: Option<DataType>,
+) -> Result<Vec<ReadObject>, Failure> {
+    let objects = names.iter().map(|name| {
+        Ok(match dictionary::find(&target.drive, name)? {
+            SelectedObject::Known(entry) => {
+                ReadObject { address: entry.object.address, entry: Some(entry), data_type }
+            }
+            SelectedObject::Unknown(address) => ReadObject { address, entry: None, data_type },
+        })
+    });
+    objects.collect()
+}
+
+/// Finds the object that the user named, and evaluates the value.
+pub fn to_write(
+    target: &TargetDrive,
+    name: &str,
+    value: &ValueText,
+    data_type: Option<DataType>,
+) -> Result<WriteObject, Failure> {
+    let (object, entry) = match (dictionary::find(&target.drive, name)?, data_type) {
+        (SelectedObject::Known(entry), None) => (entry.object, Some(entry)),
+        (SelectedObject::Known(entry), Some(data_type)) if data_type == entry.object.data_type => {
+            (entry.object, Some(entry))
+        }
+        (SelectedObject::Known(entry), Some(_)) => {
+            return Err(Failure::Unsuitable(format!(
+                "{} is {:?}, not what --type says",
+                entry.object, entry.object.data_type
+            )));
+        }
+        (SelectedObject::Unknown(address), Some(data_type)) => {
+            (Object { address, data_type, name: "object" }, None)
+        }
+        (SelectedObject::Unknown(address), None) => {
+            return Err(Failure::Unsuitable(format!(
+                "nothing is known of {address}: say its type with --type (u8, i8, u16, i16, u32, i32)"
+            )));
+        }
+    };
+    let value = match entry {
+        Some(entry) => entry.parse(target, &value.text, value.is_raw)?,
+        None => dictionary::integer(&value.text)
+            .ok_or_else(|| Failure::Unsuitable(format!("`{}` is no whole number", value.text)))?,
+    };
+    if entry.is_some_and(|entry| entry.permission == Permission::Read) {
+        return Err(Failure::Unsuitable(format!("{object} can only be read")));
+    }
+    object.data_type.encode(value).ok_or(Failure::DoesNotFit { object, value })?;
+    Ok(WriteObject { object, value, entry })
+}
 
 /// Reads objects in order.
 pub async fn read(c: &SdoSession, target: &TargetDrive, objects: &[ReadObject]) -> Result<Report, Failure> {
@@ -61,17 +134,8 @@ pub async fn read(c: &SdoSession, target: &TargetDrive, objects: &[ReadObject]) 
 }
 
 /// Writes an object and reads it back.
-pub async fn write(
-    c: &SdoSession,
-    target: &TargetDrive,
-    object: Object,
-    value: i64,
-    entry: Option<ObjectEntry>,
-) -> Result<Report, Failure> {
-    if entry.is_some_and(|entry| entry.permission == Permission::Read) {
-        return Err(Failure::Unsuitable(format!("{object} can only be read")));
-    }
-    object.data_type.encode(value).ok_or(Failure::DoesNotFit { object, value })?;
+pub async fn write(c: &SdoSession, target: &TargetDrive, write: WriteObject) -> Result<Report, Failure> {
+    let WriteObject { object, value, entry } = write;
     contact::connect(c, target).await?;
     c.step("write");
     c.write(&object, value).await?;

@@ -2,10 +2,9 @@
 
 use takt_rt::Nanoseconds;
 
-use super::dictionary::ObjectEntry;
 use super::motion_profile::MotionProfile;
 use super::target::CommandValue;
-use crate::canopen::object::{DataType, Object, ObjectAddress};
+use crate::canopen::object::DataType;
 
 /// A task with one drive.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,19 +12,23 @@ use crate::canopen::object::{DataType, Object, ObjectAddress};
 pub enum Task {
     /// Read identity, ratings and condition.
     Info,
-    /// Read objects.
+    /// Find the drives on the bus that speak the same protocol.
+    Scan,
+    /// Read objects, or the entries that a drive has in their place.
     Read {
-        /// The objects.
-        objects: Vec<ReadObject>,
+        /// Their names or addresses, as the user wrote them.
+        names: Vec<String>,
+        /// The data type given by the user.
+        data_type: Option<DataType>,
     },
-    /// Write an object, and read it back if it is readable.
+    /// Write an object or entry, and read it back if it is readable.
     Write {
-        /// The object.
-        object: Object,
-        /// The raw value.
-        value: i64,
-        /// The dictionary entry, if the object is known.
-        entry: Option<ObjectEntry>,
+        /// Its name or address, as the user wrote it.
+        name: String,
+        /// The value.
+        value: ValueText,
+        /// The data type given by the user.
+        data_type: Option<DataType>,
     },
     /// Enable the drive for a time.
     Enable {
@@ -96,6 +99,11 @@ pub enum Task {
         /// bit/s
         bit_rate: u32,
     },
+    /// Release the brake without torque.
+    ReleaseBrake {
+        /// Whether the user confirmed that nothing holds the joint.
+        is_confirmed: bool,
+    },
     /// Clear the drive's fault.
     ClearFault {
         /// Whether the user confirmed the loss of the turn count, where clearing causes it.
@@ -133,15 +141,29 @@ pub enum Task {
     Interpolation,
 }
 
-/// An object to read.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ReadObject {
-    /// Its address.
-    pub address: ObjectAddress,
-    /// Its dictionary entry, if it is known.
-    pub entry: Option<ObjectEntry>,
-    /// The data type given by the user.
-    pub data_type: Option<DataType>,
+impl Task {
+    /// The same task, to which the user has agreed.
+    #[must_use]
+    pub fn confirmed(mut self) -> Self {
+        match &mut self {
+            Self::Zero { is_confirmed }
+            | Self::Restore { is_confirmed }
+            | Self::ReleaseBrake { is_confirmed }
+            | Self::ClearFault { is_confirmed }
+            | Self::AutoHome { is_confirmed, .. } => *is_confirmed = true,
+            _ => {}
+        }
+        self
+    }
+}
+
+/// A value to write, as the user wrote it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ValueText {
+    /// The text: with a unit, a whole number, or a word where the entry has words for its values.
+    pub text: String,
+    /// Whether it is a whole number in the drive's own unit.
+    pub is_raw: bool,
 }
 
 /// The kind of a move.
@@ -161,8 +183,8 @@ pub enum MoveKind {
     Reciprocate {
         /// The position.
         to: CommandValue,
-        /// Number of repetitions.
-        times: u32,
+        /// Number of repetitions; `None`: until it is interrupted.
+        times: Option<u32>,
         /// Dwell time at each end.
         dwell_ns: Nanoseconds,
     },

@@ -1,14 +1,17 @@
 //! The motions of a drive: absolute, relative, reciprocating, continuous, by velocity and by torque (eRunner manual 7.4 and
 //! chapter 4).
 //!
-//! Every motion ends with the motor at rest and disabled, whether it arrives, is interrupted, or fails.
+//! Every motion ends with the motor at rest and disabled, whether it arrives, is interrupted, or fails. It stays enabled at rest
+//! only where that is asked for, and nothing has failed.
 
 use std::fmt;
 
 use takt_rt::Nanoseconds;
 
+use super::reading::{self, STANDING};
 use crate::erob_can::client::{RequestError, RequestFailure};
 use crate::erob_can::entries::{self, Entry};
+use crate::family::commission::{Failure, TargetDrive};
 use crate::procedure::{AxisReading, ErobCanSession};
 
 /// From one reading of a moving joint to the next.
@@ -21,8 +24,8 @@ const POWER_UP_NS: Nanoseconds = 8_000_000_000;
 const AGAIN_NS: Nanoseconds = 500_000_000;
 /// A motion may take so much longer than its profile.
 const PATIENCE_NS: Nanoseconds = 5_000_000_000;
-/// A joint slower than this stands: counts/s. The readings of a joint at rest are not quite 0.
-const STANDING: i32 = 300;
+/// In torque control the drive holds the velocity limit. Beyond this share of it the joint is stopped from here.
+const BEYOND_LIMIT: f64 = 1.25;
 
 /// The profile of position and velocity control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,25 +41,69 @@ pub struct Profile {
 /// A motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
+    /// None: the joint is held where it is.
+    Hold,
     /// To a position: counts.
     To(i32, Profile),
     /// By a distance: counts.
     By(i32, Profile),
-    /// To a position and back, again and again, until it is interrupted: counts.
-    ReciprocatingTo(i32, Profile),
-    /// By a distance and back, again and again, until it is interrupted: counts.
-    ReciprocatingBy(i32, Profile),
-    /// At the velocity of the profile, in a direction, until it is interrupted.
+    /// To a position and back, so many times, one absolute move after the other.
+    BackAndForth {
+        /// counts
+        to: i32,
+        /// How often.
+        times: u32,
+        /// The time at each end.
+        dwell_ns: Nanoseconds,
+        /// The profile of each move.
+        profile: Profile,
+    },
+    /// To a position and back by the drive itself, again and again.
+    ReciprocatingTo {
+        /// counts
+        to: i32,
+        /// The time at each end.
+        dwell_ns: Nanoseconds,
+        /// The profile.
+        profile: Profile,
+    },
+    /// At the velocity of the profile, in a direction.
     Continuous(Direction, Profile),
-    /// At a velocity by velocity control, until it is interrupted: counts/s. That of the profile is not used.
+    /// At a velocity by velocity control: counts/s. That of the profile is not used.
     Velocity(i32, Profile),
-    /// With a current, until it is interrupted.
+    /// With a current.
     Torque {
         /// mA
         current: i32,
         /// counts/s that the joint never exceeds
         velocity_limit: i32,
     },
+}
+
+impl Motion {
+    const fn profile(self) -> Option<Profile> {
+        match self {
+            Self::To(_, profile)
+            | Self::By(_, profile)
+            | Self::BackAndForth { profile, .. }
+            | Self::ReciprocatingTo { profile, .. }
+            | Self::Continuous(_, profile)
+            | Self::Velocity(_, profile) => Some(profile),
+            Self::Hold | Self::Torque { .. } => None,
+        }
+    }
+
+    /// Whether the drive has a target for it, which was compared with the limits of the axis beforehand.
+    const fn has_target(self) -> bool {
+        matches!(
+            self,
+            Self::Hold
+                | Self::To(..)
+                | Self::By(..)
+                | Self::BackAndForth { .. }
+                | Self::ReciprocatingTo { .. }
+        )
+    }
 }
 
 /// The direction of a continuous motion.
@@ -71,19 +118,39 @@ pub enum Direction {
 /// Operating mode, object 004E.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
-enum OperatingMode {
+pub enum OperatingMode {
+    /// The set-point is a current: mA.
     Torque = 1,
+    /// The set-point is a velocity: counts/s.
     Velocity = 2,
+    /// Moves, and motion without end.
     Position = 3,
 }
 
+/// A motion, and when it ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Run<'a> {
+    /// The motion.
+    pub motion: Motion,
+    /// How long a motion lasts that does not end by itself; `None`: until it is interrupted.
+    pub duration_ns: Option<Nanoseconds>,
+    /// Whether the motor stays enabled at the end.
+    pub keeps_enabled: bool,
+    /// The drive: units and limits of its axis.
+    pub target: &'a TargetDrive,
+}
+
 /// How a motion has ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ended {
     /// Why.
     pub end: End,
+    /// Where the joint was before: counts.
+    pub from: i32,
     /// Where the joint is at rest: counts.
     pub position: i32,
+    /// The highest velocity that was read: rad/s (m/s).
+    pub fastest: f64,
 }
 
 /// Why a motion has ended.
@@ -91,12 +158,14 @@ pub struct Ended {
 pub enum End {
     /// It has arrived.
     Arrived,
+    /// Its time was over, and it was stopped.
+    TimeOver,
     /// It was interrupted, and stopped.
     Interrupted,
 }
 
 /// Why a motion has failed. The motor is disabled, as far as it can be told to.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum MotionFailure {
     /// A request has failed.
     Request(RequestError),
@@ -105,7 +174,7 @@ pub enum MotionFailure {
         /// The error code.
         code: i32,
     },
-    /// The motion lasts longer than its profile allows.
+    /// The motion lasts longer than its profile allows. It was stopped.
     TooLong {
         /// Where the joint is: counts.
         position: i32,
@@ -115,6 +184,8 @@ pub enum MotionFailure {
         /// Its velocity: counts/s.
         velocity: i32,
     },
+    /// The joint has come to a limit of its axis. It was stopped.
+    Limit(Failure),
 }
 
 impl From<RequestError> for MotionFailure {
@@ -129,11 +200,7 @@ impl fmt::Display for MotionFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Request(error) => error.fmt(f),
-            Self::Drive { code } => write!(
-                f,
-                "the drive shows error 0x{code:04X} (appendix 2 of the eRob user manual); disable it, mend the cause, and \
-                 switch the power off and on if the error stays"
-            ),
+            Self::Drive { code } => write!(f, "the drive shows error 0x{code:04X}"),
             Self::TooLong { position } => {
                 write!(
                     f,
@@ -143,6 +210,7 @@ impl fmt::Display for MotionFailure {
             Self::NotStopped { velocity } => {
                 write!(f, "the joint was told to stop and still moves at {velocity} counts/s")
             }
+            Self::Limit(failure) => failure.fmt(f),
         }
     }
 }
@@ -155,61 +223,129 @@ type Moving<T> = Result<T, MotionFailure>;
 ///
 /// # Errors
 /// See [`MotionFailure`].
-pub async fn carry_out(session: &ErobCanSession, motion: Motion) -> Moving<Ended> {
-    let outcome = run(session, motion).await;
+pub async fn carry_out(session: &ErobCanSession, run: Run<'_>) -> Moving<Ended> {
+    let mut fastest = 0.0;
+    let outcome = whole(session, run, &mut fastest).await;
     if outcome.is_err() {
         session.keep_failing_step();
     }
-    session.step("disable");
-    let disabled = session.write(&entries::MOTOR_ENABLE, 0).await;
-    let end = outcome?;
-    disabled?;
-    Ok(Ended { end, position: session.read(&entries::ACTUAL_POSITION).await? })
+    session.ignore_interruptions();
+    let stays = matches!(outcome, Ok((End::Arrived | End::TimeOver, _))) && run.keeps_enabled;
+    if stays {
+        session.note("the axis stays enabled");
+    } else {
+        session.step("disable");
+        if let Err(error) = session.write(&entries::MOTOR_ENABLE, 0).await {
+            session.note(format!("the axis may still be moving: {error}; use the emergency stop"));
+            outcome?;
+            return Err(error.into());
+        }
+    }
+    let (end, from) = outcome?;
+    Ok(Ended { end, from, position: session.read(&entries::ACTUAL_POSITION).await?, fastest })
 }
 
-async fn run(session: &ErobCanSession, motion: Motion) -> Moving<End> {
+async fn whole(session: &ErobCanSession, run: Run<'_>, fastest: &mut f64) -> Moving<(End, i32)> {
     session.step("read the error code");
     check_error(session).await?;
-    session.step("disable");
-    session.write(&entries::MOTOR_ENABLE, 0).await?;
-    prepare(session, motion).await?;
+    come_to_rest(session).await?;
+    prepare(session, run.motion).await?;
+    let from = session.read(&entries::ACTUAL_POSITION).await?;
     if session.is_interrupted() {
-        return Ok(End::Interrupted);
+        return Ok((End::Interrupted, from));
     }
     session.step("enable");
     enable(session).await?;
-    session.sleep(ENABLED_NS).await;
-    let distance = start(session, motion).await?;
-    session.step("move");
-    let end = watch(session, motion, distance).await?;
-    if end == End::Interrupted {
-        session.ignore_interruptions();
-        stop(session, motion).await?;
+    session.note(
+        "this protocol has no watchdog: if this program ends unexpectedly, the drive goes on with what it does",
+    );
+    session.pause(ENABLED_NS).await;
+    let stops = match run.motion {
+        Motion::BackAndForth { to, times, dwell_ns, profile } => {
+            Stops { first: Motion::To(to, profile), back: Motion::To(from, profile), times, dwell_ns }
+        }
+        motion => Stops { first: motion, back: motion, times: 0, dwell_ns: 0 },
+    };
+    let end = stops.visit(session, run, fastest).await?;
+    Ok((end, from))
+}
+
+/// The moves of which a motion consists: one, or so many times one there and one back.
+struct Stops {
+    first: Motion,
+    back: Motion,
+    times: u32,
+    dwell_ns: Nanoseconds,
+}
+
+impl Stops {
+    async fn visit(&self, session: &ErobCanSession, run: Run<'_>, fastest: &mut f64) -> Moving<End> {
+        for number in 0..self.times.saturating_mul(2).max(1) {
+            let motion = if number % 2 == 0 { self.first } else { self.back };
+            let end = one(session, Run { motion, ..run }, fastest).await?;
+            if end != End::Arrived {
+                return Ok(end);
+            }
+            session.pause(self.dwell_ns).await;
+        }
+        Ok(End::Arrived)
     }
-    Ok(end)
+}
+
+/// One motion of an enabled motor, to its end at standstill.
+async fn one(session: &ErobCanSession, run: Run<'_>, fastest: &mut f64) -> Moving<End> {
+    if session.is_interrupted() {
+        session.ignore_interruptions();
+        return Ok(End::Interrupted);
+    }
+    let distance = start(session, run.motion).await?;
+    session.step("move");
+    let watched = watch(session, run, distance, fastest).await;
+    match &watched {
+        Ok(End::Arrived) | Err(MotionFailure::Request(_) | MotionFailure::Drive { .. }) => {}
+        Ok(End::TimeOver | End::Interrupted) | Err(_) => {
+            if !matches!(watched, Ok(End::TimeOver)) {
+                session.keep_failing_step();
+            }
+            session.ignore_interruptions();
+            stop(session, run.motion).await?;
+        }
+    }
+    watched
+}
+
+/// Stops the joint if it moves, and disables the motor.
+///
+/// # Errors
+/// A request has failed, or the joint does not come to rest.
+pub async fn come_to_rest(session: &ErobCanSession) -> Moving<()> {
+    let velocity = session.read(&entries::ACTUAL_VELOCITY).await?;
+    if velocity.saturating_abs() > STANDING {
+        session.step("stop");
+        let mode = session.read(&entries::OPERATING_MODE).await?;
+        let deceleration = session.read(&entries::PROFILE_DECELERATION).await?;
+        command_stop(session, mode == OperatingMode::Position as i32).await?;
+        wait_for_standstill(session, ramp_ns(velocity, deceleration)).await?;
+    }
+    session.step("disable");
+    session.write(&entries::MOTOR_ENABLE, 0).await?;
+    Ok(())
 }
 
 /// Writes what must be written before the motor is enabled.
 async fn prepare(session: &ErobCanSession, motion: Motion) -> Moving<()> {
     session.step("set the operating mode");
-    let (mode, profile) = match motion {
-        Motion::Torque { .. } => (OperatingMode::Torque, None),
-        Motion::Velocity(_, profile) => (OperatingMode::Velocity, Some(profile)),
-        Motion::To(_, profile)
-        | Motion::By(_, profile)
-        | Motion::ReciprocatingTo(_, profile)
-        | Motion::ReciprocatingBy(_, profile)
-        | Motion::Continuous(_, profile) => (OperatingMode::Position, Some(profile)),
+    let mode = match motion {
+        Motion::Torque { .. } => OperatingMode::Torque,
+        Motion::Velocity(..) => OperatingMode::Velocity,
+        _ => OperatingMode::Position,
     };
     set(session, &entries::OPERATING_MODE, mode as i32).await?;
     if mode != OperatingMode::Position {
-        session.write(&entries::CONTROL_SOURCE, 0).await?;
-        session.write(&entries::ANALOGUE_TYPE, 0).await?;
-        // The motor turns at once when it is enabled, if this is not 0.
-        session.write(&entries::SET_POINT, 0).await?;
+        zero_set_point(session).await?;
     }
     session.step("set the profile");
-    if let Some(profile) = profile {
+    if let Some(profile) = motion.profile() {
         session.write(&entries::PROFILE_ACCELERATION, profile.acceleration).await?;
         session.write(&entries::PROFILE_DECELERATION, profile.deceleration).await?;
     }
@@ -223,18 +359,30 @@ async fn prepare(session: &ErobCanSession, motion: Motion) -> Moving<()> {
         }
         Motion::Velocity(..) => {}
         _ => {
-            if let Some(profile) = profile {
+            if let Some(profile) = motion.profile() {
                 session.write(&entries::PROFILE_VELOCITY, profile.velocity).await?;
             }
         }
     }
     let motion_mode = match motion {
         Motion::Continuous(..) => 0,
-        Motion::To(..) | Motion::By(..) => 1,
-        Motion::ReciprocatingTo(..) | Motion::ReciprocatingBy(..) => 2,
-        Motion::Velocity(..) | Motion::Torque { .. } => return Ok(()),
+        Motion::To(..) | Motion::By(..) | Motion::BackAndForth { .. } => 1,
+        Motion::ReciprocatingTo { dwell_ns, .. } => {
+            let dwell_ms = i32::try_from(dwell_ns / 1_000_000).unwrap_or(i32::MAX);
+            session.write(&entries::DWELL_TIME, dwell_ms).await?;
+            2
+        }
+        Motion::Hold | Motion::Velocity(..) | Motion::Torque { .. } => return Ok(()),
     };
     session.write(&entries::MOTION_MODE, motion_mode).await?;
+    Ok(())
+}
+
+/// Makes the set-point of velocity and torque control 0: the motor turns at once when it is enabled, if it is not.
+async fn zero_set_point(session: &ErobCanSession) -> Moving<()> {
+    session.write(&entries::CONTROL_SOURCE, 0).await?;
+    session.write(&entries::ANALOGUE_TYPE, 0).await?;
+    session.write(&entries::SET_POINT, 0).await?;
     Ok(())
 }
 
@@ -262,7 +410,7 @@ async fn enable(session: &ErobCanSession) -> Moving<()> {
             session.note("the drive has just been switched on: it can be enabled 8 s after that");
             is_told = true;
         }
-        session.sleep(AGAIN_NS).await;
+        session.pause(AGAIN_NS).await;
     }
 }
 
@@ -271,19 +419,17 @@ async fn start(session: &ErobCanSession, motion: Motion) -> Moving<Option<i64>> 
     session.step("start");
     let here = i64::from(session.read(&entries::ACTUAL_POSITION).await?);
     let (distance, way) = match motion {
-        Motion::Velocity(velocity, _) => {
-            session.write(&entries::SET_POINT, velocity).await?;
-            return Ok(None);
-        }
-        Motion::Torque { current, .. } => {
-            session.write(&entries::SET_POINT, current).await?;
+        Motion::Hold => return Ok(None),
+        Motion::Velocity(set_point, _) | Motion::Torque { current: set_point, .. } => {
+            session.write(&entries::SET_POINT, set_point).await?;
             return Ok(None);
         }
         Motion::Continuous(..) => (None, None),
-        Motion::To(target, _) => (Some(0), Some(i64::from(target) - here)),
+        Motion::To(target, _) | Motion::BackAndForth { to: target, .. } => {
+            (Some(0), Some(i64::from(target) - here))
+        }
         Motion::By(distance, _) => (Some(distance), Some(distance.into())),
-        Motion::ReciprocatingTo(..) => (Some(0), None),
-        Motion::ReciprocatingBy(distance, _) => (Some(distance), None),
+        Motion::ReciprocatingTo { .. } => (Some(0), None),
     };
     if way == Some(0) {
         return Ok(way);
@@ -292,44 +438,78 @@ async fn start(session: &ErobCanSession, motion: Motion) -> Moving<Option<i64>> 
         // 0 makes the move an absolute one.
         session.write(&entries::RELATIVE_POSITION, distance).await?;
     }
-    if let Motion::To(target, _) | Motion::ReciprocatingTo(target, _) = motion {
-        session.write(&entries::TARGET_POSITION, target).await?;
+    if let Motion::To(to, _) | Motion::BackAndForth { to, .. } | Motion::ReciprocatingTo { to, .. } = motion {
+        session.write(&entries::TARGET_POSITION, to).await?;
     }
     session.command(&entries::START_MOTION).await?;
     Ok(way)
 }
 
-/// Watches the joint until it arrives or the session is interrupted.
-async fn watch(session: &ErobCanSession, motion: Motion, distance: Option<i64>) -> Moving<End> {
+/// Watches the joint until it arrives, its time is over, or the session is interrupted.
+async fn watch(
+    session: &ErobCanSession,
+    run: Run<'_>,
+    distance: Option<i64>,
+    fastest: &mut f64,
+) -> Moving<End> {
     let began_ns = session.now_ns();
-    let longest_ns = distance.map(|distance| longest_ns(motion, distance));
+    let longest_ns = distance.map(|distance| longest_ns(run.motion, distance));
     loop {
         if session.is_interrupted() {
             return Ok(End::Interrupted);
         }
-        let position = session.read(&entries::ACTUAL_POSITION).await?;
-        let velocity = session.read(&entries::ACTUAL_VELOCITY).await?;
-        let current_ma = session.read(&entries::MOTOR_CURRENT).await?;
-        session.show(reading(session.now_ns(), position, velocity, current_ma));
+        let reading = reading::read(session, run.target, "enabled").await?;
+        session.show(reading);
+        *fastest = if reading.velocity.abs() > fastest.abs() { reading.velocity } else { *fastest };
         check_error(session).await?;
+        check_limits(run, &reading)?;
+        let passed_ns = session.now_ns().saturating_sub(began_ns);
         if let Some(longest_ns) = longest_ns {
-            let is_resting = distance == Some(0)
-                || session.read(&entries::RUNNING_STATE).await? == 0 && velocity.saturating_abs() <= STANDING;
-            if is_resting {
+            if distance == Some(0) || has_arrived(session).await? {
                 return Ok(End::Arrived);
             }
-            if session.now_ns().saturating_sub(began_ns) > longest_ns {
-                stop(session, motion).await?;
-                return Err(MotionFailure::TooLong { position });
+            if passed_ns > longest_ns {
+                return Err(MotionFailure::TooLong {
+                    position: session.read(&entries::ACTUAL_POSITION).await?,
+                });
             }
+        } else if run.duration_ns.is_some_and(|duration_ns| passed_ns >= duration_ns) {
+            return Ok(End::TimeOver);
         }
-        session.sleep(READING_NS).await;
+        let left_ns = run.duration_ns.map_or(READING_NS, |duration_ns| duration_ns.saturating_sub(passed_ns));
+        session.pause(left_ns.clamp(1, READING_NS)).await;
     }
+}
+
+async fn has_arrived(session: &ErobCanSession) -> Moving<bool> {
+    let is_stopped = session.read(&entries::RUNNING_STATE).await? == 0;
+    Ok(is_stopped && session.read(&entries::ACTUAL_VELOCITY).await?.saturating_abs() <= STANDING)
+}
+
+/// Checks that a motion without a target can still be stopped before a limit of the axis.
+fn check_limits(run: Run<'_>, reading: &AxisReading) -> Moving<()> {
+    if run.motion.has_target() {
+        return Ok(());
+    }
+    let deceleration = run.motion.profile().map(|profile| profile.deceleration.into());
+    run.target.check_stopping_distance(reading, deceleration).map_err(MotionFailure::Limit)?;
+    let Motion::Torque { velocity_limit, .. } = run.motion else { return Ok(()) };
+    let limit = run.target.velocity(f64::from(velocity_limit)).abs();
+    if reading.velocity.abs() <= BEYOND_LIMIT * limit {
+        return Ok(());
+    }
+    let quantity = run.target.velocity_quantity();
+    Err(MotionFailure::Limit(Failure::AtLimit {
+        quantity,
+        value: reading.velocity,
+        low: -limit,
+        high: limit,
+    }))
 }
 
 /// The longest time of a motion over a distance by its profile: ramps up and down, and the way at its velocity.
 fn longest_ns(motion: Motion, distance: i64) -> Nanoseconds {
-    let (Motion::To(_, profile) | Motion::By(_, profile)) = motion else { return Nanoseconds::MAX };
+    let Some(profile) = motion.profile() else { return Nanoseconds::MAX };
     let positive = |value: i32| f64::from(value.max(1));
     let velocity = positive(profile.velocity);
     let ramps_s = velocity / positive(profile.acceleration) + velocity / positive(profile.deceleration);
@@ -341,11 +521,28 @@ fn longest_ns(motion: Motion, distance: i64) -> Nanoseconds {
 /// Stops the joint, and waits until it stands. A further interruption ends the wait.
 async fn stop(session: &ErobCanSession, motion: Motion) -> Moving<()> {
     session.step("stop");
-    match motion {
-        Motion::Velocity(..) | Motion::Torque { .. } => session.write(&entries::SET_POINT, 0).await?,
-        _ => session.command(&entries::STOP_MOTION).await?,
+    command_stop(session, !matches!(motion, Motion::Velocity(..) | Motion::Torque { .. })).await?;
+    let within_ns = match (motion, motion.profile()) {
+        (Motion::Velocity(velocity, profile), _) => ramp_ns(velocity, profile.deceleration),
+        (_, Some(profile)) => ramp_ns(profile.velocity, profile.deceleration),
+        // In torque control friction alone stops it.
+        (_, None) => PATIENCE_NS,
+    };
+    wait_for_standstill(session, within_ns).await
+}
+
+/// In position control the drive has a command to stop; in the other modes the set-point 0 is one.
+async fn command_stop(session: &ErobCanSession, is_position_controlled: bool) -> Moving<()> {
+    if is_position_controlled {
+        session.command(&entries::STOP_MOTION).await?;
+    } else {
+        session.write(&entries::SET_POINT, 0).await?;
     }
-    let end_ns = session.now_ns().saturating_add(stopping_ns(motion));
+    Ok(())
+}
+
+async fn wait_for_standstill(session: &ErobCanSession, within_ns: Nanoseconds) -> Moving<()> {
+    let end_ns = session.now_ns().saturating_add(within_ns);
     loop {
         let velocity = session.read(&entries::ACTUAL_VELOCITY).await?;
         if velocity.saturating_abs() <= STANDING || session.is_interrupted() {
@@ -354,23 +551,13 @@ async fn stop(session: &ErobCanSession, motion: Motion) -> Moving<()> {
         if session.now_ns() >= end_ns {
             return Err(MotionFailure::NotStopped { velocity });
         }
-        session.sleep(READING_NS).await;
+        session.pause(READING_NS).await;
     }
 }
 
-/// The longest time that a stop takes.
-fn stopping_ns(motion: Motion) -> Nanoseconds {
-    let (velocity, deceleration) = match motion {
-        Motion::Velocity(velocity, profile) => (velocity.saturating_abs(), profile.deceleration),
-        // Friction alone stops it.
-        Motion::Torque { .. } => return PATIENCE_NS,
-        Motion::To(_, profile)
-        | Motion::By(_, profile)
-        | Motion::ReciprocatingTo(_, profile)
-        | Motion::ReciprocatingBy(_, profile)
-        | Motion::Continuous(_, profile) => (profile.velocity, profile.deceleration),
-    };
-    let ramp_s = f64::from(velocity) / f64::from(deceleration.max(1));
+/// The longest time of a ramp to standstill: counts/s and counts/s².
+fn ramp_ns(velocity: i32, deceleration: i32) -> Nanoseconds {
+    let ramp_s = f64::from(velocity.saturating_abs()) / f64::from(deceleration.max(1));
     PATIENCE_NS.saturating_add((1e9 * ramp_s) as Nanoseconds)
 }
 
@@ -378,20 +565,5 @@ async fn check_error(session: &ErobCanSession) -> Moving<()> {
     match session.read(&entries::ERROR_CODE).await? {
         0 => Ok(()),
         code => Err(MotionFailure::Drive { code }),
-    }
-}
-
-fn reading(at_ns: Nanoseconds, position: i32, velocity: i32, current_ma: i32) -> AxisReading {
-    /// Counts of a turn of the output (eRunner manual: a single-turn model counts 0 to 524287).
-    const COUNTS_PER_RADIAN: f64 = 524_288.0 / std::f64::consts::TAU;
-    AxisReading {
-        at_ns,
-        position: f64::from(position) / COUNTS_PER_RADIAN,
-        position_counts: position.into(),
-        velocity: f64::from(velocity) / COUNTS_PER_RADIAN,
-        torque: None,
-        current_a: Some(f64::from(current_ma) / 1000.0),
-        statusword: 0,
-        state: "enabled",
     }
 }

@@ -10,7 +10,7 @@ pub use facts::FACTS;
 
 use takt_rt::Frame;
 
-use super::{CarryingOut, Family, OtherProtocol, SettingUp};
+use super::{Family, OtherProtocol, SettingUp};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
@@ -18,7 +18,7 @@ use crate::erob_can::entries;
 use crate::erob_can::frame::{self, Request};
 use crate::family::bring_up::AxisSession;
 use crate::family::commission::dictionary::ObjectEntry;
-use crate::family::commission::{SdoSession, TargetDrive, Task, profile};
+use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
 use crate::sim::Drive;
 use crate::sim::erob::{ErobJoint, ErobParameters};
 
@@ -61,6 +61,7 @@ impl Family for ErobCanopen {
             name: "vendor's custom CAN protocol",
             request: read.frame(node),
             answer: frame::reply_id(node),
+            cure: "its firmware has no CANopen: name it with `--family erob-can`, or load CANopen firmware into it",
         })
     }
 
@@ -90,13 +91,8 @@ impl Family for ErobCanopen {
         commission::process_data_words(target, frame)
     }
 
-    fn carry_out<'a>(
-        &'a self,
-        session: &'a SdoSession,
-        target: &'a TargetDrive,
-        task: Task,
-    ) -> CarryingOut<'a> {
-        Box::pin(commission::carry_out(session, target, task))
+    fn commission(&self, target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failure> {
+        over_sdo(target, task, commission::carry_out)
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

@@ -15,12 +15,12 @@ pub(crate) use process_data::answers_sync;
 
 use takt_rt::Frame;
 
-use super::{CarryingOut, Family, MappingMatch, SettingUp};
+use super::{Family, MappingMatch, SettingUp};
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::commission::dictionary::ObjectEntry;
-use crate::family::commission::{SdoSession, TargetDrive, Task};
+use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo};
 use crate::procedure::SdoQuirks;
 use crate::sim::Drive;
 use crate::sim::yz_aim::{YzAimJoint, YzAimParameters};
@@ -100,13 +100,8 @@ impl Family for YzAim {
         commission::process_data_words(target, frame)
     }
 
-    fn carry_out<'a>(
-        &'a self,
-        session: &'a SdoSession,
-        target: &'a TargetDrive,
-        task: Task,
-    ) -> CarryingOut<'a> {
-        Box::pin(commission::carry_out(session, target, task))
+    fn commission(&self, target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failure> {
+        over_sdo(target, task, commission::carry_out)
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {

@@ -12,8 +12,9 @@ use std::io;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
-use super::interface::{InterfaceSettings, interface_index};
-use super::open::{OpenError, open_socket, prepare};
+use super::interface::InterfaceSettings;
+use super::open::OpenError;
+use super::real_interface::RealInterface;
 use super::socketcan::SocketCanOptions;
 
 pub use listening::{CommandedDrive, HeardMaster, Listening, MasterActivity, MasterTraffic, Verdict};
@@ -38,8 +39,8 @@ pub enum IfOwned {
 pub struct BusClaim {
     /// The name of the bus for people.
     pub bus: String,
-    /// The name of the interface.
-    pub interface: String,
+    /// The interface.
+    pub interface: RealInterface,
     /// How it is brought up if it is down.
     pub settings: InterfaceSettings,
     /// How another master is recognised on it.
@@ -124,31 +125,32 @@ impl Ownership {
     /// # Errors
     /// See [`ClaimError`].
     pub fn claim(claims: Vec<BusClaim>, if_owned: IfOwned) -> Result<Self, ClaimError> {
-        let mut indexed = vec![];
+        let mut named = vec![];
         for claim in claims {
-            indexed.push((index_of(&claim.bus, &claim.interface)?, claim));
+            named.push((claim.interface.lock_name(&claim.bus)?, claim));
         }
         // All processes take the locks in the same order, so that no two of them wait for each other.
-        indexed.sort_by_key(|(index, _)| *index);
+        named.sort_by(|(one, _), (other, _)| one.cmp(other));
         let mut locks = vec![];
-        for (index, claim) in &indexed {
-            locks.push(take(Role::Master, *index, &claim.bus, &claim.interface, if_owned)?);
+        for (name, claim) in &named {
+            locks.push(take(Role::Master, name, &claim.bus, &claim.interface, if_owned)?);
         }
         // Only now: until the lock is taken, the interface belongs to another process.
-        for (_, claim) in &indexed {
-            prepare(&claim.bus, &claim.interface, &claim.settings)?;
+        for (_, claim) in &named {
+            claim.interface.prepare(&claim.bus, &claim.settings)?;
         }
         let mut clock = MonotonicClock::default();
         let mut buses = vec![];
-        for (_, claim) in &indexed {
-            let port = open_socket(&claim.bus, &claim.interface, &SocketCanOptions::default())?;
+        for (_, claim) in &named {
+            let options = SocketCanOptions::default();
+            let port = claim.interface.open_prepared(&claim.bus, &claim.settings, &options)?;
             buses.push((port, Listening::new(claim.traffic.clone(), clock.now_ns())));
         }
         match listen(&mut buses, &mut clock) {
             None => Ok(Self { locks }),
             Some((bus, heard)) => {
-                let (_, claim) = indexed.swap_remove(bus);
-                Err(ClaimError::OtherMaster { bus: claim.bus, interface: claim.interface, heard })
+                let (_, claim) = named.swap_remove(bus);
+                Err(ClaimError::OtherMaster { bus: claim.bus, interface: claim.interface.to_string(), heard })
             }
         }
     }
@@ -173,31 +175,24 @@ impl Ownership {
 ///
 /// # Errors
 /// See [`ClaimError`].
-pub fn lock_for_simulator(bus: &str, interface: &str) -> Result<InterfaceLock, ClaimError> {
-    take(Role::Simulator, index_of(bus, interface)?, bus, interface, IfOwned::Refuse)
+pub fn lock_for_simulator(bus: &str, interface: &RealInterface) -> Result<InterfaceLock, ClaimError> {
+    take(Role::Simulator, &interface.lock_name(bus)?, bus, interface, IfOwned::Refuse)
 }
 
-fn index_of(bus: &str, interface: &str) -> Result<u32, ClaimError> {
-    let index = interface_index(interface);
-    Ok(index.map_err(|error| OpenError::Interface { bus: bus.to_owned(), error })?)
-}
-
-/// The lock is named after the index of the interface, which stays the same when the interface is renamed.
 fn take(
     role: Role,
-    index: u32,
+    name: &str,
     bus: &str,
-    interface: &str,
+    interface: &RealInterface,
     if_owned: IfOwned,
 ) -> Result<InterfaceLock, ClaimError> {
-    let (bus, interface) = (bus.to_owned(), interface.to_owned());
-    let name = index.to_string();
+    let (bus, interface) = (bus.to_owned(), interface.to_string());
     match if_owned {
-        IfOwned::Refuse => InterfaceLock::take(role, &name).map_err(|error| match error {
+        IfOwned::Refuse => InterfaceLock::take(role, name).map_err(|error| match error {
             LockError::Held(holder) => ClaimError::Held { bus, interface, role, holder },
             LockError::System(error) => ClaimError::Lock { bus, interface, error },
         }),
-        IfOwned::TakeOver => InterfaceLock::take_over(role, &name).map_err(|error| match error {
+        IfOwned::TakeOver => InterfaceLock::take_over(role, name).map_err(|error| match error {
             TakeOverError::NotReleased { holder, error } => {
                 ClaimError::NotReleased { bus, interface, holder, error }
             }

@@ -85,6 +85,7 @@ impl ErobParameters {
                 inertia: axis.joint.inertia(),
                 viscous_friction: axis.joint.viscous_friction(),
                 coulomb_friction: axis.joint.coulomb_friction(),
+                friction_shape: axis.simulated.friction,
                 brake_torque: 2.0 * joint.peak_torque,
             },
             encoder: Encoder {

@@ -2,7 +2,6 @@
 
 use takt_rt::{DriveState, Frame, Nanoseconds};
 
-use super::motion::{self, Motion};
 use super::settings::{
     CAN_ADDRESS, MOTION_MODE, OPERATING_MODE, POSITION_ERROR, POSITIONED_THRESHOLD, POSITIONED_TIME,
     RELATIVE_POSITION, SET_POINT, Settings, TARGET_POSITION, TORQUE_VELOCITY_LIMIT, Writable,
@@ -14,6 +13,7 @@ use crate::sim::drive::{Drive, DriveFault, NodeState, Observation};
 use crate::sim::mailbox::Mailbox;
 use crate::sim::motion::Generator;
 use crate::sim::plant::{Encoder, Gravity, Joint, JointParameters};
+use crate::sim::profile_motions::Motion;
 use crate::sim::servo::Servo;
 
 /// The period of the drive's loops.
@@ -107,6 +107,8 @@ pub struct ErobCanDrive {
     /// What is added to the encoder's counts since the count of turns was lost.
     counts_offset: i32,
     has_battery_alarm: bool,
+    /// By the command 0x014F, until the motor is enabled or disabled.
+    is_brake_released: bool,
     defects: Defects,
     reply: Option<(Nanoseconds, Frame)>,
     ready_ns: Nanoseconds,
@@ -128,6 +130,7 @@ impl ErobCanDrive {
             velocity_demand: Generator::default(),
             counts_offset: 0,
             has_battery_alarm: false,
+            is_brake_released: false,
             defects: Defects::default(),
             reply: None,
             ready_ns: parameters.ready_ns,
@@ -161,7 +164,7 @@ impl ErobCanDrive {
     }
 
     fn is_braked(&self) -> bool {
-        !self.is_enabled() || self.defects.is_brake_stuck
+        !(self.is_enabled() || self.is_brake_released) || self.defects.is_brake_stuck
     }
 
     fn is_moving(&self) -> bool {
@@ -187,7 +190,10 @@ impl ErobCanDrive {
                 self.saving_until_ns = Some(now_ns.saturating_add(SAVE_NS));
                 Ok(())
             }
-            (0x014F, None, None) if self.parameters.has_brake => Ok(()),
+            (0x014F, None, None) if self.parameters.has_brake => {
+                self.is_brake_released = true;
+                Ok(())
+            }
             (0x014F, None, None) => Err(Some(ErrorCode::NO_BRAKE)),
             (0x0083 | 0x0084 | 0x00E8 | 0x014F, None, Some(_)) => Err(Some(ErrorCode::ARGUMENT_NOT_TAKEN)),
             (0x0100 | 0x0114, None, None) => Err(Some(ErrorCode::ARGUMENT_MISSING)),
@@ -229,12 +235,13 @@ impl ErobCanDrive {
 
     fn stop(&mut self) -> Result<(), Option<ErrorCode>> {
         if let Power::On { motion, .. } = &mut self.power {
-            motion.stop(&self.settings);
+            motion.stop_with(self.settings.profile().deceleration);
         }
         Ok(())
     }
 
     fn set_enabled(&mut self, now_ns: Nanoseconds, value: i32) -> Result<(), Option<ErrorCode>> {
+        self.is_brake_released = false;
         match (value, self.power) {
             (0, power) => {
                 // A fault whose cause is gone ends with the command to disable.
@@ -378,7 +385,8 @@ impl ErobCanDrive {
     }
 
     fn step_velocity(&mut self, velocity: f64, per_unit: f64) -> f64 {
-        let (faster, slower) = (motion::acceleration(&self.settings), motion::deceleration(&self.settings));
+        let profile = self.settings.profile();
+        let (faster, slower) = (profile.acceleration, profile.deceleration);
         self.velocity_demand.ramp_between(self.settings.get(SET_POINT), faster, slower, STEP_S);
         self.servo.velocity(self.velocity_demand.velocity / per_unit, velocity, 0.0, STEP_S)
     }
@@ -392,7 +400,7 @@ impl ErobCanDrive {
         per_unit: f64,
     ) -> f64 {
         let mut motion = motion;
-        motion.step(self.stepped_ns, &self.settings, STEP_S);
+        motion.step(self.stepped_ns, &self.settings.profile(), STEP_S);
         let error = motion.position() - counts;
         if error.abs() > self.settings.get(POSITION_ERROR) {
             self.fail(0x8611);
@@ -501,6 +509,7 @@ impl Drive for ErobCanDrive {
         self.node =
             self.settings.value(CAN_ADDRESS).and_then(|node| u8::try_from(node).ok()).unwrap_or(self.node);
         self.power = Power::Off;
+        self.is_brake_released = false;
         (self.torque, self.reply, self.saving_until_ns) = (0.0, None, None);
         self.ready_ns = now_ns.saturating_add(self.parameters.ready_ns);
         if !self.parameters.has_battery {

@@ -3,10 +3,8 @@
 //!
 //! - `drive`: the complete module: frames, time, power.
 //! - `settings`: what can be written, and what is kept without power.
-//! - `motion`: the motions of position control, as demands for the loops.
 
 mod drive;
-mod motion;
 mod settings;
 
 pub use drive::{ErobCanDrive, ErobCanParameters, ErrorForm};

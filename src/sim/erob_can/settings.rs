@@ -1,5 +1,7 @@
 //! What can be written to a module, and what of it is kept without power.
 
+use crate::sim::profile_motions::MotionProfile;
+
 /// When a setting may be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Writable {
@@ -114,6 +116,30 @@ impl Settings {
     pub fn set(&mut self, index: u16, value: i32) {
         if let Some(place) = place(index) {
             self.present[place] = value;
+        }
+    }
+
+    /// What shapes the motions of position control.
+    pub fn profile(&self) -> MotionProfile {
+        let most = self.get(MAXIMUM_VELOCITY);
+        let dwell_ms = self.value(DWELL_TIME).and_then(|ms| u64::try_from(ms).ok()).unwrap_or(0);
+        MotionProfile {
+            velocity: self.get(VELOCITY).clamp(-most, most),
+            acceleration: self.rate(ACCELERATION),
+            deceleration: self.rate(DECELERATION),
+            quick_stop: self.get(QUICK_STOP),
+            dwell_ns: dwell_ms.saturating_mul(1_000_000),
+            positions: (self.get(POSITION_MINIMUM), self.get(POSITION_MAXIMUM)),
+        }
+    }
+
+    /// A rate: at least 1 count/s², because with 0 no motion would end. Without limits of their own, motions change the velocity at once.
+    fn rate(&self, index: u16) -> f64 {
+        /// The loops of the drive do not follow steeper ramps: count/s².
+        const STEEPEST: f64 = 1e8;
+        match self.value(LIMITS_APPLY) {
+            Some(0) => STEEPEST,
+            _ => self.get(index).clamp(1.0, STEEPEST),
         }
     }
 

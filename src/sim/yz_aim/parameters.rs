@@ -259,6 +259,7 @@ impl YzAimParameters {
             inertia: axis.joint.inertia(),
             viscous_friction: axis.joint.viscous_friction(),
             coulomb_friction: axis.joint.coulomb_friction(),
+            friction_shape: axis.simulated.friction,
             brake_torque: 0.0,
         };
         let limits = &axis.limits;
@@ -300,11 +301,17 @@ impl YzAimParameters {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::FrictionShape;
 
     #[test]
     fn a_gear_converts_counts_and_torque_to_the_joint() {
-        let joint =
-            JointParameters { inertia: 1.0, viscous_friction: 0.0, coulomb_friction: 0.0, brake_torque: 0.0 };
+        let joint = JointParameters {
+            inertia: 1.0,
+            viscous_friction: 0.0,
+            coulomb_friction: 0.0,
+            friction_shape: FrictionShape::Constant,
+            brake_torque: 0.0,
+        };
         let screw = Gearing { ratio: 2.0, travel_per_turn: 0.005, is_reversed: true, zero_counts: 7.0 };
         let parameters = YzAimParameters::new(3, Model::Aim57x30C, screw, joint);
         assert_eq!(parameters.encoder.counts(0.005), -65_536 + 7);

@@ -98,7 +98,7 @@ async fn wait_for_end(
 ) -> Result<(), Failure> {
     let began_ns = c.now_ns();
     loop {
-        let word = reading::read_enabled(c, s, rated).await?.statusword;
+        let word = reading::read_enabled(c, s, rated).await?.status_bits();
         if word & statusword::BIT_13 != 0 {
             return Err(Failure::Homing("the drive reports a homing error (statusword bit 13)"));
         }

@@ -66,7 +66,7 @@ async fn condition(
 ) -> Result<(), Failure> {
     c.step("condition");
     let reading = reading::read(c, s, rated).await?;
-    let word = reading.statusword;
+    let word = reading.status_bits();
     report.add("state", "state", DriveState::decode(word).name(), statusword_words(word));
     report.add("statusword", "statusword", word, format!("0x{word:04X}"));
     if let Some(mode) = read_if_there(c, s, &MODES_OF_OPERATION_DISPLAY).await? {

@@ -40,7 +40,7 @@ pub async fn read(c: &SdoSession, s: &TargetDrive, rated: Option<f64>) -> Result
         velocity: velocity.map_or(f64::NAN, |velocity| s.velocity(velocity as f64)),
         torque: per_mille.and_then(|per_mille| torque(s, rated, per_mille)),
         current_a: None,
-        statusword: word,
+        statusword: Some(word),
         state: DriveState::decode(word).name(),
     })
 }
@@ -53,10 +53,10 @@ pub async fn read_enabled(
 ) -> Result<AxisReading, Failure> {
     let reading = read(c, s, rated).await?;
     c.show(reading);
-    match DriveState::decode(reading.statusword) {
+    match DriveState::decode(reading.status_bits()) {
         DriveState::OperationEnabled => Ok(reading),
         DriveState::Fault | DriveState::FaultReactionActive => Err(fault(c, s).await?),
-        _ => Err(Failure::Disabled { statusword: reading.statusword }),
+        _ => Err(Failure::Disabled { statusword: reading.status_bits() }),
     }
 }
 

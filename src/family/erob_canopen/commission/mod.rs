@@ -51,6 +51,10 @@ fn unsupported(task: &Task) -> Failure {
             "the firmware of an eRob has no object that restores its parameters (1011)",
             "restore them with the vendor's tool",
         ),
+        Task::ReleaseBrake { .. } => (
+            "the CANopen firmware of an eRob has no object that releases its brake",
+            "`enable` releases it, with torque",
+        ),
         Task::AutoHome { .. } => ("an eRob does not move by itself at power-up", "move it with `move`"),
         _ => (
             "an eRob needs no set-up for interpolation",

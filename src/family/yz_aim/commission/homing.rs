@@ -79,7 +79,7 @@ async fn wait(c: &SdoSession, s: &TargetDrive, began: i64, within_ns: Nanosecond
     loop {
         let reading = reading::read(c, s).await?;
         c.show(reading);
-        let word = reading.statusword;
+        let word = reading.status_bits();
         if word & words::ALARM != 0 {
             return Err(reading::faulted(reading::alarm(c).await?));
         }

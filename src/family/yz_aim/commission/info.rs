@@ -28,7 +28,7 @@ async fn condition(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Resu
     let clearing = alarm.advice().map_or(String::new(), |advice| format!("; {advice}"));
     report.add("alarm", "alarm", alarm.code(), format!("{alarm}{clearing}"));
     let reading = reading::read(c, s).await?;
-    let word = reading.statusword;
+    let word = reading.status_bits();
     report.add("state", "state", reading.state, format!("{} ({})", reading.state, words::statusword(word)));
     report.add("statusword", "statusword", word, format!("0x{word:04X}"));
     let mode = c.read(&MODES_OF_OPERATION).await?;

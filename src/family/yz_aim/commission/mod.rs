@@ -58,8 +58,12 @@ pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Re
         Task::Gear { ratio } => settings::gear(c, s, ratio).await,
         Task::AutoHome { is_on, is_confirmed } => settings::auto_home(c, s, is_on, is_confirmed).await,
         Task::Interpolation => settings::interpolation(c, s).await,
-        Task::Read { .. } | Task::Write { .. } => {
-            Err(Failure::Unsuitable("objects are read and written without their family".to_owned()))
+        Task::ReleaseBrake { .. } => Err(Failure::Unsupported {
+            what: "a YZ-AIM has no object that releases its brake".to_owned(),
+            instead: "`enable` releases it, with torque".to_owned(),
+        }),
+        Task::Scan | Task::Read { .. } | Task::Write { .. } => {
+            Err(Failure::Unsuitable("scanning, reading and writing are done without the family".to_owned()))
         }
     }
 }

@@ -96,7 +96,7 @@ pub async fn position(
                 (Some(distance), here.saturating_add(distance), 1, 0)
             }
             MoveKind::Reciprocate { to, times, dwell_ns } => {
-                (None, s.position_counts(to), 2 * times, dwell_ns)
+                (None, s.position_counts(to), ends(times), dwell_ns)
             }
             MoveKind::Continuous { .. } => {
                 return Err(Failure::Unsuitable("a continuous move has no target".to_owned()));
@@ -155,7 +155,7 @@ impl SetPoint {
         loop {
             let reading = reading::read_enabled(c, s).await?;
             let counts = reading.position_counts;
-            if reading.statusword & words::TARGET_REACHED != 0 && (counts - self.to).abs() <= near {
+            if reading.status_bits() & words::TARGET_REACHED != 0 && (counts - self.to).abs() <= near {
                 return Ok(());
             }
             let has_moved = (counts - self.from).abs() > near;
@@ -254,6 +254,11 @@ fn drive_profile(s: &TargetDrive, profile: &MotionProfile) -> Result<DriveProfil
         s.drive_profile(&MotionProfile { velocity: profile.velocity, acceleration, deceleration })?;
     let slower = profile.acceleration.min(profile.deceleration);
     Ok(DriveProfile { acceleration: slower, deceleration: None, ..profile })
+}
+
+/// So many ends a reciprocating move has; without a number of repetitions it goes on until it is interrupted.
+fn ends(times: Option<u32>) -> u32 {
+    times.map_or(u32::MAX, |times| times.saturating_mul(2))
 }
 
 /// Reads from the drive what the profile leaves open.

@@ -30,7 +30,7 @@ pub async fn read(c: &SdoSession, s: &TargetDrive) -> Result<AxisReading, Failur
         velocity: s.velocity(velocity as f64 * TENTHS),
         torque: None,
         current_a: Some(current as f64 / 2000.0),
-        statusword: word,
+        statusword: Some(word),
         state: words::state(word),
     })
 }
@@ -39,13 +39,13 @@ pub async fn read(c: &SdoSession, s: &TargetDrive) -> Result<AxisReading, Failur
 pub async fn read_enabled(c: &SdoSession, s: &TargetDrive) -> Result<AxisReading, Failure> {
     let reading = read(c, s).await?;
     c.show(reading);
-    if reading.statusword & words::ALARM != 0 {
+    if reading.status_bits() & words::ALARM != 0 {
         return Err(faulted(alarm(c).await?));
     }
-    if words::is_enabled(reading.statusword) {
+    if words::is_enabled(reading.status_bits()) {
         return Ok(reading);
     }
-    Err(Failure::Disabled { statusword: reading.statusword })
+    Err(Failure::Disabled { statusword: reading.status_bits() })
 }
 
 /// Reads the alarm, object 260E.

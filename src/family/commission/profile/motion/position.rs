@@ -37,7 +37,7 @@ pub async fn run(
         let (target, stops, dwell_ns) = match kind {
             MoveKind::Absolute { to, .. } => (s.position_counts(to), 1, 0),
             MoveKind::Relative(by) => (here.saturating_add(s.distance_counts(by)), 1, 0),
-            MoveKind::Reciprocate { to, times, dwell_ns } => (s.position_counts(to), 2 * times, dwell_ns),
+            MoveKind::Reciprocate { to, times, dwell_ns } => (s.position_counts(to), ends(times), dwell_ns),
             MoveKind::Continuous { .. } => {
                 return Err(Failure::Unsuitable("a continuous move has no target".to_owned()));
             }
@@ -58,6 +58,11 @@ pub async fn run(
         Ok(polling::move_report(s, here, target, stops, reached - at))
     };
     with_torque(c, s, keeps_enabled, work).await
+}
+
+/// So many ends a reciprocating move has; without a number of repetitions it goes on until it is interrupted.
+fn ends(times: Option<u32>) -> u32 {
+    times.map_or(u32::MAX, |times| times.saturating_mul(2))
 }
 
 /// Reads from the drive what the profile leaves open.
@@ -109,7 +114,7 @@ async fn arrive(
     loop {
         let reading = reading::read_enabled(c, s, rated).await?;
         let is_near = (reading.position_counts - to).abs() <= near;
-        if reading.statusword & statusword::TARGET_REACHED != 0 && is_near {
+        if reading.status_bits() & statusword::TARGET_REACHED != 0 && is_near {
             return Ok(());
         }
         let waited_ns = c.now_ns().saturating_sub(began_ns);

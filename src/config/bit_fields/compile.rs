@@ -1,0 +1,225 @@
+//! From a description to the frames of the cycle: values in SI units at the joint become the codes of the drive's fields.
+
+use std::f64::consts::TAU;
+
+use takt_rt::{
+    BesideTarget, BitField, CommandValue, FieldDriveParameters, FieldFrame, FieldGains, FieldValue,
+    LayoutError, LifeCycle, LinearScale, OwnFrames, PositionReference, ReplyValue, SenderByte,
+};
+
+use super::{
+    BesideTargetKind, DescribedLifeCycle, DescribedScale, FieldDescription, FieldDevice, FieldUnit,
+    FrameDescription, Setting,
+};
+use crate::config::{Axis, Control};
+
+/// How much faster than its velocity limit a drive may go that follows positions: it has to catch up with them.
+const CATCHING_UP: f64 = 1.5;
+
+/// What stands between the joint and the shaft whose position the drive reports.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transmission {
+    /// 1, or -1 where the drive counts the other way.
+    pub direction: f64,
+    /// Travel of the joint for one radian of the shaft: rad (m).
+    pub lever: f64,
+    /// The reported turns at which the joint is at zero.
+    pub zero_turns: f64,
+}
+
+impl Transmission {
+    /// The joint is the shaft.
+    const DIRECT: Self = Self { direction: 1.0, lever: 1.0, zero_turns: 0.0 };
+
+    /// Of an axis.
+    pub fn of(axis: &Axis) -> Self {
+        Self {
+            direction: if axis.reversed { -1.0 } else { 1.0 },
+            lever: axis.travel.per_turn() / (TAU * axis.gear_ratio),
+            zero_turns: f64::from(axis.zero_counts) / axis.counts_per_turn,
+        }
+    }
+
+    /// The same with the joint at zero where the shaft is.
+    const fn without_zero(self) -> Self {
+        Self { zero_turns: 0.0, ..self }
+    }
+}
+
+impl FieldDevice {
+    /// What one SI unit at the joint is in the unit of a field.
+    fn per_joint_unit(&self, unit: FieldUnit, by: Transmission) -> f64 {
+        let Transmission { direction, lever, .. } = by;
+        let setting = |setting| self.settings.get(setting).unwrap_or(1.0);
+        match unit {
+            FieldUnit::Radians | FieldUnit::RadiansPerSecond => direction / lever,
+            FieldUnit::Turns | FieldUnit::TurnsPerSecond => direction / lever / TAU,
+            FieldUnit::ElectricalHertz => direction / lever / TAU * setting(Setting::PolePairs),
+            FieldUnit::NewtonMetres => direction * lever,
+            FieldUnit::Amperes => direction * lever / setting(Setting::TorqueConstant),
+            FieldUnit::NewtonMetresPerRadian | FieldUnit::NewtonMetreSecondsPerRadian => lever * lever,
+            FieldUnit::DegreesCelsius | FieldUnit::Codes => 1.0,
+        }
+    }
+
+    fn scale(&self, scale: DescribedScale, by: Transmission) -> LinearScale {
+        let codes_per_unit = scale.codes / self.amount(scale.are);
+        let zero = match scale.unit {
+            FieldUnit::Turns => by.zero_turns,
+            FieldUnit::Radians => by.zero_turns * TAU,
+            _ => 0.0,
+        };
+        LinearScale {
+            codes_per_unit: codes_per_unit * self.per_joint_unit(scale.unit, by),
+            zero_code: scale.zero + codes_per_unit * zero,
+        }
+    }
+
+    fn frame<V: FieldValue>(
+        &self,
+        frame: &FrameDescription<V>,
+        motor: u8,
+        by: Transmission,
+    ) -> Result<FieldFrame<V>, LayoutError> {
+        let fields: Vec<BitField<V>> = frame
+            .fields
+            .iter()
+            .map(|field| {
+                let FieldDescription { value, bits, number, scale, codes } = *field;
+                BitField { value, bits, number, scale: self.scale(scale, by), codes }
+            })
+            .collect();
+        FieldFrame::compile(
+            self.id(&frame.id, motor),
+            self.format(frame.format),
+            frame.bytes,
+            frame.order,
+            &fields,
+        )
+    }
+
+    /// Whether the fields of the command fit its frame.
+    ///
+    /// # Errors
+    /// What is wrong with a field.
+    pub fn check_command(&self) -> Result<(), LayoutError> {
+        self.frame(&self.description.command, 1, Transmission::DIRECT).map(|_| ())
+    }
+
+    /// Whether the fields of the reply fit its frame.
+    ///
+    /// # Errors
+    /// What is wrong with a field.
+    pub fn check_reply(&self) -> Result<(), LayoutError> {
+        self.frame(&self.description.reply, 1, Transmission::DIRECT).map(|_| ())
+    }
+
+    /// What the cycle needs to speak to the drive of an axis.
+    ///
+    /// # Errors
+    /// What is wrong with a field. A description that was read has none of that.
+    pub fn compile(&self, axis: &Axis) -> Result<FieldDriveParameters, LayoutError> {
+        let (description, by) = (&self.description, Transmission::of(axis));
+        let to_drive = match description.position_reference {
+            PositionReference::Zero => by,
+            // A distance has no zero.
+            PositionReference::Present => by.without_zero(),
+        };
+        let reply = self.frame(&description.reply, axis.node, by)?;
+        let reply = match description.states {
+            Some(states) => reply.with_states(states),
+            None => reply,
+        };
+        Ok(FieldDriveParameters {
+            command: self.frame(&description.command, axis.node, to_drive)?,
+            reply: match self.sender_byte(axis.node) {
+                Some(sender) => reply.sent_by(sender),
+                None => reply,
+            },
+            life_cycle: self.life_cycle(axis.node),
+            position_reference: description.position_reference,
+            beside_target: match description.beside_target {
+                BesideTargetKind::FeedForward => BesideTarget::FeedForward,
+                // A limit has no direction.
+                BesideTargetKind::Limits => BesideTarget::Limits {
+                    velocity: by.direction * CATCHING_UP * axis.limits.velocity,
+                    torque: by.direction * axis.limits.torque,
+                },
+            },
+            gains: self.gains(&axis.control),
+            position_span: self.position_span(by),
+        })
+    }
+
+    /// The gains of the drive's own loop: a spring and a damper are those of each cycle where the axis is led by torques.
+    fn gains(&self, control: &Control) -> FieldGains {
+        let setting = |setting| self.settings.get(setting).unwrap_or(0.0);
+        let (stiffness, damping) = (setting(Setting::PositionGain), setting(Setting::PositionDamping));
+        match control {
+            Control::Torque { .. } if self.has_impedance() => FieldGains::Commanded,
+            // A velocity is followed by the damping alone.
+            Control::Velocity { .. } if self.has_impedance() => FieldGains::Fixed { stiffness: 0.0, damping },
+            _ => FieldGains::Fixed { stiffness, damping },
+        }
+    }
+
+    /// The byte of a reply that has the motor ID, if one has.
+    fn sender_byte(&self, motor: u8) -> Option<SenderByte> {
+        let bits = self.description.reply.field(ReplyValue::Sender)?.bits;
+        let is_byte = bits.low.is_none() && bits.high.width == 8 && bits.high.at.is_multiple_of(8);
+        let at = u8::try_from(bits.high.at / 8).ok()?;
+        is_byte.then_some(SenderByte { at, value: motor })
+    }
+
+    /// The range of the joint in which the reported position wraps around.
+    fn position_span(&self, by: Transmission) -> Option<f64> {
+        let field = self.description.reply.field(ReplyValue::Position).filter(|_| self.description.wraps)?;
+        let codes = f64::from(field.width()).exp2();
+        Some(codes / self.scale(field.scale, by).codes_per_unit.abs())
+    }
+
+    /// The positions of the joint that command and reply can carry; `None` where they carry every one.
+    pub fn position_range(&self, axis: &Axis) -> Option<(f64, f64)> {
+        let by = Transmission::of(axis);
+        let ends = |scale: DescribedScale, codes: (f64, f64)| {
+            let LinearScale { codes_per_unit, zero_code } = self.scale(scale, by);
+            let ends = [codes.0, codes.1].map(|code| (code - zero_code) / codes_per_unit);
+            (ends[0].min(ends[1]), ends[0].max(ends[1]))
+        };
+        let command = self.description.command.field(CommandValue::Position);
+        let reply = self.description.reply.field(ReplyValue::Position);
+        let command = command.filter(|_| {
+            self.description.position_reference == PositionReference::Zero && !self.description.wraps
+        });
+        let command = command.map(|field| ends(field.scale, field.code_range()));
+        let reply =
+            reply.filter(|_| !self.description.wraps).map(|field| ends(field.scale, field.code_range()));
+        command.into_iter().chain(reply).reduce(|one, other| (one.0.max(other.0), one.1.min(other.1)))
+    }
+
+    /// The highest value at the joint that the field of a command can carry, if there is such a field.
+    pub fn most(&self, value: CommandValue, axis: &Axis) -> Option<f64> {
+        let field = self.description.command.field(value)?;
+        let LinearScale { codes_per_unit, zero_code } = self.scale(field.scale, Transmission::of(axis));
+        let (_, highest) = field.code_range();
+        Some((highest - zero_code) / codes_per_unit.abs())
+    }
+
+    fn life_cycle(&self, motor: u8) -> LifeCycle {
+        match &self.description.life_cycle {
+            DescribedLifeCycle::ByFields(modes) => LifeCycle::ByFields { modes: *modes },
+            DescribedLifeCycle::ByFrames(frames) => {
+                let optional = |frame: &Option<_>| frame.as_ref().map(|frame| self.fixed(frame, motor));
+                LifeCycle::ByFrames(OwnFrames {
+                    start: self.fixed(&frames.start, motor),
+                    stop: self.fixed(&frames.stop, motor),
+                    zero: optional(&frames.zero),
+                    clear: optional(&frames.clear),
+                    torque: optional(&frames.torque),
+                    velocity: optional(&frames.velocity),
+                    position: optional(&frames.position),
+                })
+            }
+        }
+    }
+}

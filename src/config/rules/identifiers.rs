@@ -1,0 +1,99 @@
+//! Identifiers that two stations of a bus would send: where both send at once, their frames destroy each other.
+//!
+//! Axes of CANopen nodes have identifiers that never meet, so only drives with frames of their own are looked at.
+
+use std::ops::Range;
+
+use takt_rt::Id;
+
+use crate::canopen::function_code;
+use crate::config::bit_fields::FieldDevice;
+use crate::config::identifiers::IdUse;
+use crate::config::model::Axis;
+use crate::config::problem_kind::ProblemKind;
+use crate::config::spot::Spot;
+
+/// Checks the identifiers of an axis against those of CANopen, its own, and those of other axes.
+pub fn axis<'a, 'o>(
+    axis: &Axis,
+    others: impl Iterator<Item = (&'o Axis, Option<&'o Range<usize>>)>,
+    master_node: u8,
+    at: impl Fn(&str) -> Spot<'a>,
+) {
+    let device = axis.drive.description::<FieldDevice>();
+    let own = axis.drive.frame_identifiers(axis.node);
+    if let Some(device) = device {
+        reserved(&own, master_node, &at);
+        let reply = device.reply_id(axis.node);
+        // A drive that replies by its motor ID, whatever it is set to, does so by its nature.
+        let is_set = device.description.reply.id.has_master();
+        if is_set && device.request_ids(axis.node).contains(&reply) {
+            let value = format!("{}, by which the commands to the motor are sent", show(reply));
+            at("master_id").report_range(value, "another identifier than that of the commands".to_owned());
+        }
+    }
+    for (other, first) in others.filter(|(other, _)| (other.bus, other.node) != (axis.bus, axis.node)) {
+        let is_looked_at = device.is_some() || other.drive.description::<FieldDevice>().is_some();
+        if other.bus == axis.bus && is_looked_at {
+            between(&own, other, first, &at);
+        }
+    }
+}
+
+fn show(id: Id) -> String {
+    if id.is_extended() { format!("0x{:08X}", id.value()) } else { format!("0x{:03X}", id.value()) }
+}
+
+/// The key that an identifier comes from.
+const fn key_of(used: IdUse) -> &'static str {
+    match used {
+        IdUse::Reply => "master_id",
+        IdUse::Request | IdUse::Setup | IdUse::Node => "node",
+    }
+}
+
+/// What CANopen sends to all nodes, and the heartbeat of the controller.
+fn reserved<'a>(own: &[(Id, IdUse)], master_node: u8, at: &impl Fn(&str) -> Spot<'a>) {
+    let names = [
+        (Id::canopen(function_code::NMT, 0), "NMT"),
+        (Id::canopen(function_code::SYNC, 0), "SYNC"),
+        (Id::canopen(function_code::TIME, 0), "TIME"),
+        (Id::canopen(function_code::ERROR_CONTROL, master_node), "the heartbeat of the controller"),
+    ];
+    for (id, used) in own {
+        if let Some((_, name)) = names.iter().find(|(reserved, _)| reserved == id) {
+            let value = format!("identifier {}, which is that of {name} in CANopen", show(*id));
+            at(key_of(*used)).report_range(value, "an identifier that nobody else sends".to_owned());
+        }
+    }
+}
+
+/// Reports the first identifier that an axis and an earlier one both use.
+fn between<'a>(
+    own: &[(Id, IdUse)],
+    other: &Axis,
+    first: Option<&Range<usize>>,
+    at: &impl Fn(&str) -> Spot<'a>,
+) {
+    let theirs = other.drive.frame_identifiers(other.node);
+    let met = own.iter().find_map(|(id, used)| {
+        let is_it = |(their_id, their_use): &&(Id, IdUse)| {
+            their_id == id && !(*used == IdUse::Setup && *their_use == IdUse::Setup)
+        };
+        theirs.iter().find(is_it).map(|(_, their_use)| (*id, *used, *their_use))
+    });
+    let Some((id, used, their_use)) = met else { return };
+    let value = format!("identifier {}, which axis `{}` on the same bus has, too", show(id), other.name);
+    let allowed = match (used, their_use) {
+        (IdUse::Reply, IdUse::Reply) => {
+            "an identifier of its own: two motors that reply at once by one identifier destroy each other's frames"
+        }
+        _ => "an identifier that no other drive on the bus sends or listens to",
+    };
+    let spot = at(key_of(used));
+    let kind = ProblemKind::OutOfRange { key: spot.key.clone(), value, allowed: allowed.to_owned() };
+    match first {
+        Some(first) => spot.report_against(kind, first),
+        None => spot.report(kind),
+    }
+}

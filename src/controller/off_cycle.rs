@@ -1,0 +1,56 @@
+//! The drives of a controller that are spoken to outside of the cycle.
+
+use takt_rt::{Frame, Snapshot};
+
+use crate::channels::HostSide;
+use crate::config::Config;
+use crate::family::{self, OffCycleDrive, OffCycleTarget};
+
+/// Those drives, each with its axis.
+pub(super) struct OffCycleDrives {
+    drives: Vec<OfAxis>,
+}
+
+struct OfAxis {
+    axis: usize,
+    group: usize,
+    bus: usize,
+    drive: Box<dyn OffCycleDrive>,
+}
+
+impl OffCycleDrives {
+    pub(super) fn new(config: &Config) -> Self {
+        let group_of = |axis: usize| {
+            let is_in = |group: &usize| config.axes_of_group(*group).contains(&axis);
+            (0..config.groups.len()).find(is_in).unwrap_or(0)
+        };
+        let drives = config.axes.iter().enumerate().filter_map(|(axis, own)| {
+            let drive = family::of(&own.drive).off_cycle(own, config)?;
+            Some(OfAxis { axis, group: group_of(axis), bus: own.bus, drive })
+        });
+        Self { drives: drives.collect() }
+    }
+
+    /// Takes a frame that is no process data.
+    pub(super) fn receive(&mut self, now_ns: u64, bus: usize, frame: &Frame) {
+        for own in self.drives.iter_mut().filter(|own| own.bus == bus) {
+            own.drive.receive(now_ns, frame);
+        }
+    }
+
+    /// Goes on with every drive.
+    pub(super) fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {
+        for OfAxis { axis, group, bus, drive } in &mut self.drives {
+            let Some(shown) = snapshot.axes.get(*axis) else { continue };
+            let phase = snapshot.groups().get(*group).map(|group| group.phase).unwrap_or_default();
+            let target = OffCycleTarget::of(shown, phase, snapshot.at_ns);
+            // A frame that finds no room is lost, as on a disturbed bus.
+            let report = drive.poll(now_ns, &target, &mut |frame| {
+                let _ = host.send_service(*bus, frame);
+            });
+            if let (Some(report), Ok(axis)) = (report, u8::try_from(*axis)) {
+                host.report_off_cycle(axis, report);
+            }
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! What is to be known about a bus behind an SLCAN adapter.
+
+use crate::config::{Config, Interface};
+use crate::family::WarningKind;
+use crate::family::bring_up::ProcessData;
+
+/// A line has these characters beside two for each byte of its frame: letter, identifier, length code and CR.
+const LINE_CHARACTERS: u64 = 6;
+/// A character is ten bits on a serial line: a start bit, eight bits, a stop bit.
+const BITS_PER_CHARACTER: u64 = 10;
+/// The devices of adapters without a chip for a serial line. USB alone says how fast they are.
+const WITHOUT_SERIAL_CHIP: &str = "ttyACM";
+
+/// The warnings about a bus, if it is behind an adapter.
+pub fn of_bus(config: &Config, bus: usize) -> Vec<WarningKind> {
+    let Some(settings) = config.buses.get(bus) else { return vec![] };
+    let Interface::Slcan(line) = &settings.interface else { return vec![] };
+    let mut kinds = vec![WarningKind::Adapter { interface: settings.interface.to_string() }];
+    let characters = longest_direction(config, bus);
+    let line_ns = characters * BITS_PER_CHARACTER * 1_000_000_000 / u64::from(line.baud_rate.max(1));
+    let period_ns = config.bus_cycle(bus).period_ns;
+    if line_ns > period_ns && !line.device.contains(WITHOUT_SERIAL_CHIP) {
+        let needed = characters * BITS_PER_CHARACTER * 1_000_000_000 / period_ns.max(1);
+        let device = line.device.clone();
+        kinds.push(WarningKind::SlowLine { device, baud_rate: line.baud_rate, line_ns, period_ns, needed });
+    }
+    kinds
+}
+
+/// The characters of a cycle in the direction that has more of them. A serial line carries both directions at once.
+fn longest_direction(config: &Config, bus: usize) -> u64 {
+    let sync = LINE_CHARACTERS;
+    let (mut to_drives, mut from_drives) = (sync, 0);
+    for axis in config.axes.iter().filter(|axis| axis.bus == bus) {
+        let data = ProcessData::of(axis, config);
+        let characters = |length: usize| LINE_CHARACTERS + 2 * length as u64;
+        to_drives += data.commands.iter().map(|pdo| characters(pdo.length())).sum::<u64>();
+        let sent = data.feedback.iter().chain(&data.unused);
+        from_drives += sent.map(|pdo| characters(pdo.length())).sum::<u64>();
+    }
+    to_drives.max(from_drives)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn warnings(interface: &str, period_ns: u64) -> Vec<String> {
+        let mut config = Config::load(Path::new("configs/arm6-erob.toml")).unwrap();
+        config.cycle.period_ns = period_ns;
+        config.buses[0].interface = interface.parse().unwrap();
+        of_bus(&config, 0).iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_bus_behind_an_adapter_is_not_hard_real_time_and_no_other_bus_is_warned_about() {
+        let words = warnings("slcan:/dev/ttyACM0", 1_000_000);
+        assert_eq!(words.len(), 1, "{words:?}");
+        assert!(words[0].contains("USB is not hard real time"), "{words:?}");
+        for interface in ["sim", "can0"] {
+            assert_eq!(warnings(interface, 1_000_000), Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn a_serial_line_that_is_slower_than_the_cycle_is_named_with_the_rate_that_it_would_need() {
+        let words = warnings("slcan:/dev/ttyUSB0@115200", 1_000_000);
+        assert!(words[1].contains("115200 baud") && words[1].contains("a cycle has 1 ms"), "{words:?}");
+        assert_eq!(warnings("slcan:/dev/ttyUSB0@3000000", 1_000_000).len(), 1);
+        assert_eq!(warnings("slcan:/dev/ttyUSB0@115200", 100_000_000).len(), 1);
+    }
+}

@@ -1,0 +1,304 @@
+//! Drives that are spoken to by frames of fixed bit fields, without an object dictionary: `drive = "bit-fields"`,
+//! `description = "damiao-dm-mit"`, or the path of a description file.
+//!
+//! A description says everything of a make of drive; nothing here knows one. It comes with takt (`drives/bit-fields/`), or from a file of
+//! your own. Families of one vendor (`family/hollow`) are the same with their own words.
+
+mod device;
+
+use std::f64::consts::TAU;
+
+use takt_rt::{
+    CommandValue, FieldDriveParameters, FieldMode, Frame, FrameFormat, ModeCondition, Nanoseconds,
+    OperationMode,
+};
+
+use super::bring_up::{AxisSession, ProcessData};
+use super::commission::{DriveTask, Failure, TargetDrive, Task};
+use super::{DataSheet, Family, SettingUp};
+use crate::config::bit_fields::{
+    self, BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings,
+};
+use crate::config::{
+    Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, ErrorControl, FamilyKeys,
+    ModeChangeRule, ModeSet, Quantity,
+};
+use crate::sim::Drive;
+use crate::sim::bit_fields::FieldSimulation;
+
+/// A family whose drives are described by a file.
+#[derive(Clone, Copy, Debug)]
+pub struct BitFieldFamily {
+    /// Its word in a configuration.
+    pub word: &'static str,
+    /// What people call such a drive.
+    pub name: &'static str,
+    /// The bit rates that the drives know; empty: any.
+    pub bit_rates: &'static [u32],
+    /// Finds the description. What is wrong with the keys is reported to them, and the answer is `None`.
+    pub describe: fn(&mut FamilyKeys<'_, '_>) -> Option<Description>,
+}
+
+/// Drives whose description the configuration names.
+pub static FROM_FILE: BitFieldFamily =
+    BitFieldFamily { word: "bit-fields", name: "drive", bit_rates: &[], describe: described };
+
+/// The descriptions that come with takt.
+const SHIPPED: [(&str, &str); 7] = [
+    ("damiao-dm-mit", include_str!("../../../drives/bit-fields/damiao-dm-mit.toml")),
+    (
+        "damiao-dm-position-velocity",
+        include_str!("../../../drives/bit-fields/damiao-dm-position-velocity.toml"),
+    ),
+    ("damiao-dm-velocity", include_str!("../../../drives/bit-fields/damiao-dm-velocity.toml")),
+    ("mini-cheetah", include_str!("../../../drives/bit-fields/mini-cheetah.toml")),
+    ("t-motor-ak-mit", include_str!("../../../drives/bit-fields/t-motor-ak-mit.toml")),
+    ("odrive-can-simple", include_str!("../../../drives/bit-fields/odrive-can-simple.toml")),
+    (
+        "odrive-can-simple-velocity",
+        include_str!("../../../drives/bit-fields/odrive-can-simple-velocity.toml"),
+    ),
+];
+
+/// A description that comes with takt.
+///
+/// # Panics
+/// It is wrong; a test reads each of them.
+pub fn shipped(name: &str, text: &str) -> Description {
+    bit_fields::parse(name, text).expect("the descriptions that come with takt are right")
+}
+
+/// The description that the key `description` names: one that comes with takt, or a file.
+fn described(keys: &mut FamilyKeys<'_, '_>) -> Option<Description> {
+    let names = SHIPPED.map(|(name, _)| format!("\"{name}\"")).join(", ");
+    keys.require(
+        "description",
+        "the description of the drive: description = \"damiao-dm-mit\", or the path of a file",
+    );
+    let name = keys.text("description")?;
+    if let Some((name, text)) = SHIPPED.iter().find(|(shipped, _)| *shipped == name) {
+        return Some(shipped(name, text));
+    }
+    let path = keys.path("description")?;
+    match bit_fields::load(&path) {
+        Ok(description) => Some(description),
+        Err(reason) => {
+            let allowed = format!("one of {names}, or the path of a description:\n{reason:?}");
+            keys.refuse("description", format!("{name:?}"), allowed);
+            None
+        }
+    }
+}
+
+/// The device of an axis of such a family.
+///
+/// # Panics
+/// The drive of the axis is of another family.
+pub fn device(axis: &Axis) -> &FieldDevice {
+    axis.drive.description().expect("a drive of this family is made from its description")
+}
+
+/// The numbers that a configuration may give are beyond all use outside of these.
+const NUMBERS: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+const POLE_PAIRS: std::ops::Range<i64> = 1..201;
+const MASTER_IDS: std::ops::Range<i64> = 0..0x800;
+
+/// What the configuration says of the drive. `None` where something is missing or wrong: all of it is reported.
+fn settings(keys: &mut FamilyKeys<'_, '_>, description: &Description) -> Option<Settings> {
+    let mut settings = Settings::default();
+    let mut is_complete = true;
+    if FieldDevice::needs_master_id(description) {
+        keys.require("master_id", "the identifier by which the motor replies: master_id = 0x65");
+        settings.master_id = keys.integer("master_id", MASTER_IDS).and_then(|id| u16::try_from(id).ok());
+        is_complete &= settings.master_id.is_some();
+    }
+    if description.command.format == FrameFormat::Fd {
+        let switches = keys.boolean("bit_rate_switch");
+        settings.has_bit_rate_switch = switches.unwrap_or(false);
+        is_complete &= switches.is_some();
+    }
+    let needed = FieldDevice::needed(description);
+    for setting in &needed {
+        keys.require(setting.key(), setting.says());
+    }
+    let of_setup = description.setup.iter().filter_map(|setup| Some(setup.number?.setting));
+    let gains =
+        [(Setting::PositionGain, CommandValue::Stiffness), (Setting::PositionDamping, CommandValue::Damping)];
+    let gains = gains.into_iter().filter(|(_, value)| description.command.field(*value).is_some());
+    let gains = gains.map(|(setting, _)| setting);
+    for setting in needed.iter().copied().chain(of_setup).chain(gains) {
+        if let Some(number) = number(keys, setting) {
+            settings.set(setting, number);
+        }
+    }
+    let is_given = |setting: &Setting| settings.get(*setting).is_some();
+    (is_complete && needed.iter().all(is_given)).then_some(settings)
+}
+
+fn number(keys: &mut FamilyKeys<'_, '_>, setting: Setting) -> Option<f64> {
+    let key = setting.key();
+    match setting {
+        Setting::PositionFullScale => keys.quantity(key, Quantity::ANGLE, 1e-3..=1e6 * TAU),
+        Setting::VelocityFullScale => keys.quantity(key, Quantity::ANGULAR_VELOCITY, NUMBERS),
+        Setting::TorqueFullScale => keys.quantity(key, Quantity::TORQUE, NUMBERS),
+        Setting::PolePairs => keys.integer(key, POLE_PAIRS).map(|pairs| pairs as f64),
+        Setting::PositionGain | Setting::PositionDamping => keys.number(key, 0.0..=1e6),
+        Setting::CurrentFullScale
+        | Setting::TorqueConstant
+        | Setting::VelocityLoopKp
+        | Setting::VelocityLoopKi
+        | Setting::CurrentLoopKp
+        | Setting::CurrentLoopKi => keys.number(key, NUMBERS),
+    }
+}
+
+impl BitFieldFamily {
+    fn facts(&self, device: &FieldDevice) -> DriveFacts {
+        let description = &device.description;
+        let modes: Vec<OperationMode> = description.modes.iter().map(|mode| operation_mode(*mode)).collect();
+        let follows_positions = description.modes.contains(&FieldMode::Position);
+        let usual_gain = crate::config::defaults::position_gain(1e-3);
+        DriveFacts {
+            counts_per_turn: Some(device.counts_per_turn()),
+            modes: ModeSet::of(&modes),
+            usual_mode: match follows_positions {
+                true => Control::Position,
+                false => Control::Velocity { position_gain: usual_gain },
+            },
+            mode_changes: match (description.modes.len(), device.has_impedance()) {
+                (1, _) => ModeChangeRule::Never { because: "it has one mode" },
+                (_, true) => {
+                    ModeChangeRule::Never { because: "the gains in its commands are those of one mode" }
+                }
+                _ => ModeChangeRule::When(ModeCondition::AtRest),
+            },
+            bit_rates: self.bit_rates,
+            has_fixed_process_data: description.beside_target == BesideTargetKind::Limits,
+            has_field_frames: true,
+            error_control: ErrorControl::None,
+            consumes_heartbeat: false,
+            sends_emergencies: false,
+            ..DriveFacts::standard(self.word, self.name)
+        }
+    }
+}
+
+const fn operation_mode(mode: FieldMode) -> OperationMode {
+    match mode {
+        FieldMode::Torque => OperationMode::CyclicSynchronousTorque,
+        FieldMode::Velocity => OperationMode::CyclicSynchronousVelocity,
+        FieldMode::Position => OperationMode::CyclicSynchronousPosition,
+    }
+}
+
+impl ConfiguredFamily for BitFieldFamily {
+    fn word(&self) -> &'static str {
+        self.word
+    }
+
+    fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
+        let Some(description) = (self.describe)(keys) else {
+            // Which of these the drive has is not known.
+            Setting::ALL.into_iter().for_each(|(key, _)| keys.pass_over(key));
+            ["master_id", "bit_rate_switch"].into_iter().for_each(|key| keys.pass_over(key));
+            return None;
+        };
+        let settings = settings(keys, &description)?;
+        let device = FieldDevice { description, settings };
+        Some(DriveFamily::of_drive(self.facts(&device), device))
+    }
+}
+
+/// The pause before a frame that sets a drive up, beside the time that its reply takes.
+const SETUP_PAUSE_NS: Nanoseconds = 2_000_000;
+
+impl Family for BitFieldFamily {
+    /// Nothing is known of a drive without its scales.
+    fn unconfigured(&self) -> Option<DriveFamily> {
+        None
+    }
+
+    /// There are no PDOs.
+    fn process_data(&self, _: &Axis) -> ProcessData {
+        ProcessData { commands: vec![], feedback: vec![], unused: vec![] }
+    }
+
+    fn field_drive(&self, axis: &Axis) -> Option<FieldDriveParameters> {
+        device(axis).compile(axis).ok()
+    }
+
+    /// Sends the frames that set the drive up. Whether it is there, the cycle sees, which stops it first.
+    fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(async move {
+            let device = device(c.axis);
+            let reply_ns = match device.description.reply_moment {
+                ReplyMoment::AfterCommand { delay_ns } => delay_ns,
+                ReplyMoment::Cyclic { .. } => 0,
+            };
+            let setup = device.setup(c.axis.node);
+            if setup.is_empty() {
+                return Ok(());
+            }
+            c.step("set the motor up", "check the supply of the motor and the wiring");
+            // It may have been switched on just now, and nothing shows when it listens.
+            c.pause(c.axis.power_up_ns).await;
+            for frame in setup {
+                c.pause(SETUP_PAUSE_NS.saturating_add(reply_ns)).await;
+                c.send(Frame::of(frame.id, frame.payload));
+            }
+            Ok(())
+        })
+    }
+
+    /// The drive has no network states.
+    fn start<'a>(&'a self, _: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(async { Ok(()) })
+    }
+
+    /// The cycle has taken its torque away.
+    fn shut_down<'a>(&'a self, _: &'a AxisSession<'a>) -> SettingUp<'a> {
+        Box::pin(async { Ok(()) })
+    }
+
+    fn data_sheet<'d>(&self, drive: &'d DriveFamily) -> Option<&'d dyn DataSheet> {
+        let device: &FieldDevice = drive.description()?;
+        Some(device)
+    }
+
+    fn error_words(&self, code: u16) -> String {
+        format!("error {code} of the drive")
+    }
+
+    fn error_cure(&self, _: u16) -> Option<&'static str> {
+        Some("remove its cause, then reset the fault; if it stays, power-cycle the drive")
+    }
+
+    fn instead_of_lss(&self) -> Option<&'static str> {
+        Some("the IDs of such a drive are set with its vendor's tool")
+    }
+
+    fn commission(&self, _: TargetDrive, _: Task) -> Result<DriveTask<Frame>, Failure> {
+        Err(Failure::Unsupported {
+            what: "the drive has no object dictionary".to_owned(),
+            instead: "move it with `takt run` or `takt play`, and set it up with its vendor's tool"
+                .to_owned(),
+        })
+    }
+
+    fn simulated(&self, axis: &Axis, _: &Config) -> Box<dyn Drive> {
+        Box::new(FieldSimulation::new(device::parameters(axis, device(axis))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_description_that_comes_with_takt_is_right_and_says_where_it_is_from() {
+        for (name, text) in SHIPPED {
+            let description = shipped(name, text);
+            assert!(!description.drive.sources.is_empty() && !description.modes.is_empty(), "{name}");
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! Commissioning of a drive by eRob's own protocol: the tasks of `takt drive`.
+//!
+//! - `selection`: what the user reads and writes, by name or address, with units and words.
+//! - `moving`: the motions, with the limits of the axis.
+//! - `inspection`: what the drive tells of itself; the other drives on the bus.
+//! - `upkeep`: saving, node ID, brake, faults, the count of turns.
+//! - `words`: requests and replies in words.
+
+mod inspection;
+mod moving;
+mod selection;
+mod upkeep;
+mod words;
+
+use takt_rt::{Frame, Nanoseconds};
+
+use super::failure;
+use crate::erob_can::client::{RequestClient, RequestError, RequestFailure, RequestTiming};
+use crate::erob_can::entries::{self, EntryAccess, Values};
+use crate::erob_can::frame::NODES;
+use crate::family::commission::{
+    AnsweredProtocol, DriveTask, Failure, NamedEntry, Report, TargetDrive, Task,
+};
+use crate::procedure::{ErobCanSession, Procedure};
+
+/// How long to wait for an answer of CANopen firmware.
+const OTHER_PROTOCOL_NS: Nanoseconds = 50_000_000;
+
+/// A task with a drive.
+///
+/// # Errors
+/// Such a drive cannot do it, or a name or a value is wrong.
+pub fn begin(target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failure> {
+    if !NODES.contains(&target.node) {
+        return Err(Failure::Unsuitable(format!(
+            "an eRob with its own protocol has a node ID from 1 to 64, not {}",
+            target.node
+        )));
+    }
+    let work = Work::of(&target, task)?;
+    let session = ErobCanSession::new(RequestClient::new(target.node, RequestTiming::default()));
+    let mut words = words::Words::new(target.clone());
+    let procedure = Procedure::new(session.clone(), async move { carry_out(&session, &target, work).await });
+    Ok(DriveTask::new(procedure, move |frame| words.of(frame)))
+}
+
+/// A task whose entries have been found.
+enum Work {
+    Read(Vec<selection::ToRead>),
+    Write(selection::ToWrite),
+    Task(Task),
+}
+
+impl Work {
+    fn of(target: &TargetDrive, task: Task) -> Result<Self, Failure> {
+        Ok(match task {
+            Task::Read { names, data_type } => Self::Read(selection::to_read(&names, data_type)?),
+            Task::Write { name, value, data_type } => {
+                Self::Write(selection::to_write(target, &name, &value, data_type)?)
+            }
+            task => match unsupported(&task) {
+                Some(failure) => return Err(failure),
+                None => Self::Task(task),
+            },
+        })
+    }
+}
+
+async fn carry_out(c: &ErobCanSession, s: &TargetDrive, work: Work) -> Result<Report, Failure> {
+    match work {
+        Work::Read(entries) => {
+            connect(c, s).await?;
+            selection::read(c, s, &entries).await
+        }
+        Work::Write(write) => {
+            connect(c, s).await?;
+            selection::write(c, s, write).await
+        }
+        Work::Task(Task::Scan) => inspection::scan(c).await,
+        Work::Task(task) => match task {
+            Task::Info => inspection::info(c, s).await,
+            Task::Watch { every_ns, duration_ns } => inspection::watch(c, s, every_ns, duration_ns).await,
+            Task::Enable { hold_ns, keeps_enabled } => moving::enable(c, s, hold_ns, keeps_enabled).await,
+            Task::Disable => moving::disable(c, s).await,
+            Task::Move { kind, profile, keeps_enabled } => {
+                moving::run_move(c, s, kind, profile, keeps_enabled).await
+            }
+            Task::Velocity { velocity, profile, duration_ns, keeps_enabled } => {
+                moving::velocity(c, s, velocity, profile, duration_ns, keeps_enabled).await
+            }
+            Task::Torque { torque, velocity_limit, duration_ns } => {
+                moving::torque(c, s, torque, velocity_limit, duration_ns).await
+            }
+            Task::Save => upkeep::save(c, s).await,
+            Task::SetId { node } => upkeep::set_id(c, s, node).await,
+            Task::ReleaseBrake { is_confirmed } => upkeep::release_brake(c, s, is_confirmed).await,
+            Task::Zero { is_confirmed } => upkeep::clear_turns(c, s, is_confirmed).await,
+            Task::ClearFault { .. } => upkeep::clear_fault(c, s).await,
+            task => Err(unsupported(&task).unwrap_or(Failure::Interrupted)),
+        },
+    }
+}
+
+/// Waits until the drive answers. It reads the position, which changes nothing.
+async fn connect(c: &ErobCanSession, s: &TargetDrive) -> Result<(), Failure> {
+    c.step("contact");
+    let end_ns = c.now_ns().saturating_add(s.patience_ns);
+    loop {
+        match c.read(&entries::ACTUAL_POSITION).await {
+            Ok(_) | Err(RequestError { failure: RequestFailure::Refused(_), .. }) => return Ok(()),
+            Err(RequestError { failure: RequestFailure::NoReply, .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+        if c.is_interrupted() {
+            return Err(Failure::Interrupted);
+        }
+        if c.now_ns() >= end_ns {
+            break;
+        }
+    }
+    let mut other_protocol = None;
+    if let Some(other) = s.family().other_protocol(s.node)
+        && c.answers(other.request, other.answer, OTHER_PROTOCOL_NS).await
+    {
+        other_protocol = Some(AnsweredProtocol { name: other.name, cure: other.cure });
+    }
+    Err(Failure::Silent { node: s.node, reported: None, other_protocol })
+}
+
+/// Everything in the table of the manual.
+pub fn entries() -> Vec<NamedEntry> {
+    let named = entries::ALL.iter().map(|entry| NamedEntry {
+        address: entry.address.to_string(),
+        name: entry.name,
+        access: match entry.access {
+            EntryAccess::Read => "read",
+            EntryAccess::ReadWrite => "read, write",
+            EntryAccess::Write => "write",
+            EntryAccess::Command | EntryAccess::CommandWithArgument => "command",
+        },
+        unit: entry.unit.symbol().to_owned(),
+        values: if entry.values == Values::Any { String::new() } else { entry.values.to_string() },
+        note: entry.note,
+    });
+    named.collect()
+}
+
+/// Why a drive with this protocol cannot do a task; `None` where it can.
+fn unsupported(task: &Task) -> Option<Failure> {
+    let (what, instead) = match task {
+        Task::Home { .. } => (
+            "the own protocol of an eRob has no homing",
+            "its encoder is absolute: set `zero_counts` in the configuration",
+        ),
+        Task::Restore { .. } => (
+            "the own protocol of an eRob has no command that restores its parameters",
+            "restore them with the vendor's tool",
+        ),
+        Task::SetBitRate { .. } => {
+            ("the bit rate of an eRob is fixed at 1 Mbit/s", "set the bus to 1 Mbit/s instead")
+        }
+        Task::Gains { .. } => (
+            "the gains of an eRob suit most applications, and have no ranges in the manual",
+            "`read` and `write` them: \"position loop gain\", \"velocity loop gain\", \"velocity loop integral\"",
+        ),
+        Task::Gear { .. } => (
+            "an eRob has no electronic gear",
+            "it counts turns of its output; `gear_ratio` in the configuration is for a transmission behind it",
+        ),
+        Task::AutoHome { .. } => ("an eRob does not move by itself at power-up", "move it with `move`"),
+        Task::Interpolation => (
+            "the own protocol of an eRob has no interpolation",
+            "CANopen firmware has cyclic modes that interpolate by themselves",
+        ),
+        _ => return None,
+    };
+    Some(Failure::Unsupported { what: what.to_owned(), instead: instead.to_owned() })
+}

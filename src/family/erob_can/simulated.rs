@@ -1,0 +1,59 @@
+//! The drive that stands in for an axis on a simulated bus, or on an interface by `takt sim`.
+
+use crate::config::{Axis, FamilyKeys};
+use crate::sim::Drive;
+use crate::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
+use crate::sim::plant::{Encoder, JointParameters};
+
+/// From a request to its reply: up to 1 ms in the captures of the manual.
+const REPLY_NS: u64 = 500_000;
+/// Until a drive can be enabled after power-on (cure of the errors 001F and 0056).
+const READY_NS: u64 = 8_000_000_000;
+/// Torque of a turn of the field for one ampere where the axis says nothing of it: that of an eRob70 with a ratio of 100.
+const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
+
+/// In what firmware differs, as far as the simulation can show it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Firmware {
+    /// Whether the velocity limit of torque control (0204) is taken while the motor is enabled. By the manual it is not; a program
+    /// of the vendor writes it in every loop while enabled, so there seems to be firmware that takes it.
+    takes_velocity_limit_while_enabled: bool,
+}
+
+impl Firmware {
+    /// Reads the keys of the simulated drive. `None`: something is wrong with them, which has been reported.
+    pub fn read(keys: &mut FamilyKeys<'_, '_>) -> Option<Self> {
+        let takes_velocity_limit_while_enabled = keys.simulated_flag("takes_velocity_limit_while_enabled")?;
+        Some(Self { takes_velocity_limit_while_enabled })
+    }
+}
+
+/// The drive that simulates an axis. It has been switched on for as long as it needs to be enabled.
+pub fn drive(axis: &Axis) -> Box<dyn Drive> {
+    let firmware = axis.drive.description::<Firmware>().copied().unwrap_or_default();
+    let direction = if axis.reversed { -1.0 } else { 1.0 };
+    let counts_per_unit = direction * axis.counts_per_turn * axis.gear_ratio / axis.travel.per_turn();
+    let joint = &axis.simulated;
+    Box::new(ErobCanDrive::new(ErobCanParameters {
+        node: axis.node,
+        joint: JointParameters {
+            inertia: axis.joint.inertia(),
+            viscous_friction: axis.joint.viscous_friction(),
+            coulomb_friction: axis.joint.coulomb_friction(),
+            friction_shape: axis.simulated.friction,
+            brake_torque: 2.0 * joint.peak_torque,
+        },
+        encoder: Encoder { counts_per_unit, zero_counts: axis.zero_counts.into() },
+        counts_per_turn: axis.counts_per_turn,
+        initial_position: joint.initial_position,
+        peak_torque: joint.peak_torque,
+        torque_per_ampere: TORQUE_PER_AMPERE,
+        highest_velocity: 1.5 * axis.limits.velocity,
+        ready_ns: axis.power_up_ns.min(READY_NS),
+        reply_ns: REPLY_NS,
+        has_battery: true,
+        has_brake: true,
+        error_form: ErrorForm::Printed,
+        has_free_velocity_limit: firmware.takes_velocity_limit_while_enabled,
+    }))
+}

@@ -1,0 +1,27 @@
+//! Hollow-shaft motors HO4307 to HO10025 (their manual, and field experience), in the loop over CAN and over CAN FD.
+//!
+//! They are drives of bit fields: the three protocols are descriptions beside this file. A motor is a slave that answers each frame with one
+//! reply, 500 µs later. It has no watchdog: without commands it goes on with the last one.
+
+use crate::config::FamilyKeys;
+use crate::config::bit_fields::Description;
+use crate::family::bit_fields::{BitFieldFamily, shipped};
+
+/// Motors over CAN, in normal mode, or in extended mode (`extended = true`).
+pub static CAN: BitFieldFamily =
+    BitFieldFamily { word: "hollow-can", name: "hollow-shaft motor", bit_rates: &[1_000_000], describe: can };
+
+/// Motors over CAN FD.
+pub static CAN_FD: BitFieldFamily = BitFieldFamily {
+    word: "hollow-can-fd",
+    name: "hollow-shaft motor with CAN FD",
+    bit_rates: &[1_000_000],
+    describe: |_| Some(shipped("hollow-can-fd", include_str!("can_fd.toml"))),
+};
+
+fn can(keys: &mut FamilyKeys<'_, '_>) -> Option<Description> {
+    Some(match keys.boolean("extended")? {
+        false => shipped("hollow-can", include_str!("can.toml")),
+        true => shipped("hollow-can in extended mode", include_str!("can_extended.toml")),
+    })
+}

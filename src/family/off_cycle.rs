@@ -1,0 +1,98 @@
+//! A drive that answers too slowly for the cycle: it is spoken to beside it, as often as it can answer.
+
+use takt_rt::{AxisSnapshot, Command, Frame, OffCycleReport, Phase};
+
+/// What is wanted of a drive that is spoken to outside of the cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct OffCycleTarget {
+    /// What its controlword says.
+    pub wish: OffCycleWish,
+    /// The set-point of the position: rad (m).
+    pub position: f64,
+    /// The set-point of the velocity: rad/s (m/s).
+    pub velocity: f64,
+    /// The torque that is fed forward, or commanded: N·m (N).
+    pub torque: f64,
+    /// The time of the cycle that wants it.
+    pub at_ns: u64,
+}
+
+/// What is wanted of the power of a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OffCycleWish {
+    /// Its position is to be known; it is told nothing.
+    #[default]
+    Observe,
+    /// It has no torque.
+    Stop,
+    /// It follows the set-points.
+    Follow,
+    /// Its faults are cleared.
+    ClearFaults,
+}
+
+impl OffCycleTarget {
+    /// What a cycle wants of an axis.
+    pub(crate) fn of(axis: &AxisSnapshot, phase: Phase, at_ns: u64) -> Self {
+        let wish = match Command::decode(axis.controlword) {
+            _ if phase == Phase::Passive => OffCycleWish::Observe,
+            _ if axis.controlword & takt_rt::controlword::FAULT_RESET != 0 => OffCycleWish::ClearFaults,
+            Command::SwitchOn | Command::EnableOperation => OffCycleWish::Follow,
+            Command::Shutdown | Command::DisableVoltage | Command::QuickStop => OffCycleWish::Stop,
+        };
+        let AxisSnapshot { position_set, velocity_set, torque_set, .. } = *axis;
+        Self { wish, position: position_set, velocity: velocity_set, torque: torque_set, at_ns }
+    }
+}
+
+/// What a drive that is spoken to outside of the cycle asks of its bus or line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct OffCycleBudget {
+    /// The most requests in a second.
+    pub requests_per_s: f64,
+    /// From one report of the drive to the next, at the longest.
+    pub report_ns: u64,
+    /// The share of the bus, 1 for all of it, with the most stuff bits that frames can have.
+    pub bus_share: f64,
+    /// So long after the last request the drive stops by itself, if the controller is gone; `None` if it never does.
+    pub watchdog_ns: Option<u64>,
+}
+
+/// Speaks to one drive outside of the cycle, without waiting: it is called about once in a millisecond.
+///
+/// The drive follows set-points that may come late or not at all: the controller may be held up, or be gone. Whoever implements this
+/// stops the drive when `at_ns` of the target stays behind the time for too long.
+pub trait OffCycleDrive: Send {
+    /// Takes a frame that has arrived on the bus of the axis and is no process data.
+    fn receive(&mut self, now_ns: u64, frame: &Frame);
+
+    /// Goes on. `send` sends a frame on the bus of the axis, as soon as that has room beside the process data. Returns what the drive
+    /// has said since the last call.
+    fn poll(
+        &mut self,
+        now_ns: u64,
+        target: &OffCycleTarget,
+        send: &mut dyn FnMut(Frame),
+    ) -> Option<OffCycleReport>;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_controlword_of_an_active_group_says_what_is_wanted_of_a_drive() {
+        let wish = |phase, controlword| {
+            let axis = AxisSnapshot { controlword, position_set: 1.5, ..AxisSnapshot::default() };
+            let target = OffCycleTarget::of(&axis, phase, 7);
+            assert_eq!((target.position, target.at_ns), (1.5, 7));
+            target.wish
+        };
+        let wishes = [0x00, 0x02, 0x06, 0x07, 0x0F, 0x80].map(|word| wish(Phase::Disabled, word));
+        let (stop, follow) = (OffCycleWish::Stop, OffCycleWish::Follow);
+        assert_eq!(wishes, [stop, stop, stop, follow, follow, OffCycleWish::ClearFaults]);
+        assert_eq!(wish(Phase::Passive, 0x0F), OffCycleWish::Observe);
+    }
+}

@@ -1,0 +1,57 @@
+//! The port of a real interface, of any kind.
+
+use takt_rt::linux::{SlcanPort, SocketCanPort};
+use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch};
+
+#[cfg(feature = "cli")]
+use crate::sim::LivePort;
+
+/// The port of a real interface.
+#[derive(Debug)]
+pub enum LinkPort {
+    /// A CAN interface of this machine.
+    SocketCan(Box<SocketCanPort>),
+    /// An SLCAN adapter on a serial line.
+    Slcan(Box<SlcanPort>),
+}
+
+#[cfg(feature = "cli")]
+impl LinkPort {
+    /// This port for simulated drives.
+    pub fn into_live(self) -> Box<dyn LivePort> {
+        match self {
+            Self::SocketCan(port) => port,
+            Self::Slcan(port) => port,
+        }
+    }
+}
+
+impl BusPort for LinkPort {
+    fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
+        match self {
+            Self::SocketCan(port) => port.send(now_ns, frames),
+            Self::Slcan(port) => port.send(now_ns, frames),
+        }
+    }
+
+    fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
+        match self {
+            Self::SocketCan(port) => port.receive(now_ns, batch),
+            Self::Slcan(port) => port.receive(now_ns, batch),
+        }
+    }
+
+    fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
+        match self {
+            Self::SocketCan(port) => port.unconfirmed(now_ns),
+            Self::Slcan(port) => port.unconfirmed(now_ns),
+        }
+    }
+
+    fn health(&mut self) -> BusHealth {
+        match self {
+            Self::SocketCan(port) => port.health(),
+            Self::Slcan(port) => port.health(),
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! An interface that other programs of this machine can open, too: every one but a simulated bus.
+
+use std::fmt;
+
+use super::interface::{InterfaceSettings, interface_index, prepare_interface};
+use super::open::OpenError;
+use super::port::LinkPort;
+use super::serial_line::device_number;
+use super::slcan::open_slcan;
+use super::socketcan::{SocketCanOptions, open_socketcan};
+use crate::config::{Interface, SlcanLine};
+
+/// An interface of this machine.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RealInterface {
+    /// A SocketCAN network interface, by name.
+    SocketCan(String),
+    /// An SLCAN adapter on a serial line.
+    Slcan(SlcanLine),
+}
+
+impl RealInterface {
+    /// `None` for a simulated bus.
+    pub fn of(interface: &Interface) -> Option<Self> {
+        match interface {
+            Interface::Simulated => None,
+            Interface::SocketCan(name) => Some(Self::SocketCan(name.clone())),
+            Interface::Slcan(line) => Some(Self::Slcan(line.clone())),
+        }
+    }
+
+    /// The name of its lock: the same for every name and path of the interface, for as long as it is there.
+    pub(super) fn lock_name(&self, bus: &str) -> Result<String, OpenError> {
+        match self {
+            Self::SocketCan(name) => match interface_index(name) {
+                Ok(index) => Ok(index.to_string()),
+                Err(error) => Err(OpenError::Interface { bus: bus.to_owned(), error }),
+            },
+            Self::Slcan(line) => match device_number(&line.device) {
+                Ok(number) => Ok(format!("line-{number}")),
+                Err(error) => Err(OpenError::Slcan { bus: bus.to_owned(), error: error.into() }),
+            },
+        }
+    }
+
+    /// Brings it up with these settings, or checks that it has them. The channel of an adapter gets them when it is opened.
+    pub(super) fn prepare(&self, bus: &str, settings: &InterfaceSettings) -> Result<(), OpenError> {
+        match self {
+            Self::SocketCan(name) => match prepare_interface(name, settings) {
+                Ok(_) => Ok(()),
+                Err(error) => Err(OpenError::Interface { bus: bus.to_owned(), error }),
+            },
+            Self::Slcan(_) => Ok(()),
+        }
+    }
+
+    /// Opens it. A network interface must be up.
+    pub(super) fn open_prepared(
+        &self,
+        bus: &str,
+        settings: &InterfaceSettings,
+        options: &SocketCanOptions,
+    ) -> Result<LinkPort, OpenError> {
+        match self {
+            Self::SocketCan(name) => match open_socketcan(name, options) {
+                Ok(port) => Ok(LinkPort::SocketCan(Box::new(port))),
+                Err(error) => Err(OpenError::Socket { bus: bus.to_owned(), error }),
+            },
+            Self::Slcan(line) => match open_slcan(line, settings) {
+                Ok(port) => Ok(LinkPort::Slcan(Box::new(port))),
+                Err(error) => Err(OpenError::Slcan { bus: bus.to_owned(), error }),
+            },
+        }
+    }
+}
+
+impl fmt::Display for RealInterface {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::SocketCan(name) => f.write_str(name),
+            Self::Slcan(line) => write!(f, "slcan:{line}"),
+        }
+    }
+}
