@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 25] = [
+const ORDER: [&str; 27] = [
     "internals",
     "cli",
     "doctor",
@@ -24,6 +24,8 @@ const ORDER: [&str; 25] = [
     "procedure",
     "canopen",
     "erob_can",
+    "modbus",
+    "hollow_lines",
     "channels",
     "trajectory",
     "frame_time",
@@ -128,8 +130,8 @@ fn only_its_own_folder_and_the_simulation_name_a_family() {
     let mut files = rust_files("src");
     files.extend(rust_files("rt/src"));
     let is_of_family = |name: &str| {
-        let folders =
-            ["erob_can", "erob_canopen", "yz_aim", "cia402"].map(|family| format!("src/family/{family}/"));
+        let folders = ["erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402"]
+            .map(|family| format!("src/family/{family}/"));
         name.starts_with("src/sim/")
             || name.starts_with("src/erob_can/")
             || folders.iter().any(|folder| name.starts_with(folder))

@@ -30,6 +30,7 @@ impl Bench {
                 inertia: 0.3,
                 viscous_friction: 1.0,
                 coulomb_friction: 3.0,
+                friction_shape: takt::config::FrictionShape::Constant,
                 brake_torque: 60.0,
             },
             encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },

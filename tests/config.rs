@@ -273,8 +273,10 @@ fn a_bus_can_be_connected_elsewhere_than_the_file_says() {
     assert!(matches!(taken, Err(OverrideError::InterfaceTaken { bus, .. }) if bus == "base"));
     let unknown = config.override_interface("elbow", "vcan1");
     assert!(matches!(unknown, Err(OverrideError::UnknownBus { .. })));
-    let serial = config.override_interface("wrist", "slcan:/dev/ttyACM0");
-    assert!(matches!(serial, Err(OverrideError::Interface { .. })));
+    config.override_interface("wrist", "slcan:/dev/ttyACM0").unwrap();
+    assert!(matches!(&config.buses[1].interface, Interface::Slcan(line) if line.device == "/dev/ttyACM0"));
+    let no_path = config.override_interface("wrist", "slcan:ttyACM0");
+    assert!(matches!(no_path, Err(OverrideError::Interface { .. })));
     config.override_interface("base", "sim").unwrap();
     assert_eq!(config.buses[0].interface, Interface::Simulated);
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use takt::SessionOptions;
 use takt::config::{
     Axis, Bus, Config, Control, DriveFamily, Feedback, Interface, Limits, Program, ProgramMove,
-    ProgramTarget, StreamDelay, Travel,
+    ProgramTarget, SlcanLine, StreamDelay, Travel,
 };
 use takt::family;
 use takt::internals::controller::assemble;
@@ -86,6 +86,19 @@ const CASES: &[Case] = &[
         &[BUS, "\"a b\" cannot be the name"],
     ),
     ("interface", |c| bus(c).interface = Interface::SocketCan("sim".into()), &[BUS, "`bus.interface`"]),
+    (
+        "adapter",
+        |c| bus(c).interface = Interface::Slcan(SlcanLine { device: "ttyACM0".into(), baud_rate: 1_000_000 }),
+        &[BUS, "\"ttyACM0\" cannot be the path of a serial line"],
+    ),
+    (
+        "data bit rate of an adapter",
+        |c| {
+            bus(c).interface = "slcan:/dev/ttyACM0".parse().unwrap();
+            bus(c).data_bit_rate = Some(2_500_000);
+        },
+        &[BUS, "`bus.data_bit_rate`", "SLCAN adapters"],
+    ),
     (
         "one interface twice",
         |c| c.buses.iter_mut().for_each(|bus| bus.interface = Interface::SocketCan("can0".into())),

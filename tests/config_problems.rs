@@ -282,7 +282,9 @@ cases! {
     }
 
     interfaces_that_takt_cannot_use_are_refused {
-        "interface = \"can1\"" => "interface = \"slcan:/dev/ttyACM0\"", at "slcan": Interface { reason: InterfaceError::SerialLine { device } } if device == "/dev/ttyACM0",
+        "interface = \"can1\"" => "interface = \"slcan:ttyACM0\"", at "slcan": Interface { reason: InterfaceError::Device { given } } if given == "ttyACM0",
+        "interface = \"can1\"" => "interface = \"slcan:/dev/ttyACM0@0\"", at "slcan": Interface { reason: InterfaceError::BaudRate { given } } if given == "0",
+        "interface = \"can1\"" => "interface = \"slcan:/dev/ttyACM0\"\ndata_bit_rate = \"2.5 Mbit/s\"", at "2.5 Mbit/s": OutOfRange { allowed, .. } if allowed.contains("SLCAN"),
         "interface = \"can1\"" => "interface = \"can 1\"", at "can 1": Interface { reason: InterfaceError::Name { .. } },
     }
 

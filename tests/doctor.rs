@@ -197,6 +197,40 @@ fn a_prepared_machine_is_good_in_every_respect() {
 }
 
 #[test]
+fn serial_adapters_are_examined_for_their_latency_and_their_rate() {
+    let mut machine = prepared();
+    for (name, driver) in [("ttyUSB0", "ftdi_sio"), ("ttyUSB1", "ch341-uart"), ("ttyUSB2", "ftdi_sio")] {
+        machine
+            .link(&format!("sys/bus/usb-serial/devices/{name}/driver"), &format!("../../drivers/{driver}"));
+        machine.answers.insert(format!("stty -F /dev/{name} speed"), "115200\n".to_owned());
+    }
+    machine.file("sys/bus/usb-serial/devices/ttyUSB0/latency_timer", b"16\n");
+    machine.file("sys/bus/usb-serial/devices/ttyUSB2/latency_timer", b"1\n");
+    let examination = machine.examine(&subject(), &attempt(Outcome::Granted));
+    assert_eq!(worse_than_good(&examination), ["serial_latency"]);
+    let of_adapters: Vec<_> = examination
+        .checks
+        .iter()
+        .filter(|finding| finding.check.starts_with("serial"))
+        .map(|finding| (finding.interface.as_deref().unwrap(), finding.check, finding.read.as_str()))
+        .collect();
+    let rate = "115200 bit/s, as the last program has left it: reading a position by Modbus takes 5.0 ms and the time of the drive";
+    assert_eq!(
+        of_adapters,
+        [
+            ("ttyUSB0", "serial_latency", "16 ms (ftdi_sio)"),
+            ("ttyUSB0", "serial_rate", rate),
+            ("ttyUSB1", "serial_latency", "ch341-uart has none"),
+            ("ttyUSB1", "serial_rate", rate),
+            ("ttyUSB2", "serial_latency", "1 ms (ftdi_sio)"),
+            ("ttyUSB2", "serial_rate", rate),
+        ]
+    );
+    let text = examination.render(Emphasis::None);
+    assert!(text.contains("latency_timer   # until it is unplugged"), "{text}");
+}
+
+#[test]
 fn each_thing_that_is_spoilt_is_found_and_nothing_else() {
     let spoil: [(&str, &str, &[&str], Verdict); 12] = [
         (

@@ -1,12 +1,14 @@
 //! Drives that speak eRob's own CAN protocol: the motions of the manual on the simulated drive, in virtual time.
 
+use takt::family;
+use takt::family::commission::TargetDrive;
 use takt::internals::erob_can::client::{RequestClient, RequestError, RequestFailure, RequestTiming};
 use takt::internals::erob_can::entries;
 use takt::internals::erob_can::error_code::ErrorCode;
 use takt::internals::erob_can::frame::{ReceivedRequest, Request};
 use takt::internals::family::erob_can::module;
 use takt::internals::family::erob_can::motion::{
-    self, Direction, End, Ended, Motion, MotionFailure, Profile,
+    self, Direction, End, Ended, Motion, MotionFailure, Profile, Run,
 };
 use takt::internals::procedure::{ErobCanSession, Procedure, ProcedureError, ProcedureEvent};
 use takt::internals::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
@@ -27,6 +29,7 @@ fn parameters() -> ErobCanParameters {
             inertia: 0.3,
             viscous_friction: 2.0,
             coulomb_friction: 4.0,
+            friction_shape: takt::config::FrictionShape::Constant,
             brake_torque: 60.0,
         },
         encoder: Encoder { counts_per_unit: COUNTS_PER_TURN / std::f64::consts::TAU, zero_counts: 0.0 },
@@ -42,6 +45,17 @@ fn parameters() -> ErobCanParameters {
         error_form: ErrorForm::Printed,
         has_free_velocity_limit: false,
     }
+}
+
+fn target() -> TargetDrive {
+    let family = family::all().into_iter().find(|family| family.word() == "erob-can").unwrap();
+    TargetDrive::unconfigured(NODE, family.unconfigured().unwrap()).unwrap()
+}
+
+/// A motion without an end of its own lasts until it is interrupted.
+async fn carry_out(session: &ErobCanSession, motion: Motion) -> Result<Ended, MotionFailure> {
+    let run = Run { motion, duration_ns: None, keeps_enabled: false, target: &target() };
+    motion::carry_out(session, run).await
 }
 
 /// A drive on a bus, and what went over it.
@@ -114,11 +128,11 @@ impl Bench {
     }
 
     fn carry_out(&mut self, motion: Motion) -> Outcome<Ended, MotionFailure> {
-        self.run(async move |session| motion::carry_out(&session, motion).await, |_, _| false)
+        self.run(async move |session| carry_out(&session, motion).await, |_, _| false)
     }
 
     fn carry_out_until(&mut self, motion: Motion, end_ms: u64) -> Outcome<Ended, MotionFailure> {
-        self.run(async move |session| motion::carry_out(&session, motion).await, |_, ms| ms == end_ms)
+        self.run(async move |session| carry_out(&session, motion).await, |_, ms| ms == end_ms)
     }
 
     /// The requests that were sent.
@@ -203,12 +217,13 @@ fn motions_without_end_run_until_they_are_interrupted_and_come_to_rest() {
 
 #[test]
 fn a_reciprocating_motion_turns_at_its_ends_until_it_is_interrupted() {
-    for motion in [Motion::ReciprocatingBy(20_000, PROFILE), Motion::ReciprocatingTo(20_000, PROFILE)] {
+    for dwell_ns in [0, 200 * MS] {
+        let motion = Motion::ReciprocatingTo { to: 20_000, dwell_ns, profile: PROFILE };
         let mut bench = Bench::ready();
         let (mut lowest, mut highest, mut turns, mut last) = (0, 0, 0, 0.0);
         let ended: Ended = bench
             .run(
-                async move |session| motion::carry_out(&session, motion).await,
+                async move |session| carry_out(&session, motion).await,
                 |bus, ms| {
                     let truth = bus.observe(NODE).unwrap();
                     (lowest, highest) =
@@ -257,7 +272,7 @@ fn the_velocity_limit_of_torque_control_is_written_while_disabled_and_only_if_it
 fn a_drive_that_was_just_switched_on_is_waited_for() {
     let mut bench = Bench::of(parameters());
     assert_eq!(bench.carry_out(Motion::By(1_000, PROFILE)).unwrap().end, End::Arrived);
-    assert_eq!(bench.notes, ["the drive has just been switched on: it can be enabled 8 s after that"]);
+    assert_eq!(bench.notes[0], "the drive has just been switched on: it can be enabled 8 s after that");
 }
 
 #[test]
@@ -291,7 +306,7 @@ fn a_refused_request_ends_the_motion_with_its_words_and_the_drive_disabled_in_bo
 fn a_fault_on_the_way_ends_the_motion_with_the_error_code_and_the_drive_disabled() {
     let mut bench = Bench::ready();
     let outcome: Outcome<Ended, MotionFailure> = bench.run(
-        async |session| motion::carry_out(&session, Motion::To(500_000, PROFILE)).await,
+        async |session| carry_out(&session, Motion::To(500_000, PROFILE)).await,
         |bus, ms| {
             if ms == 2_000 {
                 bus.inject_fault(NODE, DriveFault::OverCurrent).unwrap();
@@ -308,7 +323,7 @@ fn a_fault_on_the_way_ends_the_motion_with_the_error_code_and_the_drive_disabled
 fn a_blocked_joint_is_a_fault_and_a_silent_drive_is_named() {
     let mut bench = Bench::ready();
     let blocked: Outcome<Ended, MotionFailure> = bench.run(
-        async |session| motion::carry_out(&session, Motion::By(100_000, PROFILE)).await,
+        async |session| carry_out(&session, Motion::By(100_000, PROFILE)).await,
         |bus, ms| {
             if ms == 1 {
                 bus.inject_defect(NODE, Defect::BlockedJoint, true).unwrap();
@@ -329,9 +344,7 @@ fn a_second_interruption_disables_the_motor_at_once() {
     let slow = Profile { deceleration: 100, ..PROFILE };
     let ended: Ended = bench
         .run(
-            async move |session| {
-                motion::carry_out(&session, Motion::Continuous(Direction::Forward, slow)).await
-            },
+            async move |session| carry_out(&session, Motion::Continuous(Direction::Forward, slow)).await,
             |_, ms| ms == 3_000 || ms == 3_500,
         )
         .unwrap();

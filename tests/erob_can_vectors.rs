@@ -124,7 +124,12 @@ fn unit(row: &[String], entry: &Entry) -> Unit {
         // An enumeration, whose meanings are times.
         "us" if entry.address == entries::JERK_SETTING.address => Unit::None,
         "" => Unit::None,
-        "count" => Unit::Counts,
+        // The table calls positions, distances and the counts of the encoders alike.
+        "count" => match entry.address.index {
+            0x0054 | 0x0087 | 0x0109 => Unit::DistanceCounts,
+            0x009C | 0x009F => Unit::EncoderCounts,
+            _ => Unit::Counts,
+        },
         "count/s" => Unit::CountsPerSecond,
         "count/s^2" => Unit::CountsPerSecondSquared,
         "mA" => Unit::Milliamperes,

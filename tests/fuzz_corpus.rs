@@ -46,13 +46,15 @@ const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
 #[test]
 fn every_kept_input_is_borne() {
     type Subject = fn(&[u8]);
-    let subjects: [(&str, Subject); 7] = [
+    let subjects: [(&str, Subject); 9] = [
         ("configuration", subjects::configuration::run),
         ("scenario", subjects::scenario::run),
         ("device_description", subjects::device_description::run),
         ("recording", subjects::recording::run),
         ("problem_lines", subjects::problem_lines::run),
+        ("lines", subjects::lines::run),
         ("wire", subjects::wire::run),
+        ("modbus", subjects::modbus::run),
         ("engine", |bytes| drop(subjects::engine::run(bytes))),
     ];
     for (name, run) in subjects {
@@ -130,6 +132,18 @@ proptest! {
     fn any_frames_are_decoded_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("wire")) {
         subjects::wire::run(&bytes);
         subjects::wire::run(&seed);
+    }
+
+    #[test]
+    fn any_bytes_of_a_serial_line_are_decoded_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("lines")) {
+        subjects::lines::run(&bytes);
+        subjects::lines::run(&seed);
+    }
+
+    #[test]
+    fn any_bytes_on_a_modbus_line_are_borne(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("modbus")) {
+        subjects::modbus::run(&bytes);
+        subjects::modbus::run(&seed);
     }
 
     #[test]

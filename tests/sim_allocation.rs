@@ -55,8 +55,13 @@ fn allocations() -> u64 {
     ALLOCATIONS.with(Cell::get)
 }
 
-const JOINT: JointParameters =
-    JointParameters { inertia: 0.4, viscous_friction: 1.5, coulomb_friction: 4.0, brake_torque: 110.0 };
+const JOINT: JointParameters = JointParameters {
+    inertia: 0.4,
+    viscous_friction: 1.5,
+    coulomb_friction: 4.0,
+    friction_shape: takt::config::FrictionShape::Constant,
+    brake_torque: 110.0,
+};
 
 fn drive(node: u8) -> Box<dyn Drive> {
     Box::new(ErobJoint::new(ErobParameters {
@@ -192,8 +197,13 @@ fn live_without_memory(drive: fn(u8) -> Box<dyn Drive>) {
 fn servo(node: u8) -> Box<dyn Drive> {
     let gearing =
         Gearing { ratio: 10.0, travel_per_turn: std::f64::consts::TAU, is_reversed: false, zero_counts: 0.0 };
-    let joint =
-        JointParameters { inertia: 0.02, viscous_friction: 0.1, coulomb_friction: 0.5, brake_torque: 0.0 };
+    let joint = JointParameters {
+        inertia: 0.02,
+        viscous_friction: 0.1,
+        coulomb_friction: 0.5,
+        friction_shape: takt::config::FrictionShape::Constant,
+        brake_torque: 0.0,
+    };
     Box::new(YzAimJoint::new(YzAimParameters {
         power_up_ns: 5_000_000,
         special_function: 7,

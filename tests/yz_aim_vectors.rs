@@ -48,8 +48,13 @@ fn row(line: &str) -> Row {
 /// A servo without gear that stands at these counts and has no quirks.
 fn servo(node: u8, counts: f64) -> YzAimParameters {
     let gearing = Gearing { ratio: 1.0, travel_per_turn: TAU, is_reversed: false, zero_counts: 0.0 };
-    let joint =
-        JointParameters { inertia: 2e-4, viscous_friction: 1e-3, coulomb_friction: 0.01, brake_torque: 0.0 };
+    let joint = JointParameters {
+        inertia: 2e-4,
+        viscous_friction: 1e-3,
+        coulomb_friction: 0.01,
+        friction_shape: takt::config::FrictionShape::Constant,
+        brake_torque: 0.0,
+    };
     YzAimParameters {
         initial_position: counts / 32_768.0 * TAU,
         power_up_ns: 5 * MILLISECOND_NS,

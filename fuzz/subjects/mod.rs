@@ -5,6 +5,8 @@ pub mod configuration;
 pub mod device_description;
 pub mod engine;
 mod input;
+pub mod lines;
+pub mod modbus;
 pub mod problem_lines;
 mod procedures;
 pub mod recording;

@@ -186,6 +186,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         },
         simulated: SimulatedJoint {
             gravity: 0.0,
+            friction: FrictionShape::Constant,
             peak_torque: 60.0,
             initial_position: 0.0,
             power_up: PowerUpState::PreOperational,

@@ -6,10 +6,8 @@ use std::path::PathBuf;
 use takt::Config;
 use takt::family::bring_up::ProcessData;
 use takt::family::cia402::{self, Device};
-use takt::family::commission::{CommandValue, MotionProfile, MoveKind, ReadObject, TargetDrive, Task};
+use takt::family::commission::{CommandValue, MotionProfile, MoveKind, TargetDrive, Task, ValueText};
 use takt::internals::commission::bus_session::{self, SessionEvent};
-use takt::internals::commission::dictionary::{self, SelectedObject};
-use takt::internals::commission::procedure;
 use takt::schedule::{self, MessageKind};
 use takt::sim::{DriveFault, SimulatedBus};
 use takt::{Outcome, VirtualClock};
@@ -296,10 +294,11 @@ fn commissioning_of_the_second_axis_moves_the_second_axis_alone() {
         keeps_enabled: false,
     };
     let mut bus = SimulatedBus::new(&config, 0);
-    let procedure = procedure(TargetDrive::of(&config.axes[1]).unwrap(), task);
+    let target = TargetDrive::of(&config.axes[1]).unwrap();
+    let task = target.family().commission(target.clone(), task).unwrap();
     let mut touched = vec![];
     bus_session::run(
-        procedure,
+        task.procedure,
         &mut bus,
         &mut VirtualClock::default(),
         || false,
@@ -326,14 +325,14 @@ fn an_object_is_read_from_the_axis_that_it_was_written_to() {
     let mut clock = VirtualClock::default();
     let mut run = |axis: usize, task: Task| {
         let target = TargetDrive::of(&config.axes[axis]).unwrap();
-        bus_session::run(procedure(target, task), &mut bus, &mut clock, || false, |_, _| {}).unwrap()
+        let task = target.family().commission(target.clone(), task).unwrap();
+        bus_session::run(task.procedure, &mut bus, &mut clock, || false, |_, _| {}).unwrap()
     };
-    let found = dictionary::find(&config.axes[1].drive, "profile velocity").unwrap();
-    let SelectedObject::Known(entry) = found else { panic!("{found:?}") };
-    run(1, Task::Write { object: entry.object, value: 1234, entry: Some(entry) });
+    let name = "profile velocity".to_owned();
+    let value = ValueText { text: "1234".to_owned(), is_raw: true };
+    run(1, Task::Write { name: name.clone(), value, data_type: None });
     let mut read = |axis: usize| {
-        let object = ReadObject { address: entry.object.address, entry: Some(entry), data_type: None };
-        let report = run(axis, Task::Read { objects: vec![object] });
+        let report = run(axis, Task::Read { names: vec![name.clone()], data_type: None });
         serde_json::to_value(&report).unwrap()["objects"][0]["raw"].as_i64().unwrap()
     };
     assert_eq!(read(1), 1234);

@@ -4,11 +4,10 @@ use std::cell::Cell;
 
 use takt::VirtualClock;
 use takt::family::commission::{
-    CommandValue, MotionProfile, MoveKind, ReadObject, Report, TargetDrive, Task,
+    CommandValue, MotionProfile, MoveKind, ProcedureError, Report, TargetDrive, Task, ValueText,
 };
+use takt::internals::commission::ProcedureEvent;
 use takt::internals::commission::bus_session::{self, SessionEvent};
-use takt::internals::commission::dictionary::{self, SelectedObject};
-use takt::internals::commission::{ProcedureError, ProcedureEvent, procedure};
 use takt::sim::{Observation, SimulatedBus};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
@@ -63,7 +62,11 @@ impl Bench {
             asked += usize::from(is_more);
             is_more
         };
-        bus_session::run(procedure(target, request), bus, clock, is_interrupted, |_, seen| match seen {
+        let task = match target.family().commission(target.clone(), request) {
+            Ok(task) => task,
+            Err(failure) => return Err(ProcedureError { step: "command line", failure }),
+        };
+        bus_session::run(task.procedure, bus, clock, is_interrupted, |_, seen| match seen {
             SessionEvent::Procedure(ProcedureEvent::Step(name)) => {
                 step.set(name);
                 steps.push(name);
@@ -84,7 +87,8 @@ impl Bench {
         until_ns: u64,
         mut touch: impl FnMut(&mut SimulatedBus, u64),
     ) -> Option<Result<Report, ProcedureError>> {
-        let mut procedure = procedure(self.target.clone(), request);
+        let task = self.target.family().commission(self.target.clone(), request).unwrap();
+        let mut procedure = task.procedure;
         for now_ns in (0..until_ns).step_by((MS / 2) as usize) {
             touch(&mut self.bus, now_ns);
             let mut batch = ReceiveBatch::new();
@@ -140,11 +144,12 @@ pub fn number(report: &Report, key: &str) -> f64 {
     report.get(key).and_then(serde_json::Value::as_f64).unwrap_or_else(|| panic!("{key} of {report:?}"))
 }
 
+pub fn write(name: &str, value: i64) -> Task {
+    let value = ValueText { text: value.to_string(), is_raw: true };
+    Task::Write { name: name.to_owned(), value, data_type: None }
+}
+
 pub fn read(bench: &mut Bench, name: &str) -> i64 {
-    let Ok(SelectedObject::Known(entry)) = dictionary::find(&bench.target.drive, name) else {
-        panic!("{name}")
-    };
-    let object = ReadObject { address: entry.object.address, entry: Some(entry), data_type: None };
-    let report = bench.run(Task::Read { objects: vec![object] }).unwrap();
+    let report = bench.run(Task::Read { names: vec![name.to_owned()], data_type: None }).unwrap();
     serde_json::to_value(&report).unwrap()["objects"][0]["raw"].as_i64().unwrap()
 }

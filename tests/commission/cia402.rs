@@ -266,6 +266,7 @@ fn switched_bench(sheet: &Path) -> Bench {
             inertia: 0.05,
             viscous_friction: 0.05,
             coulomb_friction: 0.2,
+            friction_shape: takt::config::FrictionShape::Constant,
             brake_torque: 40.0,
         },
         encoder: Encoder { counts_per_unit: counts_per_turn / TAU, zero_counts: 0.0 },
@@ -305,11 +306,7 @@ fn homing_finds_limit_switches_the_home_switch_and_the_index_pulse_and_counts_fr
             // 6099:1, 6099:2 and 609A, of the EPOS4 in r/min and r/min/s, of the other in counts.
             let values = if name.starts_with("maxon") { [7, 1, 100] } else { [1800, 180, 16000] };
             for (object, value) in ["6099:1", "6099:2", "609A"].into_iter().zip(values) {
-                let Ok(SelectedObject::Known(entry)) = dictionary::find(&bench.target.drive, object) else {
-                    panic!("{of}")
-                };
-                let write = Task::Write { object: entry.object, value, entry: Some(entry) };
-                bench.run(write).unwrap_or_else(|error| panic!("{of}: {error}"));
+                bench.run(write(object, value)).unwrap_or_else(|error| panic!("{of}: {error}"));
             }
             let home = Task::Home { method: Some(method), within_ns: 60 * SECOND, is_forced: false };
             let report = bench.run(home).unwrap_or_else(|error| panic!("{of}: {error}"));
@@ -325,8 +322,7 @@ fn homing_finds_limit_switches_the_home_switch_and_the_index_pulse_and_counts_fr
 #[test]
 fn a_homing_that_does_not_end_in_its_time_is_stopped() {
     let mut bench = switched_bench(&vendor("faulhaber-mcbl300x.eds"));
-    let Ok(SelectedObject::Known(entry)) = dictionary::find(&bench.target.drive, "6099:1") else { panic!() };
-    bench.run(Task::Write { object: entry.object, value: 100, entry: Some(entry) }).unwrap();
+    bench.run(write("6099:1", 100)).unwrap();
     let home = Task::Home { method: Some(17), within_ns: SECOND, is_forced: false };
     let failed = bench.run(home).unwrap_err();
     assert!(matches!(failed.failure, Failure::NotInTime { what: "the end of homing", .. }), "{failed:?}");
@@ -413,13 +409,9 @@ fn saved_parameters_survive_a_power_cycle_until_those_of_the_factory_are_restore
             assert!(matches!(failed.failure, Failure::Unsupported { .. }), "{of}: {failed:?}");
             continue;
         }
-        let Ok(SelectedObject::Known(entry)) = dictionary::find(&bench.target.drive, "profile velocity")
-        else {
-            panic!("{of}")
-        };
         let before = read(&mut bench, "profile velocity");
         let value = before + 7;
-        bench.run(Task::Write { object: entry.object, value, entry: Some(entry) }).unwrap();
+        bench.run(write("profile velocity", value)).unwrap();
         bench.run(Task::Save).unwrap();
         bench.bus.power_cycle(NODE).unwrap();
         assert_eq!(read(&mut bench, "profile velocity"), value, "{of}");

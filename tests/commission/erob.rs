@@ -5,7 +5,6 @@ use std::path::Path;
 use takt::config::Config;
 use takt::family;
 use takt::family::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
-use takt::internals::commission::dictionary::{self, SelectedObject};
 use takt::sim::{DriveFault, SimulatedBus};
 use takt_rt::{BusPort, Clock, DriveState, Frame, Id};
 
@@ -76,7 +75,7 @@ fn relative_and_reciprocating_moves_start_at_the_actual_position() {
     bench.run(move_to(absolute(20.0))).unwrap();
     bench.run(move_to(MoveKind::Relative(degrees(-5.0)))).unwrap();
     assert!((bench.observe().position.to_degrees() - 15.0).abs() < 0.01);
-    let kind = MoveKind::Reciprocate { to: degrees(30.0), times: 2, dwell_ns: 50 * MS };
+    let kind = MoveKind::Reciprocate { to: degrees(30.0), times: Some(2), dwell_ns: 50 * MS };
     let report = bench.run(move_to(kind)).unwrap();
     assert_eq!(number(&report, "moves"), 4.0);
     assert!((bench.observe().position.to_degrees() - 15.0).abs() < 0.01);
@@ -108,7 +107,7 @@ fn targets_outside_the_limits_are_refused_and_nothing_moves() {
     for request in [
         move_to(absolute(170.5)),
         move_to(MoveKind::Relative(degrees(71.0))),
-        move_to(MoveKind::Reciprocate { to: degrees(-171.0), times: 1, dwell_ns: 0 }),
+        move_to(MoveKind::Reciprocate { to: degrees(-171.0), times: Some(1), dwell_ns: 0 }),
         Task::Move { kind: absolute(0.0), profile: too_fast, keeps_enabled: false },
         Task::Velocity {
             velocity: degrees(-91.0),
@@ -317,12 +316,6 @@ fn zero_clears_the_turn_count_with_consent_and_never_with_torque() {
 #[test]
 fn saved_parameters_survive_a_power_cycle_and_others_do_not() {
     let mut bench = bench();
-    let write = |name: &str, value| {
-        let Ok(SelectedObject::Known(entry)) = dictionary::find(&family::EROB_CANOPEN, name) else {
-            panic!("{name}")
-        };
-        Task::Write { object: entry.object, value, entry: Some(entry) }
-    };
     bench.run(write("profile velocity", 12_345)).unwrap();
     bench.run(Task::Save).unwrap();
     bench.run(write("profile acceleration", 54_321)).unwrap();

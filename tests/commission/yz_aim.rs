@@ -4,9 +4,7 @@ use std::f64::consts::TAU;
 
 use takt::config::{Limits, Travel};
 use takt::family;
-use takt::family::commission::{
-    CommandValue, Failure, MotionProfile, MoveKind, ReadObject, TargetDrive, Task,
-};
+use takt::family::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task};
 use takt::internals::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::homing_switches::{HomingSwitches, Switch};
 use takt::sim::plant::{EndStops, JointParameters};
@@ -33,8 +31,13 @@ fn vector(id: &str) -> Frame {
 
 fn parameters() -> YzAimParameters {
     let gearing = Gearing { ratio: RATIO, travel_per_turn: TAU, is_reversed: false, zero_counts: 0.0 };
-    let joint =
-        JointParameters { inertia: 0.02, viscous_friction: 0.1, coulomb_friction: 0.5, brake_torque: 0.0 };
+    let joint = JointParameters {
+        inertia: 0.02,
+        viscous_friction: 0.1,
+        coulomb_friction: 0.5,
+        friction_shape: takt::config::FrictionShape::Constant,
+        brake_torque: 0.0,
+    };
     YzAimParameters { seed: 7, ..YzAimParameters::new(NODE, Model::Aim57x30C, gearing, joint) }
 }
 
@@ -161,7 +164,7 @@ fn a_target_outside_the_limits_is_refused_and_the_drive_is_not_changed() {
     for kind in [
         MoveKind::Absolute { to: CommandValue::Joint(20.1), is_immediate: false },
         MoveKind::Relative(CommandValue::Joint(-20.1)),
-        MoveKind::Reciprocate { to: CommandValue::Joint(21.0), times: 1, dwell_ns: 0 },
+        MoveKind::Reciprocate { to: CommandValue::Joint(21.0), times: Some(1), dwell_ns: 0 },
     ] {
         let failed = bench.run(move_to(kind)).unwrap_err();
         assert!(matches!(failed.failure, Failure::OutsideLimits { .. }), "{failed:?}");
@@ -189,7 +192,7 @@ fn a_velocity_run_is_as_in_the_manual_and_ends_with_a_ramp() {
 #[test]
 fn reciprocating_and_continuous_moves_end_at_standstill() {
     let mut bench = bench();
-    let kind = MoveKind::Reciprocate { to: CommandValue::Joint(1.0), times: 2, dwell_ns: 20 * MS };
+    let kind = MoveKind::Reciprocate { to: CommandValue::Joint(1.0), times: Some(2), dwell_ns: 20 * MS };
     let report = bench.run(move_to(kind)).unwrap();
     assert_eq!(number(&report, "moves"), 4.0);
     assert!(bench.observe().position.abs() < 1e-2);
@@ -418,12 +421,7 @@ fn the_gear_is_read_and_changed_and_command_keys_are_refused() {
 #[test]
 fn a_missing_object_is_named_after_a_timeout() {
     let mut bench = bench();
-    let object = ReadObject {
-        address: takt::canopen::object::ObjectAddress::new(0x6502, 0),
-        entry: None,
-        data_type: None,
-    };
-    let failed = bench.run(Task::Read { objects: vec![object] }).unwrap_err();
+    let failed = bench.run(Task::Read { names: vec!["6502".to_owned()], data_type: None }).unwrap_err();
     assert!(failed.failure.to_string().starts_with("reading 6502:00: no reply"), "{failed:?}");
     assert!(matches!(
         bench.run(Task::Torque { torque: CommandValue::Drive(1), velocity_limit: None, duration_ns: None }),

@@ -17,6 +17,7 @@ pub fn parameters(node: u8) -> ErobParameters {
             inertia: 0.4,
             viscous_friction: 1.5,
             coulomb_friction: 4.0,
+            friction_shape: takt::config::FrictionShape::Constant,
             brake_torque: 110.0,
         },
         encoder: Encoder { counts_per_unit: COUNTS_PER_RADIAN, zero_counts: 0.0 },

@@ -40,6 +40,7 @@ pub fn joint(counts_per_turn: f64) -> Cia402AxisParameters {
             inertia: 0.05,
             viscous_friction: 0.05,
             coulomb_friction: 0.2,
+            friction_shape: takt::config::FrictionShape::Constant,
             brake_torque: 40.0,
         },
         encoder: Encoder { counts_per_unit: counts_per_turn / std::f64::consts::TAU, zero_counts: 0.0 },

@@ -21,8 +21,13 @@ const RATIO: f64 = 10.0;
 /// A 57AIM30C behind a gear of 10:1, which boots in 5 ms.
 fn parameters(node: u8) -> YzAimParameters {
     let gearing = Gearing { ratio: RATIO, travel_per_turn: TAU, is_reversed: false, zero_counts: 0.0 };
-    let joint =
-        JointParameters { inertia: 0.02, viscous_friction: 0.1, coulomb_friction: 0.5, brake_torque: 0.0 };
+    let joint = JointParameters {
+        inertia: 0.02,
+        viscous_friction: 0.1,
+        coulomb_friction: 0.5,
+        friction_shape: takt::config::FrictionShape::Constant,
+        brake_torque: 0.0,
+    };
     YzAimParameters {
         power_up_ns: 5 * MILLISECOND_NS,
         seed: 7,

@@ -102,6 +102,16 @@ impl Case {
         Self::with(seed, None)
     }
 
+    /// One on a machine whose drives are spoken to by bit fields.
+    pub fn of_bit_fields(seed: u64) -> Self {
+        let mut dice = Dice::new(seed).split(u64::MAX - 6);
+        let mut case = Self::with(seed, Some(machine::of_bit_fields(&mut dice)));
+        if dice.chance(0.5) {
+            case.harden(&mut dice);
+        }
+        case
+    }
+
     fn with(seed: u64, crowd: Option<Config>) -> Self {
         let mut dice = Dice::new(seed);
         // Every kind has its turn; some storms are calm, and in most there is more than one fault.
@@ -268,8 +278,9 @@ fn random_target(dice: &mut Dice, axes: &[&Axis]) -> ProgramTarget {
 
 /// A fault of this kind, or of any: not every simulated drive can be broken in every way.
 fn possible_fault(dice: &mut Dice, config: &Config, kind: Option<&str>, when: &str) -> String {
-    for _ in 0..1000 {
-        let kind = kind.unwrap_or_else(|| dice.pick(&KINDS));
+    // No drive of some machines can have some faults.
+    for attempt in 0..1000 {
+        let kind = kind.filter(|_| attempt < 100).unwrap_or_else(|| dice.pick(&KINDS));
         let text = fault(dice, config, kind, when);
         if Scenario::parse("storm", &text, config).is_ok() {
             return text;

@@ -184,6 +184,9 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
                 && node.is_none_or(|node| node == axis.node)
                 && *probability == 1.0
         }
+        Effect::Drive { node, effect: DriveEffect::Silent } => {
+            node == axis.node && !axis.drive.consumes_heartbeat
+        }
         Effect::Drive { node, effect } => {
             node == axis.node && effect == DriveEffect::Defect(Defect::SilentSdoServer)
         }
@@ -191,13 +194,18 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
     };
     // A servo holds its shaft before anybody has commanded it, and follows an encoder that slips.
     let is_led_astray = fault.kind == "encoder-jump" && axis.drive == family::YZ_AIM;
+    // Frames with the identifier of a motor are commands to it, and one that replies to them has no time for others.
+    let is_flooded_by_commands = !axis.drive.consumes_heartbeat
+        && matches!(fault.effect, Effect::Foreign(ForeignFrames::Frame { .. }));
     Concern {
         is_present,
         is_misled,
-        is_unwatched,
-        is_cut_off,
+        is_unwatched: is_unwatched || !axis.drive.consumes_heartbeat,
+        // A flood leaves no room for anything else.
+        is_cut_off: is_cut_off || is_flooded_by_commands,
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
-        is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray),
+        is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray)
+            || is_flooded_by_commands,
         is_loaded: is_own && fault.kind == "load",
         missed_heartbeat: MissedHeartbeat::No,
         unreachable_since_ns: None,

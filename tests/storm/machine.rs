@@ -29,6 +29,8 @@ const SHIPPED: [&str; 15] = [
     "erob-modes/erob-pt",
     "erob-modes/erob-pv",
 ];
+/// Those whose drives are spoken to by bit fields.
+const OF_BIT_FIELDS: [&str; 3] = ["damiao-arm", "hollow-leg-fd", "hollow-arm"];
 /// As many axes as one controller moves.
 const CROWD: &str = "axes32-erob";
 const RANDOM_SHARE: f64 = 0.5;
@@ -40,7 +42,8 @@ const RECORDS: usize = 16;
 /// A shipped machine, read once.
 pub fn load(name: &str) -> Config {
     static READ: OnceLock<HashMap<&str, Config>> = OnceLock::new();
-    let read = || SHIPPED.into_iter().chain([CROWD]).map(|name| (name, read(name))).collect();
+    let read =
+        || SHIPPED.into_iter().chain(OF_BIT_FIELDS).chain([CROWD]).map(|name| (name, read(name))).collect();
     READ.get_or_init(read)[name].clone()
 }
 
@@ -64,6 +67,11 @@ fn ready(mut config: Config) -> Config {
 /// The largest machine that one controller moves.
 pub fn crowd() -> Config {
     load(CROWD)
+}
+
+/// One whose drives are spoken to by bit fields.
+pub fn of_bit_fields(dice: &mut Dice) -> Config {
+    load(dice.pick(&OF_BIT_FIELDS))
 }
 
 /// Any machine; one with an eRob if that is needed.

@@ -2,7 +2,7 @@
 //! faults.
 //!
 //! `TAKT_STORM_CYCLES=100000000` for a long one (with `--release`), `TAKT_STORM_FIRST=…` for the cases from this seed on in
-//! place of those from 0 on, `TAKT_STORM_SEED=…` for one case again, `TAKT_STORM_TABLE=1` for the tables of what has been gone
+//! place of those from 0 on, `TAKT_STORM_CASES=…` for so many on machines of bit fields, `TAKT_STORM_SEED=…` for one case again, `TAKT_STORM_TABLE=1` for the tables of what has been gone
 //! through and of the reactions.
 
 mod bounds;
@@ -50,6 +50,8 @@ const CALLBACK_CASES: u64 = 120;
 const POINT_CASES: u64 = 240;
 /// Of storms in which modes of operation are changed.
 const MODE_CASES: u64 = 120;
+/// Of storms over drives of bit fields.
+const BIT_FIELD_CASES: u64 = 600;
 /// A shard ends after so many failures.
 const FAILURES_AT_MOST: usize = 5;
 
@@ -135,6 +137,20 @@ fn the_invariants_hold_in_every_storm_and_every_fault_has_its_turn() {
     assert!(failures.is_empty(), "storms have failed: {failures:?}");
     let gaps = if cycles < CYCLES { vec![] } else { coverage.gaps() };
     assert!(gaps.is_empty(), "never: {gaps:?}");
+}
+
+#[test]
+fn the_invariants_hold_for_drives_of_bit_fields() {
+    let first = number("TAKT_STORM_FIRST").unwrap_or(0);
+    let mut failures = vec![];
+    for seed in first..first + number("TAKT_STORM_CASES").unwrap_or(BIT_FIELD_CASES) {
+        let case = Case::of_bit_fields(seed);
+        if let Err(wrong) = play(&case) {
+            println!("seed {seed}, bit fields: {} {wrong}\n{}", case.config.name, case.text);
+            failures.push(seed);
+        }
+    }
+    assert!(failures.is_empty(), "storms have failed: {failures:?}");
 }
 
 #[test]

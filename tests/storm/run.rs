@@ -368,8 +368,8 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
         let truth = world.run.ports()[axis.bus].observe(rest_ns, axis.node);
         // Set-points of another master enable a drive again whose node somebody has started.
         let is_driven = truth.state == DriveState::OperationEnabled && !concern.is_driven_by_others;
-        // Nothing stops a drive that has no watchdog any more and that no frame reaches.
-        let is_beyond_reach = concern.is_unwatched && concern.is_cut_off;
+        // Nothing stops a drive that has no watchdog any more and that no frame reaches, or none as it was sent.
+        let is_beyond_reach = concern.is_unwatched && (concern.is_cut_off || concern.is_misled);
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {
             return Err(format!("{} is not at rest in the end: {truth:?}", axis.name));
         }

@@ -7,6 +7,7 @@ use core::f64::consts::TAU;
 
 use takt_rt::{
     AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CanopenNetwork, Cia402Codec, CommandPdo,
+    Exchange, Pdos,
     ControlLaw, CycleInput, CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince,
     Follow, Frame, HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request,
     RequestEnvelope, RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories,
@@ -64,14 +65,16 @@ fn axis() -> Option<AxisParameters> {
         bus: 0,
         node: 1,
         node_axis: 1,
-        commands: [CommandPdo::every_cycle(pdo(0x200, Mapping::commands(&commands).ok()?))]
-            .into_iter()
-            .collect(),
-        feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
+        exchange: Exchange::Pdos(Pdos {
+            commands: [CommandPdo::every_cycle(pdo(0x200, Mapping::commands(&commands).ok()?))]
+                .into_iter()
+                .collect(),
+            feedback: [pdo(0x180, Mapping::feedback(&feedback).ok()?)].into_iter().collect(),
+            unused: Default::default(),
+        }),
         codec: Cia402Codec::default(),
         controlword_spacing_cycles: 0,
         feedback_since: FeedbackSince::Sync,
-        unused: Default::default(),
         law: ControlLaw::Position,
         mode_changes: ModeChanges::default(),
         scale: Scale::new(scale).ok()?,

@@ -12,9 +12,9 @@ use takt::family::bring_up::{
     AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat, identity,
     pdo_mapping,
 };
-use takt::family::commission::{Failure, SdoSession, TargetDrive, Task};
-use takt::family::{CarryingOut, Family, SettingUp};
-use takt::rt::controlword;
+use takt::family::commission::{DriveTask, Failure, TargetDrive, Task};
+use takt::family::{Family, SettingUp};
+use takt::rt::{Frame, controlword};
 use takt::sim::Drive;
 use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
 use takt::sim::plant::{Encoder, JointParameters};
@@ -101,10 +101,10 @@ impl Family for BeltServo {
         (code == 0xFF01).then_some("put a new belt on")
     }
 
-    fn carry_out<'a>(&'a self, _: &'a SdoSession, _: &'a TargetDrive, _: Task) -> CarryingOut<'a> {
+    fn commission(&self, _: TargetDrive, _: Task) -> Result<DriveTask<Frame>, Failure> {
         let (what, instead) =
             ("a belt servo has no commissioning".to_owned(), "move it by `takt run`".to_owned());
-        Box::pin(async move { Err(Failure::Unsupported { what, instead }) })
+        Err(Failure::Unsupported { what, instead })
     }
 
     /// A CiA 402 drive with the objects of a data sheet that is at hand.
@@ -119,6 +119,7 @@ impl Family for BeltServo {
                     inertia: 1.0,
                     viscous_friction: 1.0,
                     coulomb_friction: 0.5,
+                    friction_shape: takt::config::FrictionShape::Constant,
                     brake_torque: 100.0,
                 },
                 encoder: Encoder {

@@ -102,6 +102,7 @@ fn a_reversed_spindle_counts_in_the_other_direction() {
         inertia: 100.0,
         viscous_friction: 200.0,
         coulomb_friction: 30.0,
+        friction_shape: takt::config::FrictionShape::Constant,
         brake_torque: 0.0,
     };
     let servo = YzAimParameters::new(NODE, Model::Aim57x30C, spindle, nut);

@@ -1,5 +1,6 @@
 //! No drive loses its torque, or applies its brake, before its joint stands, in a stop that waits for that.
 
+use takt::config::Axis;
 use takt::sim::Observation;
 use takt_rt::StopCategory;
 
@@ -38,7 +39,8 @@ impl Releases {
             let is_braked = !before.is_braked && now.is_braked;
             let speed = before.velocity.abs();
             // It has gone on slowing down since the last look.
-            let slow = SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s;
+            let slow =
+                SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s + unseen_speed(seen, axis);
             // A drive that has missed the heartbeat stops by its own fault reaction, and is not enabled again after it.
             let is_own_reaction = concern.missed_heartbeat == MissedHeartbeat::Shown;
             let is_taken = (is_released || is_braked) && !self.is_cut[number] && !is_own_reaction;
@@ -53,4 +55,13 @@ impl Releases {
         }
         Ok(())
     }
+}
+
+/// How fast a joint may be that turns round within one and a half counts of its drive's position, while it is watched: it is four times as
+/// fast then as from end to end.
+fn unseen_speed(seen: &Seen<'_>, axis: &Axis) -> f64 {
+    const WATCHED_CYCLES: f64 = 20.0;
+    let cycle_s = seen.config.bus_cycle(axis.bus).period_ns as f64 * 1e-9;
+    let count = axis.scale().map_or(0.0, |scale| 1.0 / scale.resolution());
+    4.0 * 1.5 * count / (WATCHED_CYCLES * cycle_s)
 }

@@ -1,0 +1,14 @@
+//! Drives of bit fields: hollow-shaft motors and the makes that a file describes, from the configuration to the simulated drive.
+
+#[path = "../vectors/rows.rs"]
+mod rows;
+#[allow(dead_code, reason = "it is the world of other tests, too")]
+#[path = "../drive_modes/world.rs"]
+mod world;
+
+mod machine;
+mod refusals;
+mod running;
+mod schedule;
+mod simulated;
+mod vectors;
