@@ -482,3 +482,30 @@ fn check_says_whether_a_configuration_fits() {
     assert_eq!(output.status.code(), Some(2));
     assert_eq!(report(&output)["fits"], false);
 }
+
+#[test]
+fn shells_and_manual_pages_know_every_subcommand() {
+    let takt =
+        |arguments: &[&str]| Command::new(env!("CARGO_BIN_EXE_takt")).args(arguments).output().unwrap();
+    let help = String::from_utf8(takt(&["--help"]).stdout).unwrap();
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let names: Vec<&str> = commands
+        .take_while(|line| !line.is_empty())
+        .filter_map(|line| line.split_whitespace().next())
+        .filter(|name| *name != "help")
+        .collect();
+    assert!(names.contains(&"run") && names.contains(&"manual"), "{help}");
+    let folder = tempfile::tempdir().unwrap();
+    assert!(takt(&["manual", folder.path().to_str().unwrap()]).status.success());
+    for name in &names {
+        let page = std::fs::read_to_string(folder.path().join(format!("takt-{name}.1"))).unwrap();
+        assert!(page.contains("SYNOPSIS"), "{page}");
+    }
+    for shell in ["bash", "zsh", "fish"] {
+        let script = String::from_utf8(takt(&["completions", shell]).stdout).unwrap();
+        assert!(names.iter().all(|name| script.contains(name)), "{shell}: {script}");
+    }
+    let refused = takt(&["manual", "/nowhere"]);
+    let message = String::from_utf8(refused.stderr).unwrap();
+    assert!(refused.status.code() == Some(2) && message.contains("/nowhere"), "{message}");
+}

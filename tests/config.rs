@@ -146,6 +146,11 @@ drive = "erob-canopen"
 limits = { position = ["-90 deg", "0.25 turn"], velocity = 2, acceleration = "10 rad/s^2", torque = "20 Nm" }
 "#;
 
+/// The same with these lines in its axis.
+fn with_axis(lines: &str) -> Config {
+    parse(&SMALL.replace("node = 1\n", &format!("node = 1\n{lines}\n")))
+}
+
 fn with(additions: &str) -> Config {
     parse(&format!("{SMALL}\n{additions}"))
 }
@@ -157,6 +162,15 @@ fn a_number_is_si_and_a_text_has_its_unit() {
     assert_eq!(limits.position_max, std::f64::consts::FRAC_PI_2);
     assert_eq!((limits.velocity, limits.acceleration, limits.deceleration), (2.0, 10.0, 10.0));
     assert!(limits.jerk.is_infinite());
+}
+
+#[test]
+fn the_zero_of_a_joint_is_a_count_or_the_position_where_the_drive_counts_zero() {
+    let zero = |lines: &str| with_axis(lines).axes[0].zero_counts;
+    assert_eq!(zero("zero_counts = -131072"), -131_072);
+    // The drive counts zero at 90 degrees, so it has counted a quarter of a turn back where the joint is at zero.
+    assert_eq!(zero("position_at_zero_counts = \"90 deg\""), -131_072);
+    assert_eq!(zero("position_at_zero_counts = \"90 deg\"\nreversed = true"), 131_072);
 }
 
 #[test]

@@ -37,16 +37,54 @@ fn a_configuration_that_fits_is_shown_with_limits_units_and_buses_and_exit_code_
     let text = standard_output(&output);
     assert_eq!(output.status.code(), Some(0), "{text}");
     for part in [
-        "arm6-erob: 6 axes on 2 buses",
+        "\n6 axes on 2 buses",
         "-2.9671   2.9671",
-        "83443.027 per rad",
+        "83443 per rad",
         "199.6",
         "775 µs = 55 SYNC + 375 feedback + 345 set-points",
-        "450 to 590              fits",
-        "Every bus carries its traffic in the worst case.",
+        "450 to 590",
     ] {
         assert!(text.contains(part), "{part:?} is missing in\n{text}");
     }
+}
+
+#[test]
+fn the_verdict_comes_first() {
+    let text = standard_output(&check(&configs().join("arm6-erob.toml"), &[]));
+    assert!(text.starts_with("arm6-erob: every bus carries its traffic in the worst case.\n"), "{text}");
+    let folder = tempfile::tempdir().unwrap();
+    let text = standard_output(&check(&six_on_one_bus(folder.path()), &[]));
+    assert!(text.starts_with("arm6-erob: REFUSED: not every bus"), "{text}");
+}
+
+#[test]
+fn every_line_fits_a_terminal_of_80_or_100_columns() {
+    let files = std::fs::read_dir(configs()).unwrap().map(|entry| entry.unwrap().path());
+    for config in files.filter(|path| path.extension().is_some_and(|extension| extension == "toml")) {
+        for columns in [80, 100] {
+            let output = Command::new(env!("CARGO_BIN_EXE_takt"))
+                .arg("check")
+                .arg(&config)
+                .env("COLUMNS", columns.to_string())
+                .output()
+                .unwrap();
+            let text = standard_output(&output);
+            let longest = text.lines().map(|line| line.chars().count()).max().unwrap();
+            assert!(longest <= columns, "{}: {longest} of {columns} columns\n{text}", config.display());
+        }
+    }
+}
+
+#[test]
+fn limits_are_shown_in_the_unit_that_the_file_has_for_the_position() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("degrees.toml");
+    let arm = std::fs::read_to_string(configs().join("arm6-erob.toml")).unwrap();
+    std::fs::write(&path, arm.replace("[-2.9671, 2.9671]", "[\"-170 deg\", \"170 deg\"]")).unwrap();
+    let text = standard_output(&check(&path, &[]));
+    let of_joint1: Vec<&str> = text.lines().filter(|line| line.trim_start().starts_with("joint1")).collect();
+    assert!(of_joint1.iter().any(|line| line.contains("deg   -170.00   170.00    137.08")), "{text}");
+    assert_eq!(json(&check(&path, &["--json"]))["axes"][0]["position_max"], 170_f64.to_radians());
 }
 
 #[test]

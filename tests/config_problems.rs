@@ -142,6 +142,8 @@ cases! {
         "initial_position" => "power_up = \"1 s\"\ninitial_position", at "\"1 s\"": Replaced { .. },
         "initial_position" => "power_up = \"operational\"\ninitial_position", at "\"operational\"": OutOfRange { .. },
         "inertia = \"1 kg" => "inertias = \"1 kg", at "inertias": UnknownKey { nearest: Some("inertia"), .. },
+        "gear_ratio = 1.0\nzero_counts = 0" => "home_offset = 0.5", at "home_offset": UnknownKey { nearest: Some("position_at_zero_counts"), .. },
+        "zero_counts = 0" => "zero_counts = 0\nposition_at_zero_counts = 0.5", at "position_at_zero_counts": Ignored { beside: "zero_counts", .. },
         "dwell" => "dwel", at "dwel =": UnknownKey { key, nearest: Some("dwell"), .. } if key == "program.move.dwel",
         "seed" => "sead", at "sead": UnknownKey { nearest: Some("seed"), .. },
         "record = true" => "recording = true", at "recording": UnknownKey { nearest: Some("record"), .. },

@@ -85,6 +85,37 @@ fn every_interface_and_order_is_planned() {
 }
 
 #[test]
+fn an_answer_is_sampled_at_the_multiples_of_dt_or_at_the_times_that_are_asked_for() {
+    let (mut grid, mut asked) = (problem(), problem());
+    grid["dt"] = json!(0.01);
+    asked["t"] = json!([0.1, 0.2]);
+    let output = plan(&[], &format!("{grid}\n{asked}\n"));
+    let answers = answers(&output);
+    let times = numbers(&answers[0]["t"]);
+    assert!(times.windows(2).all(|pair| (pair[1] - pair[0] - 0.01).abs() < 1e-12), "{times:?}");
+    assert!((times[times.len() - 1] - answers[0]["duration"].as_f64().unwrap()).abs() < 1e-9);
+    let last = numbers(&answers[0]["p"][times.len() - 1]);
+    assert!((last[0] - 1.0).abs() < 1e-9 && (last[1] + 0.5).abs() < 1e-9, "{last:?}");
+    assert_eq!(numbers(&answers[1]["t"]), [0.1, 0.2]);
+    assert_eq!(answers[1]["p"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn the_help_has_every_key_of_a_problem() {
+    let help = Command::new(env!("CARGO_BIN_EXE_takt")).args(["plan", "--help"]).output().unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    // A key that is not known is answered with all that are.
+    let answer = &answers(&plan(&[], "{\"qqq\": 1}\n"))[0];
+    let message = answer["message"].as_str().unwrap();
+    let known: Vec<&str> = message.split('`').skip(3).step_by(2).collect();
+    let of_answers_alone = ["dofs", "family", "result", "duration", "t_min", "p", "v", "a"];
+    assert!(known.contains(&"vmax"), "{message}");
+    for key in known.into_iter().filter(|key| !of_answers_alone.contains(key)) {
+        assert!(help.split([' ', ',', '\n']).any(|word| word == key), "{key} is not in\n{help}");
+    }
+}
+
+#[test]
 fn that_a_problem_has_no_answer_is_an_answer_with_a_name() {
     let mut beyond = problem();
     beyond["pf"] = json!([1.0, -1.5]);
@@ -153,7 +184,13 @@ fn a_problem_with_a_known_answer_beside_it_is_a_problem_like_any_other() {
     assert_eq!(output.status.code(), Some(0));
     let answers = answers(&output);
     assert_eq!((&answers[0]["result"], &answers[0]["duration"]), (&json!("ok"), &json!(0.75)));
-    assert!(answers.iter().all(|answer| *answer == answers[0]), "{answers:?}");
+    assert_eq!(answers[2], answers[0]);
+    // The times of the known answer are those at which ours is sampled.
+    assert_eq!(answers[1]["t"], answered["t"]);
+    assert_eq!(
+        (&answers[1]["duration"], &answers[1]["t_min"]),
+        (&answers[0]["duration"], &answers[0]["t_min"])
+    );
     answered["dofs"] = json!(6);
     let output = plan(&[], &answered.to_string());
     assert_eq!(output.status.code(), Some(2));

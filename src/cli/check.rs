@@ -6,7 +6,7 @@ mod unattended;
 
 use std::path::PathBuf;
 
-use crate::config::{Axis, Compliance, Config, Control, FeedForward, Group, Travel, mode_word};
+use crate::config::{Axis, Compliance, Config, Control, FeedForward, Group, PositionUnit, Travel, mode_word};
 use crate::schedule::{self, BusSchedule};
 use clap::Args;
 use serde::Serialize;
@@ -97,6 +97,9 @@ struct AxisCheck {
     /// When its drive takes another mode; `None` where it stays in its own.
     mode_change: Option<&'static str>,
     is_linear: bool,
+    /// The unit of the text; JSON has SI units.
+    #[serde(skip)]
+    shown_in: PositionUnit,
     position_min: f64,
     position_max: f64,
     velocity: f64,
@@ -187,6 +190,7 @@ impl AxisCheck {
                     ModeCondition::AtRest => "at rest",
                 }),
             is_linear: axis.travel != Travel::Rotary,
+            shown_in: axis.shown_in,
             position_min: axis.limits.position_min,
             position_max: axis.limits.position_max,
             velocity: axis.limits.velocity,
@@ -216,7 +220,21 @@ impl AxisCheck {
         }
     }
 
+    /// A position or one of its derivatives, from rad (m), in the unit that the file uses.
+    fn shown(&self, value: f64) -> f64 {
+        self.shown_in.from_si(value)
+    }
+
+    /// That unit.
     fn unit(&self) -> &'static str {
-        if self.is_linear { "m" } else { "rad" }
+        self.shown_in.symbol()
+    }
+
+    /// How many decimals of a position are shown in it.
+    fn decimals(&self) -> usize {
+        match self.shown_in {
+            PositionUnit::Degree | PositionUnit::Millimetre => 2,
+            _ => 4,
+        }
     }
 }

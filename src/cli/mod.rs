@@ -5,6 +5,8 @@ mod say;
 
 mod chart;
 mod check;
+mod columns;
+mod completions;
 mod configuration;
 mod doctor;
 mod drive;
@@ -15,6 +17,7 @@ mod interruption;
 mod jitter;
 mod log;
 mod lss;
+mod manual;
 mod ownership;
 mod plan;
 mod play;
@@ -63,6 +66,8 @@ enum Command {
     Eds(eds::Arguments),
     Lss(lss::Arguments),
     Jitter(jitter::Arguments),
+    Completions(completions::Arguments),
+    Manual(manual::Arguments),
 }
 
 impl CommandLine {
@@ -81,6 +86,8 @@ impl CommandLine {
             Command::Eds(arguments) => eds::run(&arguments),
             Command::Lss(arguments) => lss::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
+            Command::Completions(arguments) => completions::run(arguments),
+            Command::Manual(arguments) => manual::run(&arguments),
         }
     }
 }

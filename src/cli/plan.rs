@@ -19,6 +19,7 @@ use question::Question;
 
 /// Plan trajectories: one problem a line in JSON, one answer a line out
 #[derive(Args, Clone, Debug)]
+#[command(after_long_help = FORMAT)]
 pub struct Arguments {
     /// Where the problems are; standard input when there is none
     problems: Option<PathBuf>,
@@ -26,6 +27,34 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
+
+/// The keys of a problem and of an answer.
+const FORMAT: &str = "\
+A problem is one object in one line. Each list has one number an axis; any unit will do, as long as it is the same throughout:
+
+  echo '{\"p0\": [0], \"pf\": [1], \"vmax\": [2], \"amax\": [8], \"jmax\": [100]}' | takt plan --plot trajectory.svg
+
+  p0, v0, a0       position, velocity and acceleration at the start; p0 is required, the others are 0 when left out
+  pf, vf, af       the same at the target, 0 when left out
+  vmax, amax       highest velocity and acceleration, required
+  vmin, amin       the lowest ones, below 0; -vmax and -amax when left out
+  jmax             highest jerk; null or left out: no limit
+  pmin, pmax       position limits; null or left out: none
+  interface        \"position\" (default), or \"velocity\": reach vf and af wherever that is
+  sync             \"time\" (default): all axes arrive together; \"phase\": on a straight line where that is possible; \"straight\": on a
+                   straight line or not at all; \"none\": each as soon as it can
+  dt               the duration is a multiple of this (s), and the answer has a sample at each multiple
+  t                the sample times (s), for others than those
+  min_duration     the trajectory takes at least so long (s)
+  id               anything; the answer repeats it
+
+An answer is one object in one line:
+
+  id, result       result is \"ok\" or the name of what is wrong, which `message` says in words
+  duration         of the trajectory (s)
+  t_min            how soon each axis could arrive by itself (s)
+  t, p, v, a       sample times (s), and one list an axis at each of them; 16 samples from start to end without t and dt
+  pmin, pmax       the lowest and the highest position of each axis on its way";
 
 /// Answers every line. The exit code is 2 when a line is no problem or the file cannot be read, 1 when an answer or the
 /// plot cannot be written, else 0: a problem without a solution is a valid answer.

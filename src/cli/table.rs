@@ -1,60 +1,103 @@
-//! Tables with aligned columns.
+//! Tables with aligned columns that fit the terminal.
 
 use std::fmt;
 
-/// A table. A heading that begins with `>` makes its column one that is aligned to the right.
-#[derive(Debug, Default)]
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
+
+use super::columns::columns;
+
+/// A table. A heading that begins with `>` makes its column one that is aligned to the right. Where a row is too long for the
+/// terminal, cells are broken between words.
+#[derive(Debug)]
 pub struct Table {
-    is_right: Vec<bool>,
-    rows: Vec<Vec<String>>,
+    table: comfy_table::Table,
+    /// Of each column, the letters of its longest word.
+    longest_words: Vec<usize>,
 }
+
+/// A space at which a cell is not broken.
+pub const UNBROKEN: char = '\u{a0}';
+
+/// The letters of a word that is broken nowhere.
+const LONGEST_UNBROKEN: u16 = 14;
+
+/// The spaces before each column.
+const GAP: u16 = 2;
 
 impl Table {
     /// A table with these headings.
     pub fn new<const N: usize>(headings: [&str; N]) -> Self {
-        Self {
-            is_right: headings.iter().map(|heading| heading.starts_with('>')).collect(),
-            rows: vec![headings.iter().map(|heading| heading.trim_start_matches('>').to_owned()).collect()],
+        let mut table = comfy_table::Table::new();
+        table
+            .load_preset(presets::NOTHING)
+            .set_header(headings.map(|heading| heading.trim_start_matches('>')));
+        for (column, heading) in table.column_iter_mut().zip(headings) {
+            column.set_padding((GAP, 0));
+            if heading.starts_with('>') {
+                column.set_cell_alignment(CellAlignment::Right);
+            }
         }
+        Self { table, longest_words: headings.map(longest_word).to_vec() }
     }
 
     /// Adds a row.
     pub fn row<const N: usize>(&mut self, cells: [String; N]) {
-        self.rows.push(cells.to_vec());
+        for (longest, cell) in self.longest_words.iter_mut().zip(&cells) {
+            *longest = longest_word(cell).max(*longest);
+        }
+        self.table.add_row(cells);
     }
 
-    fn column(&self, column: usize) -> impl Iterator<Item = &String> {
-        self.rows.iter().filter_map(move |row| row.get(column))
+    /// The text for a terminal of so many columns; without them, each row in one line.
+    fn fitted(&self, columns: Option<u16>) -> String {
+        let mut table = self.table.clone();
+        if let Some(columns) = columns {
+            table.set_content_arrangement(ContentArrangement::Dynamic).set_width(columns);
+            for (column, longest) in table.column_iter_mut().zip(&self.longest_words) {
+                let word = u16::try_from(*longest).unwrap_or(u16::MAX).min(LONGEST_UNBROKEN);
+                let width = word.saturating_add(GAP);
+                column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(width)));
+            }
+        }
+        table.trim_fmt().replace(UNBROKEN, " ")
     }
+}
+
+fn longest_word(text: &str) -> usize {
+    text.trim_start_matches('>').split(' ').map(|word| word.chars().count()).max().unwrap_or(0)
 }
 
 impl fmt::Display for Table {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let widths: Vec<usize> = (0..self.is_right.len())
-            .map(|column| self.column(column).map(|cell| cell.chars().count()).max().unwrap_or(0))
-            .collect();
-        for row in &self.rows {
-            let mut line = String::new();
-            for ((cell, width), is_right) in row.iter().zip(&widths).zip(&self.is_right) {
-                let cell = if *is_right { format!("{cell:>width$}") } else { format!("{cell:<width$}") };
-                line.push_str("  ");
-                line.push_str(&cell);
-            }
-            writeln!(f, "{}", line.trim_end())?;
-        }
-        Ok(())
+        writeln!(f, "{}", self.fitted(columns()))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::Table;
+    use super::{Table, UNBROKEN};
 
     #[test]
     fn words_are_aligned_to_the_left_and_numbers_to_the_right() {
         let mut table = Table::new(["name", ">µs"]);
         table.row(["a".to_owned(), "5".to_owned()]);
         table.row(["longer".to_owned(), "1000".to_owned()]);
-        assert_eq!(table.to_string(), "  name      µs\n  a          5\n  longer  1000\n");
+        assert_eq!(table.fitted(None), "  name      µs\n  a          5\n  longer  1000");
+    }
+
+    #[test]
+    fn a_number_stays_with_its_unit() {
+        let mut table = Table::new(["name", ">torque"]);
+        table.row(["a longer name".to_owned(), format!("87.0{UNBROKEN}Nm")]);
+        assert!(table.fitted(Some(18)).contains("87.0 Nm"), "{}", table.fitted(Some(18)));
+    }
+
+    #[test]
+    fn a_row_that_is_too_long_is_broken_between_words() {
+        let mut table = Table::new(["name", "what the drive does", ">counts at full speed"]);
+        table.row(["joint1".to_owned(), "holds its last set-point".to_owned(), "199.6".to_owned()]);
+        let text = table.fitted(Some(36));
+        assert!(text.lines().all(|line| line.chars().count() <= 36), "{text}");
+        assert!(text.contains("joint1") && text.contains("set-point") && text.contains("199.6"), "{text}");
     }
 }

@@ -33,6 +33,7 @@ use super::model::{
     Limits, Master, MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry,
     Travel,
 };
+use super::position_unit::PositionUnit;
 
 impl Config {
     /// A controller of these axes on these buses, without a program. The period is 1 ms: see [`Config::with_period`].
@@ -147,6 +148,7 @@ impl Axis {
             reversed: false,
             zero_counts: 0,
             limits,
+            shown_in: PositionUnit::of(travel),
             compliance: defaults::compliance(&[control]),
             feed_forward: FeedForward::default(),
             following_error: FollowingError {
@@ -175,6 +177,7 @@ impl Axis {
     #[must_use]
     pub fn linear(mut self, lead_m: f64) -> Self {
         self.travel = Travel::Linear { lead_m };
+        self.shown_in = PositionUnit::of(self.travel);
         self.following_error.limit = defaults::following_error(self.travel);
         self.start_tolerance = defaults::start_tolerance(self.travel);
         self.set_defaults_of_modes();

@@ -14,6 +14,7 @@ pub use takt_rt::ControlLaw as Control;
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::drive_family::DriveFamily;
+use super::position_unit::PositionUnit;
 use crate::canopen::dcf::DeviceConfiguration;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
@@ -231,6 +232,8 @@ pub struct Axis {
     pub zero_counts: i32,
     /// What may never be exceeded.
     pub limits: Limits,
+    /// The unit in which its positions are shown to people. Default: that in which the file has the limits of its position.
+    pub shown_in: PositionUnit,
     /// What a source may ask of the torque loop. Default: no more than the gains of the axis' own loop.
     pub compliance: Compliance,
     /// What is sent to the drive beside its target. Default: nothing.

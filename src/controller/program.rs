@@ -21,6 +21,10 @@ pub struct ProgramRunner {
     begun: u64,
     /// The requests for the present motion.
     requests: Vec<RequestId>,
+    /// The set-points of the axes when the present move began: rad (m).
+    from: Vec<f64>,
+    /// How much of the present move is done, from 0 to 1.
+    done: f64,
     progress: MoveProgress,
 }
 
@@ -87,12 +91,13 @@ impl ProgramRunner {
         let progress = if moves.is_empty() { MoveProgress::Finished } else { MoveProgress::Next };
         // A checked configuration has no group whose number does not fit.
         let group = u8::try_from(group).unwrap_or(u8::MAX);
-        Self { group, axes, moves, repeat, begun: 0, requests: vec![], progress }
+        Self { group, axes, moves, repeat, begun: 0, requests: vec![], from: vec![], done: 0.0, progress }
     }
 
     /// Takes the state of the group and says what is to happen. The requests of a step have ids from `numbers`, so that the
     /// program knows the answers to its own requests.
     pub fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, numbers: &RequestNumbers) -> ProgramStep {
+        self.done = self.part_done(snapshot);
         let is_count_reached = self.repeat.is_some_and(|times| self.begun >= times * self.moves.len() as u64);
         match self.progress {
             MoveProgress::Finished => ProgramStep::Finished,
@@ -100,6 +105,8 @@ impl ProgramRunner {
             MoveProgress::Next => {
                 self.begun += 1;
                 self.progress = MoveProgress::Moving;
+                self.from = self.axes.iter().map(|axis| set_point(snapshot, *axis)).collect();
+                self.done = 0.0;
                 ProgramStep::Begin(self.present_requests(now_ns, 1.0, numbers))
             }
             MoveProgress::Moving | MoveProgress::ComingToRest => match self.motion_result(snapshot) {
@@ -244,10 +251,35 @@ impl ProgramRunner {
         }
     }
 
-    /// Moves begun, and how many there are in all if that is known.
-    pub fn progress(&self) -> (u64, Option<u64>) {
-        (self.begun, self.repeat.map(|times| times * self.moves.len() as u64))
+    /// How much of its way the slowest axis of the present move has behind it, from 0 to 1: all of it when nothing moves.
+    fn part_done(&self, snapshot: &Snapshot) -> f64 {
+        let parts = self.targets().zip(&self.from).filter_map(|((axis, target), from)| {
+            let (whole, left) = ((target - from).abs(), (target - set_point(snapshot, axis)).abs());
+            (whole > 0.0).then_some((1.0 - left / whole).clamp(0.0, 1.0))
+        });
+        parts.fold(1.0, f64::min)
     }
+
+    /// How far the program is.
+    pub fn progress(&self) -> ProgramProgress {
+        let all = self.repeat.map(|times| times * self.moves.len() as u64);
+        ProgramProgress { begun: self.begun, all, done: self.begun.saturating_sub(1) as f64 + self.done }
+    }
+}
+
+/// How far a program is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProgramProgress {
+    /// Moves begun.
+    pub begun: u64,
+    /// How many there are, if that is known.
+    pub all: Option<u64>,
+    /// How many are done, the present one in part.
+    pub done: f64,
+}
+
+fn set_point(snapshot: &Snapshot, axis: usize) -> f64 {
+    snapshot.axes.get(axis).map_or(0.0, |axis| axis.position_set)
 }
 
 #[cfg(test)]
@@ -370,6 +402,25 @@ mod tests {
         assert_eq!(only, [1.0, 2.0, 1.0, 2.0]);
         assert!(targets.windows(2).all(|pair| pair[1].0 - pair[0].0 >= 100), "{targets:?}");
         assert_eq!(runner.poll(3_000_000_000, &snapshot), ProgramStep::Finished);
+    }
+
+    #[test]
+    fn progress_goes_on_within_a_move_with_the_slowest_axis() {
+        let to = ProgramTarget::Position(vec![1.0, -2.0]);
+        let moves = vec![ProgramMove { target: to, ..program(1).moves[0].clone() }];
+        let mut runner = Running::new(&Program { repeat: 2, moves });
+        let (request, _) = runner.begin(0, &finished(&[])).unwrap();
+        let mut moving = finished(&[]);
+        moving.motions.begin(request, 0, None, |_| true);
+        let mut done_at = |first, second| {
+            (moving.axes[0].position_set, moving.axes[1].position_set) = (first, second);
+            runner.poll(1, &moving);
+            runner.0.progress().done
+        };
+        assert_eq!(done_at(0.0, 0.0), 0.0);
+        assert_eq!(done_at(0.5, -0.5), 0.25);
+        assert_eq!(done_at(1.0, -2.0), 1.0);
+        assert_eq!((runner.0.progress().begun, runner.0.progress().all), (1, Some(2)));
     }
 
     #[test]

@@ -20,7 +20,7 @@ use tracing::{info, warn};
 use super::arrival::{ARRIVAL_NS, Arrival};
 use super::off_cycle::OffCycleDrives;
 use super::outcome::{Interrupt, Outcome, Progress};
-use super::program::{ProgramRunner, ProgramStep};
+use super::program::{ProgramProgress, ProgramRunner, ProgramStep};
 use crate::channels::{HostSide, RequestNumbers};
 use crate::config::Config;
 use crate::family;
@@ -488,11 +488,13 @@ impl Supervisor {
         axes.iter().position(|axis| axis.drive_state.is_faulted()).map(|axis| (axis, axes[axis].error_code))
     }
 
-    /// Moves begun by all groups, and how many there are in all if that is known.
-    fn programs_progress(&self) -> (u64, Option<u64>) {
-        let all = self.programs.iter().map(ProgramRunner::progress);
-        all.fold((0, Some(0)), |(begun, all), (own_begun, own_all)| {
-            (begun + own_begun, all.zip(own_all).map(|(all, own)| all + own))
+    /// How far the programs of all groups are together.
+    fn programs_progress(&self) -> ProgramProgress {
+        let nothing = ProgramProgress { begun: 0, all: Some(0), done: 0.0 };
+        self.programs.iter().map(ProgramRunner::progress).fold(nothing, |sum, own| ProgramProgress {
+            begun: sum.begun + own.begun,
+            all: sum.all.zip(own.all).map(|(sum, own)| sum + own),
+            done: sum.done + own.done,
         })
     }
 
@@ -505,9 +507,9 @@ impl Supervisor {
             }
             Stage::Activate | Stage::ResetFaults | Stage::Enable => ("enabling".to_owned(), None),
             Stage::Run => {
-                let (begun, all) = self.programs_progress();
+                let ProgramProgress { begun, all, done } = self.programs_progress();
                 let of = all.map_or(String::new(), |all| format!(" of {all}"));
-                (format!("move {begun}{of}"), all.map(|all| begun.saturating_sub(1) as f64 / all as f64))
+                (format!("move {begun}{of}"), all.map(|all| done / all as f64))
             }
             Stage::Settle { .. } => ("settling".to_owned(), Some(1.0)),
             Stage::Disable => ("stopping".to_owned(), Some(1.0)),

@@ -153,6 +153,7 @@ fn axis(number: usize, bus: usize, node: u8) -> Axis {
         gear_ratio: 1.0,
         reversed: false,
         zero_counts: 0,
+        shown_in: PositionUnit::Radian,
         limits: Limits {
             position_min: -3.0,
             position_max: 3.0,

@@ -8,23 +8,28 @@ use crate::schedule::text::{message_name, microseconds, narrow, remedy, reserve,
 use crate::schedule::{BusSchedule, MessageSchedule};
 
 use super::{AxisCheck, Check, ComplianceCheck, GroupCheck};
-use crate::cli::table::Table;
+use crate::cli::columns::paragraph;
+use crate::cli::table::{Table, UNBROKEN};
 
-/// The whole text.
+/// The whole text: the verdict first, then what is doubtful, then the tables.
 pub fn whole(check: &Check, config: &Config) -> String {
-    let mut text = format!(
-        "{}: {} axes on {} buses, a cycle of {} with the command phase at {} µs{}\n",
-        check.name,
-        check.axes.len(),
-        check.buses.len(),
+    let summary = format!(
+        "{} on {}, a cycle of {} with the command phase at {} µs{}",
+        counted(check.axes.len(), "axis", "axes"),
+        counted(check.buses.len(), "bus", "buses"),
         time(check.cycle_ns),
         microseconds(check.command_phase_ns),
         automatic(check),
     );
+    let mut text = paragraph(&format!("{}: {}", check.name, verdict(check)), 0);
+    let _ = writeln!(text, "\n{}", paragraph(&summary, 0));
+    text.push_str(&sentences("Warnings", &check.warnings));
+    text.push_str(&sentences("What drives lack, by their data sheets", &check.losses));
     if !check.groups.is_empty() {
         let _ = write!(text, "\nGroups\n{}", groups_table(&check.groups));
     }
     let axes = alike(&check.axes, is_shown_alike);
+    let _ = write!(text, "\nAxes\n{}", axes_table(&axes));
     let _ = write!(text, "\nLimits\n{}", limits_table(&axes));
     if let Some(table) = modes_table(&axes) {
         let _ = write!(text, "\nModes of operation\n{table}");
@@ -33,11 +38,19 @@ pub fn whole(check: &Check, config: &Config) -> String {
         let _ = write!(text, "\nTorque that streams may ask for\n{table}");
     }
     let _ = write!(text, "\nUnits\n{}", units_table(&axes));
-    let _ = write!(text, "\nSupervision, beside feedback in every cycle\n{}", supervision_table(&axes));
+    let _ = write!(
+        text,
+        "\nSupervision, beside feedback in every cycle\n{}",
+        supervision_table(&alike(&check.axes, |first, second| first.supervision == second.supervision))
+    );
     let _ = write!(
         text,
         "\nIf the controller is gone at full speed (kill -9, a broken cable)\n{}",
-        unattended_table(&axes)
+        unattended_table(&alike(&check.axes, |first, second| {
+            first.mode == second.mode
+                && first.shown_in == second.shown_in
+                && first.without_controller == second.without_controller
+        }))
     );
 
     text.push_str(&configuration_files(config));
@@ -52,20 +65,27 @@ pub fn whole(check: &Check, config: &Config) -> String {
         text.push('\n');
         text.push_str(&bus_text(group));
     }
-    text.push_str(
-        "\nresponse: from being queued until received, whatever else is queued when (Davis, Burns, Bril, Lukkien \
-         2007)\nin slot by: after SYNC is due, with everything in its place in the slot\n",
-    );
-    if !check.losses.is_empty() {
-        text.push_str("\nWhat drives lack, by their data sheets\n");
-        check.losses.iter().for_each(|loss| text.push_str(&format!("  {loss}\n")));
+    for explained in [
+        "response: from being queued until received, whatever else is queued when (Davis, Burns, Bril, Lukkien 2007)",
+        "in slot by: after SYNC is due, with everything in its place in the slot",
+    ] {
+        let _ = write!(text, "\n{}", paragraph(explained, 2));
     }
-    if !check.warnings.is_empty() {
-        text.push_str("\nWarnings\n");
-        check.warnings.iter().for_each(|warning| text.push_str(&format!("  {warning}\n")));
-    }
-    let _ = writeln!(text, "\n{}", verdict(check));
+    text.push('\n');
     text
+}
+
+fn counted(count: usize, one: &str, many: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { many })
+}
+
+/// Sentences under a heading; nothing without one.
+fn sentences(heading: &str, sentences: &[String]) -> String {
+    if sentences.is_empty() {
+        return String::new();
+    }
+    let lines = sentences.iter().map(|sentence| paragraph(&format!("  {sentence}"), 4));
+    format!("\n{heading}\n{}\n", lines.collect::<Vec<_>>().join("\n"))
 }
 
 fn groups_table(groups: &[GroupCheck]) -> Table {
@@ -97,9 +117,9 @@ fn verdict(check: &Check) -> &'static str {
     if !check.fits {
         "REFUSED: not every bus carries its traffic in the worst case."
     } else if check.buses.iter().any(BusSchedule::is_narrow) {
-        "Every bus carries its traffic in the worst case, but with little reserve."
+        "every bus carries its traffic in the worst case, but with little reserve."
     } else {
-        "Every bus carries its traffic in the worst case."
+        "every bus carries its traffic in the worst case."
     }
 }
 
@@ -139,22 +159,8 @@ fn is_shown_alike(first: &AxisCheck, second: &AxisCheck) -> bool {
     anonymous(first) == anonymous(second)
 }
 
-fn limits_table(axes: &[&[AxisCheck]]) -> Table {
-    let mut table = Table::new([
-        "axis",
-        "bus",
-        ">node",
-        "mode",
-        "unit",
-        ">lowest",
-        ">highest",
-        ">velocity",
-        ">acceleration",
-        ">deceleration",
-        ">jerk",
-        ">torque",
-        "following error",
-    ]);
+fn axes_table(axes: &[&[AxisCheck]]) -> Table {
+    let mut table = Table::new(["axis", "bus", ">node", "mode", "following error"]);
     for (group, axis) in axes.iter().filter_map(|group| Some((group, group.first()?))) {
         let (lowest, highest) =
             group.iter().fold((u8::MAX, 0), |(low, high), axis| (low.min(axis.node), high.max(axis.node)));
@@ -167,15 +173,37 @@ fn limits_table(axes: &[&[AxisCheck]]) -> Table {
                 number => format!("{lowest}, axis {number}"),
             },
             axis.mode.to_owned(),
+            format!(
+                "up to {} {} for {}",
+                short(axis.shown(axis.following_error)),
+                axis.unit(),
+                time(axis.following_error_time_ns)
+            ),
+        ]);
+    }
+    table
+}
+
+/// In the unit that the file has for the position limits of the axis.
+fn limits_table(axes: &[&[AxisCheck]]) -> Table {
+    let mut table =
+        Table::new(["axis", "unit", ">lowest", ">highest", ">velocity", ">acceleration", ">jerk", ">torque"]);
+    for (group, axis) in axes.iter().filter_map(|group| Some((group, group.first()?))) {
+        let position = |position: f64| format!("{:.*}", axis.decimals(), axis.shown(position));
+        let derivative = |value: f64| format!("{:.*}", axis.decimals().saturating_sub(2), axis.shown(value));
+        table.row([
+            counted_span(group.iter().map(|axis| axis.name.as_str())),
             axis.unit().to_owned(),
-            format!("{:.4}", axis.position_min),
-            format!("{:.4}", axis.position_max),
-            format!("{:.4}", axis.velocity),
-            format!("{:.2}", axis.acceleration),
-            format!("{:.2}", axis.deceleration),
-            axis.jerk.map_or("none".to_owned(), |jerk| format!("{jerk:.1}")),
-            format!("{:.1} {}", axis.torque, if axis.is_linear { "N" } else { "Nm" }),
-            format!("{:.4} for {}", axis.following_error, time(axis.following_error_time_ns)),
+            position(axis.position_min),
+            position(axis.position_max),
+            position(axis.velocity),
+            if axis.deceleration == axis.acceleration {
+                derivative(axis.acceleration)
+            } else {
+                format!("{}, braking {}", derivative(axis.acceleration), derivative(axis.deceleration))
+            },
+            axis.jerk.map_or("none".to_owned(), derivative),
+            format!("{:.1}{UNBROKEN}{}", axis.torque, if axis.is_linear { "N" } else { "Nm" }),
         ]);
     }
     table
@@ -231,8 +259,8 @@ fn units_table(axes: &[&[AxisCheck]]) -> Table {
         let [lowest, highest] = axis.counts_range;
         table.row([
             counted_span(group.iter().map(|axis| axis.name.as_str())),
-            format!("{:.3} per {}", axis.counts_per_unit, axis.unit()),
-            format!("{:.3} µ{}", axis.resolution * 1e6, axis.unit()),
+            format!("{} per {}", short(1.0 / axis.shown(axis.resolution)), axis.unit()),
+            format!("{}{UNBROKEN}µ{}", short(axis.shown(axis.resolution) * 1e6), axis.unit()),
             format!("{:.1}", axis.counts_per_cycle),
             format!("{lowest} to {highest}"),
         ]);
@@ -267,7 +295,7 @@ fn unattended_table(axes: &[&[AxisCheck]]) -> Table {
         table.row([
             counted_span(group.iter().map(|axis| axis.name.as_str())),
             axis.mode.to_owned(),
-            axis.without_controller.words(axis.is_linear),
+            axis.without_controller.words(axis.shown_in),
         ]);
     }
     table
@@ -306,30 +334,26 @@ fn buses_table(groups: &[Group<'_>]) -> Table {
     let mut table = Table::new([
         "bus",
         "interface",
-        ">kbit/s",
         ">load",
         ">feedback by",
         ">command phase",
+        "possible",
         ">set-points by",
-        ">next SYNC",
-        "command phase possible",
         "verdict",
     ]);
     for (group, (schedule, _)) in groups.iter().filter_map(|group| Some((group, group.first()?))) {
         let interfaces: Vec<String> = group.iter().map(|(_, bus)| bus.interface.to_string()).collect();
         let phases = schedule.slot.command_phases_ns.map_or("none".to_owned(), |(earliest, latest)| {
-            format!("{} to {}", microseconds(earliest), microseconds(latest))
+            format!("{}{UNBROKEN}to{UNBROKEN}{}", microseconds(earliest), microseconds(latest))
         });
         table.row([
             names(group),
-            span(interfaces.iter().map(String::as_str)),
-            (schedule.bit_rate / 1000).to_string(),
-            format!("{:.1} %", schedule.load_percent),
+            format!("{}, {} kbit/s", span(interfaces.iter().map(String::as_str)), schedule.bit_rate / 1000),
+            format!("{:.1}{UNBROKEN}%", schedule.load_percent),
             microseconds(schedule.slot.feedback_done_ns),
             microseconds(schedule.command_phase_ns),
-            microseconds(schedule.slot.set_points_done_ns),
-            microseconds(schedule.period_ns),
             phases,
+            microseconds(schedule.slot.set_points_done_ns),
             match (schedule.fits(), schedule.is_narrow()) {
                 (true, false) => "fits",
                 (true, true) => "fits narrowly",
@@ -351,32 +375,32 @@ fn bus_text(group: &Group<'_>) -> String {
     };
     let mut text =
         format!("Bus {}{whose} (times in µs)\n{}", schedule.name, message_table(&schedule.messages));
-    for line in sums(schedule).into_iter().chain(reserve(schedule)) {
-        let _ = writeln!(text, "  {line}");
+    let line = |line: &str, indentation: usize| format!("{}\n", paragraph(&format!("  {line}"), indentation));
+    for sum in sums(schedule).into_iter().chain(reserve(schedule)) {
+        text.push_str(&line(&sum, SUM_INDENTATION));
     }
     match narrow(schedule) {
-        Some(why) => {
-            let _ = writeln!(text, "  fits narrowly: {why}");
-        }
+        Some(why) => text.push_str(&line(&format!("fits narrowly: {why}"), 4)),
         None if schedule.fits() => text.push_str("  fits\n"),
         None => {}
     }
-    for line in schedule.shortfalls.iter().map(shortfall) {
-        let _ = writeln!(text, "  DOES NOT FIT: {line}");
+    for shortfall in schedule.shortfalls.iter().map(shortfall) {
+        text.push_str(&line(&format!("DOES NOT FIT: {shortfall}"), 4));
     }
-    for line in schedule.remedies.iter().map(remedy) {
-        let _ = writeln!(text, "  what would fit: {line}");
+    for remedy in schedule.remedies.iter().map(remedy) {
+        text.push_str(&line(&format!("what would fit: {remedy}"), 4));
     }
     text
 }
+
+/// Where the numbers of a sum begin.
+const SUM_INDENTATION: usize = 16;
 
 fn message_table(messages: &[MessageSchedule]) -> Table {
     let mut table = Table::new([
         "id",
         "message",
         "axis",
-        ">bytes",
-        ">bits",
         ">on the wire",
         ">period",
         ">response",
@@ -400,10 +424,8 @@ fn message_table(messages: &[MessageSchedule]) -> Table {
             id,
             message_name(message.kind).to_owned(),
             span(group.iter().filter_map(|message| message.axis.as_deref())),
-            message.length.to_string(),
-            message.bits.to_string(),
             microseconds(message.transmission_ns),
-            if message.is_sent_while_enabled { time(message.period_ns) } else { "while disabled".to_owned() },
+            if message.is_sent_while_enabled { time(message.period_ns) } else { "disabled".to_owned() },
             bound(message.response_ns),
             message.in_slot_ns.map_or("-".to_owned(), microseconds),
             message.deadline_ns.map_or("-".to_owned(), microseconds),
@@ -426,6 +448,16 @@ fn earliness(message: &MessageSchedule) -> String {
 fn are_shown_alike(first: &MessageSchedule, second: &MessageSchedule) -> bool {
     let anonymous = |message: &MessageSchedule| MessageSchedule { axis: None, id: 0, ..message.clone() };
     anonymous(first) == anonymous(second)
+}
+
+/// A number with five significant digits, without zeros at its end.
+fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return value.to_string();
+    }
+    let decimals = (4 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
+    let text = format!("{value:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// A length of time in the unit that suits it.

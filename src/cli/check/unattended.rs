@@ -1,6 +1,6 @@
 //! What an axis does when the controller is gone, by `kill -9` or by a broken cable, until its drive acts.
 
-use crate::config::{Axis, Config, Control};
+use crate::config::{Axis, Config, Control, PositionUnit};
 use crate::family;
 use serde::Serialize;
 
@@ -94,13 +94,11 @@ impl Unattended {
     }
 
     /// It in words.
-    pub fn words(&self, is_linear: bool) -> String {
-        let distance = |travel: f64| {
-            if is_linear {
-                format!("{travel:.4} m")
-            } else {
-                format!("{travel:.4} rad ({:.1} deg)", travel.to_degrees())
-            }
+    pub fn words(&self, unit: PositionUnit) -> String {
+        let distance = |travel: f64| match unit {
+            PositionUnit::Radian => format!("{travel:.4} rad ({:.1} deg)", travel.to_degrees()),
+            PositionUnit::Metre => format!("{travel:.4} m"),
+            _ => format!("{:.1} {}", unit.from_si(travel), unit.symbol()),
         };
         let milliseconds = |ns: u64| ns.div_ceil(1_000_000);
         match self {

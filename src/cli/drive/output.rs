@@ -8,6 +8,7 @@ use serde_json::json;
 
 use crate::commission::bus_session::SessionEvent;
 use crate::commission::{AxisReading, Failure, ProcedureError, ProcedureEvent, Report, TargetDrive};
+use crate::config::Quantity;
 use takt_rt::{Frame, Nanoseconds};
 
 use super::super::exit::Exit;
@@ -144,14 +145,14 @@ impl Output {
     }
 
     fn reading_words(&self, reading: &AxisReading) -> String {
-        let position = self.target.position_quantity().show(reading.position);
-        let velocity = self.target.velocity_quantity().show(reading.velocity);
+        let position = in_column(self.target.position_quantity(), reading.position);
+        let velocity = in_column(self.target.velocity_quantity(), reading.velocity);
         let mut words = format!("{position}  {velocity}");
         if let Some(torque) = reading.torque {
-            words = format!("{words}  {}", self.target.effort_quantity().show(torque));
+            words = format!("{words}  {}", in_column(self.target.effort_quantity(), torque));
         }
         if let Some(current) = reading.current_a {
-            words = format!("{words}  {current:.3} A");
+            words = format!("{words}  {current:>8.3} A");
         }
         let statusword = reading.statusword.map_or_else(String::new, |word| format!("0x{word:04X} "));
         format!("{words}  {statusword}{}", reading.state)
@@ -220,6 +221,17 @@ impl Output {
                 }
             }
         }
+    }
+}
+
+/// A value with as many letters as others of its quantity have, so that readings can be compared line by line.
+fn in_column(quantity: Quantity, value: f64) -> String {
+    let unit = quantity.unit;
+    if unit.starts_with("rad") {
+        let degrees = unit.replace("rad", "deg");
+        format!("{value:>9.4} {unit} ({:>9.2} {degrees})", value.to_degrees())
+    } else {
+        format!("{value:>9.4} {unit}")
     }
 }
 

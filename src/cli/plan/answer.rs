@@ -3,8 +3,20 @@
 use serde::Serialize;
 use takt_rt::plan::{Extrema, Limit, PlanError, Profile, Quantity};
 
-/// The number of sample times, from the start to the end.
+/// The number of sample times, from the start to the end, where the problem has no grid of its own.
 const SAMPLES: u32 = 16;
+/// The most samples on the grid of a problem. A longer trajectory has [`SAMPLES`].
+const SAMPLES_AT_MOST: f64 = 1e6;
+
+/// The sample times of a trajectory: on the grid of the problem if it has one.
+pub fn sample_times(duration_s: f64, grid_s: Option<f64>) -> Vec<f64> {
+    match grid_s.map(|grid_s| (grid_s, (duration_s / grid_s).round())) {
+        Some((grid_s, steps)) if steps < SAMPLES_AT_MOST => {
+            (0..=steps as u32).map(|k| f64::from(k) * grid_s).collect()
+        }
+        _ => (0..SAMPLES).map(|k| duration_s * f64::from(k) / f64::from(SAMPLES - 1)).collect(),
+    }
+}
 
 /// The answer to one problem.
 #[derive(Serialize, Debug)]
@@ -33,9 +45,7 @@ struct Trajectory {
 
 impl Answer {
     /// A trajectory was found.
-    pub fn planned(id: serde_json::Value, duration_s: f64, profiles: &[Profile]) -> Self {
-        let times: Vec<f64> =
-            (0..SAMPLES).map(|k| duration_s * f64::from(k) / f64::from(SAMPLES - 1)).collect();
+    pub fn planned(id: serde_json::Value, duration_s: f64, times: Vec<f64>, profiles: &[Profile]) -> Self {
         let states: Vec<Vec<_>> = times
             .iter()
             .map(|time_s| profiles.iter().map(|profile| profile.sample(*time_s)).collect())

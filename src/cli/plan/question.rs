@@ -6,7 +6,7 @@ use takt_rt::plan::{
     Limits, PlanOptions, Problem, Profile, State, Synchronisation, synchronised, synchronised_velocity,
 };
 
-use super::answer::Answer;
+use super::answer::{Answer, sample_times};
 
 /// The problem, one number an axis in every list. What is left out is zero, or unlimited for a position or a jerk.
 ///
@@ -24,7 +24,7 @@ pub struct Question {
     interface: Interface,
     #[serde(default)]
     sync: Sync,
-    /// The duration is a multiple of this.
+    /// The duration is a multiple of this, and the answer has a sample at each.
     dt: Option<f64>,
     min_duration: Option<f64>,
     p0: Vec<f64>,
@@ -50,6 +50,8 @@ pub struct Question {
     pmin: Vec<Option<f64>>,
     #[serde(default)]
     pmax: Vec<Option<f64>>,
+    /// The times at which the trajectory is sampled (s).
+    t: Option<Vec<f64>>,
     /// The expected number of axes, if it is to be checked.
     dofs: Option<usize>,
     #[serde(default, rename = "family")]
@@ -60,8 +62,6 @@ pub struct Question {
     _duration: IgnoredAny,
     #[serde(default, rename = "t_min")]
     _minimum_durations: IgnoredAny,
-    #[serde(default, rename = "t")]
-    _times: IgnoredAny,
     #[serde(default, rename = "p")]
     _positions: IgnoredAny,
     #[serde(default, rename = "v")]
@@ -190,7 +190,10 @@ impl Question {
             Interface::Velocity => synchronised_velocity(&problems, &mut profiles, timing),
         };
         match planned {
-            Ok(duration_s) => (Answer::planned(self.id.clone(), duration_s, &profiles), Some(profiles)),
+            Ok(duration_s) => {
+                let times = self.t.clone().unwrap_or_else(|| sample_times(duration_s, self.dt));
+                (Answer::planned(self.id.clone(), duration_s, times, &profiles), Some(profiles))
+            }
             Err(error) => (Answer::refused(self.id.clone(), error), None),
         }
     }

@@ -124,7 +124,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let travel = travel(&mut section);
     let q = Quantities::of(travel.unwrap_or(Travel::Rotary));
     let counting = counting(&mut section, drive, travel);
-    let limits = limits(section.section("limits"), q, counting.as_ref());
+    let (limits, shown_in) =
+        limits(section.section("limits"), q, travel.unwrap_or(Travel::Rotary), counting.as_ref());
     let following_error = following_error(section.section("following_error"), q, travel);
     let power_up = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
     let mut joint_section = section.section("joint");
@@ -191,6 +192,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             reversed: counting.reversed,
             zero_counts: counting.zero_counts,
             limits: limits?,
+            shown_in,
             compliance: modes.compliance,
             feed_forward,
             following_error,

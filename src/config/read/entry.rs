@@ -149,6 +149,18 @@ impl<'a> Entry<'a> {
         Some(self.elements(list))
     }
 
+    /// Those elements of a list that are texts; none where this is no list.
+    pub fn texts(&self) -> impl Iterator<Item = &'a str> {
+        let list = match self.value {
+            DeValue::Array(list) => Some(list),
+            _ => None,
+        };
+        list.into_iter().flat_map(|list| list.iter()).filter_map(|element| match element.get_ref() {
+            DeValue::String(text) => Some(text.as_ref()),
+            _ => None,
+        })
+    }
+
     /// The tables of a list of tables.
     pub fn tables(&self) -> Option<Vec<Entry<'a>>> {
         let DeValue::Array(list) = self.value else {

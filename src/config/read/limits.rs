@@ -4,18 +4,25 @@ use super::entry::Entry;
 use super::section::Section;
 use crate::config::defaults;
 use crate::config::model::{FollowingError, Limits, Travel};
+use crate::config::position_unit::PositionUnit;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::ranges;
 use crate::config::rules;
 
-/// The limits; `None` where something about them is wrong.
-pub fn limits(mut section: Section<'_>, q: Quantities, counting: Option<&Counting>) -> Option<Limits> {
-    let position = section
-        .require("position", "lowest and highest position: position = [\"-170 deg\", \"170 deg\"]")
-        .and_then(|entry| {
-            let range = position_range(&entry, q)?;
-            rules::limits::position_range(&entry.spot, range, q, counting).then_some(range)
-        });
+/// The limits, `None` where something about them is wrong, and the unit of those of the position.
+pub fn limits(
+    mut section: Section<'_>,
+    q: Quantities,
+    travel: Travel,
+    counting: Option<&Counting>,
+) -> (Option<Limits>, PositionUnit) {
+    let entry =
+        section.require("position", "lowest and highest position: position = [\"-170 deg\", \"170 deg\"]");
+    let shown_in = entry.as_ref().map_or(PositionUnit::of(travel), |entry| shown_in(entry, travel));
+    let position = entry.and_then(|entry| {
+        let range = position_range(&entry, q)?;
+        rules::limits::position_range(&entry.spot, range, q, counting).then_some(range)
+    });
     let velocity = section
         .require("velocity", "highest speed: velocity = \"137 deg/s\"")
         .and_then(|entry| rules::limits::velocity(&entry.spot, entry.unbounded(q.velocity)?, q, counting));
@@ -42,7 +49,13 @@ pub fn limits(mut section: Section<'_>, q: Quantities, counting: Option<&Countin
     };
     let limits = build().filter(|limits| rules::limits::stopping_time(limits, q, |key| section.spot(key)));
     section.finish();
-    limits
+    (limits, shown_in)
+}
+
+/// The unit of the first position that is written with one.
+fn shown_in(entry: &Entry<'_>, travel: Travel) -> PositionUnit {
+    let written = entry.texts().next().map(|text| PositionUnit::written(text, travel));
+    written.unwrap_or(PositionUnit::of(travel))
 }
 
 fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<[f64; 2]> {

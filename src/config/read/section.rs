@@ -26,6 +26,18 @@ const REPLACED: [(Option<&str>, &str, &str); 5] = [
     (Some("simulated"), "rated_torque", "it in [axis.joint]: real drives obey it too"),
 ];
 
+/// Words that other programs have for a key, and the key that was probably meant.
+const SYNONYMS: [(&str, &str); 8] = [
+    ("home_offset", "position_at_zero_counts"),
+    ("homing_offset", "position_at_zero_counts"),
+    ("zero_offset", "position_at_zero_counts"),
+    ("offset", "position_at_zero_counts"),
+    ("direction", "reversed"),
+    ("inverted", "reversed"),
+    ("speed", "velocity"),
+    ("effort", "torque"),
+];
+
 /// The most unknown keys of a table for which the key that was meant is looked for. No more problems are shown anyway.
 const SUGGESTED_AT_MOST: usize = 20;
 
@@ -168,7 +180,12 @@ impl<'a> Section<'a> {
                 // Looking for the key that was meant takes long, and only the first problems are shown.
                 let nearest = (index < SUGGESTED_AT_MOST).then(|| {
                     let absent = known.iter().copied().filter(|known| find(table, known).is_none());
-                    spelling::nearest(key.get_ref(), absent)
+                    let synonym =
+                        SYNONYMS.iter().find(|(word, _)| word == key.get_ref()).map(|(_, meant)| *meant);
+                    absent
+                        .clone()
+                        .find(|key| Some(*key) == synonym)
+                        .or_else(|| spelling::nearest(key.get_ref(), absent))
                 });
                 meant.extend(nearest.flatten());
                 let kind = ProblemKind::UnknownKey {

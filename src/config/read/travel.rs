@@ -5,9 +5,11 @@ use super::section::Section;
 use crate::config::defaults;
 use crate::config::drive_family::DriveFacts;
 use crate::config::model::Travel;
-use crate::config::quantities::Counting;
+use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
+use crate::config::rules;
 
 /// The travel. The lead of a rotary axis is checked and not used, so that the travel can be changed in one line.
 pub fn travel(section: &mut Section<'_>) -> Option<Travel> {
@@ -39,14 +41,24 @@ pub fn counting(
         section.require("counts_per_turn", says);
     }
     let gear_ratio = section.get("gear_ratio").map(|entry| entry.number(ranges::GEAR_RATIO));
-    let zero =
+    let zero_counts =
         section.get("zero_counts").map(|entry| entry.integer(i32::MIN.into()..1 + i64::from(i32::MAX)));
     let reversed = boolean(section, "reversed", false);
-    Some(Counting {
+    let position_at_zero_counts = section.get("position_at_zero_counts");
+    let counting = Counting {
         travel: travel?,
         counts_per_turn: counts_per_turn.unwrap_or_else(|| drive.and_then(|drive| drive.counts_per_turn))?,
         gear_ratio: gear_ratio.unwrap_or(Some(defaults::GEAR_RATIO))?,
         reversed,
-        zero_counts: i32::try_from(zero.unwrap_or(Some(0))?).ok()?,
-    })
+        zero_counts: i32::try_from(zero_counts.unwrap_or(Some(0))?).ok()?,
+    };
+    let Some(entry) = position_at_zero_counts else { return Some(counting) };
+    if zero_counts.is_some() {
+        let (key, belongs) = (entry.spot.key.clone(), "both say where the joint is at 0: keep one of them");
+        entry.report(ProblemKind::Ignored { key, beside: "zero_counts", belongs });
+        return None;
+    }
+    let position = entry.unbounded(Quantities::of(counting.travel).position)?;
+    let zero_counts = rules::limits::zero_counts(&entry.spot, position, &counting)?;
+    Some(Counting { zero_counts, ..counting })
 }

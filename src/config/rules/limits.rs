@@ -56,6 +56,14 @@ pub fn velocity(spot: &Spot<'_>, velocity: f64, q: Quantities, counting: Option<
     fits_counts(spot, counts.as_slice()).then_some(velocity)
 }
 
+/// The count at which the joint is at 0, from the position that it has where the drive counts 0.
+pub fn zero_counts(spot: &Spot<'_>, position_at_zero_counts: f64, counting: &Counting) -> Option<i32> {
+    let position =
+        spot.quantity(position_at_zero_counts, Quantities::of(counting.travel).position, Bounds::Finite)?;
+    let counts = -(counting.position(position) - counting.position(0.0));
+    fits_counts(spot, &[counts]).then_some(counts.round() as i32)
+}
+
 /// A drive counts positions and speeds in 32 bits.
 fn fits_counts(spot: &Spot<'_>, counts: &[f64]) -> bool {
     let beyond = counts.iter().find(|counts| counts.abs() > f64::from(i32::MAX));

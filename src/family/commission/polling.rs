@@ -20,19 +20,17 @@ pub async fn watch(
 ) -> Result<Report, Failure> {
     c.step("watch");
     let mut count = 0_u64;
-    let show = async || {
-        let reading = read().await?;
-        c.show(reading);
+    let counted = async || {
         count += 1;
-        Ok(reading)
+        read().await
     };
-    poll_until(c, every_ns, duration_ns, show, |_| Ok(())).await?;
+    poll_until(c, every_ns, duration_ns, counted, |_| Ok(())).await?;
     let mut report = Report::new();
     report.add("readings", "readings", count, count.to_string());
     Ok(report)
 }
 
-/// Polls `read` at an interval until the time is over; `check` can end it earlier with a failure.
+/// Polls `read` at an interval until the time is over, and shows each reading; `check` can end it earlier with a failure.
 pub async fn poll_until(
     c: &SdoSession,
     every_ns: Nanoseconds,
@@ -43,7 +41,9 @@ pub async fn poll_until(
     let began_ns = c.now_ns();
     loop {
         let begun_ns = c.now_ns();
-        check(&read().await?)?;
+        let reading = read().await?;
+        c.show(reading);
+        check(&reading)?;
         let since = |then_ns: Nanoseconds| c.now_ns().saturating_sub(then_ns);
         let left_ns = duration_ns.map(|duration_ns| duration_ns.saturating_sub(since(began_ns)));
         if left_ns == Some(0) {
