@@ -7,6 +7,7 @@ use takt::config::{
     Config, Control, Feedback, Interface, OverrideError, PowerUpState, ProblemKind, ProgramTarget, Travel,
 };
 use takt::internals::sim::yz_aim::YzAimParameters;
+use takt::{Outcome, VirtualRun};
 
 /// The configurations that come with takt; other folders in there hold other things.
 fn configs() -> Vec<PathBuf> {
@@ -36,6 +37,22 @@ fn every_configuration_that_comes_with_takt_loads() {
     assert!(paths.len() >= 6, "{paths:?}");
     for path in paths {
         assert_eq!(load(&path).name, path.file_stem().unwrap().to_str().unwrap());
+    }
+}
+
+/// Half a minute of the shortest cycle.
+const SLOTS_AT_MOST: u64 = 60_000;
+
+#[test]
+fn every_configuration_that_comes_with_takt_runs_its_program_to_the_end() {
+    for path in configs() {
+        let config = load(&path);
+        if config.program.moves.is_empty() {
+            continue;
+        }
+        let mut run = VirtualRun::simulated(&config).unwrap().0;
+        let outcome = run.run(SLOTS_AT_MOST, |_| {});
+        assert_eq!(outcome, Some(Outcome::Finished), "{}", path.display());
     }
 }
 

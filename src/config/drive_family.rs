@@ -76,11 +76,8 @@ pub struct DriveFacts {
     pub may_ignore_sync: bool,
     /// The number of this axis among those of its drive, 1 where a drive has one axis. See [`Axis::node`](super::model::Axis::node).
     pub node_axis: u8,
-    /// Whether the drives are spoken to by frames of bit fields, see [`Family::field_drive`](crate::family::Family::field_drive). They are no
-    /// CANopen nodes then: they have neither objects nor NMT states nor PDOs.
-    pub has_field_frames: bool,
-    /// The identifiers of drives that are no CANopen nodes, and have a protocol of their own.
-    pub own_identifiers: Option<OwnIdentifiers>,
+    /// How the drives are spoken to.
+    pub protocol: Protocol,
     /// How the drives show that they live, beside their feedback.
     pub error_control: ErrorControl,
     /// Whether the drives can watch the heartbeat of the controller (object 1016).
@@ -95,6 +92,27 @@ pub struct DriveFacts {
     pub controlword_spacing_ns: u64,
     /// What is plausible for such a drive.
     pub plausible: Plausible,
+}
+
+/// How drives are spoken to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Protocol {
+    /// By CANopen: they are nodes, with objects, NMT states and PDOs.
+    Canopen,
+    /// By frames of bit fields, see [`Family::field_drive`](crate::family::Family::field_drive).
+    BitFields,
+    /// By a protocol of their own with these identifiers, one request at a time.
+    Own(OwnIdentifiers),
+}
+
+impl Protocol {
+    /// The identifiers of a protocol of their own.
+    pub const fn own_identifiers(self) -> Option<OwnIdentifiers> {
+        match self {
+            Self::Own(own) => Some(own),
+            Self::Canopen | Self::BitFields => None,
+        }
+    }
 }
 
 /// The 11-bit identifiers of a protocol that is not CANopen: the node ID is added to each.
@@ -230,8 +248,7 @@ impl DriveFacts {
             reports_mode: true,
             may_ignore_sync: false,
             node_axis: 1,
-            has_field_frames: false,
-            own_identifiers: None,
+            protocol: Protocol::Canopen,
             error_control: ErrorControl::Heartbeat { fixed_ms: None },
             consumes_heartbeat: true,
             sends_emergencies: true,
@@ -245,9 +262,11 @@ impl DriveFacts {
     /// Every identifier between a drive with this node ID and its master: those of its own protocol, or those that CANopen gives to
     /// its node (CiA 301, 7.3.3).
     pub(crate) fn identifiers(&self, node: u8) -> Vec<Id> {
-        match self.own_identifiers {
-            Some(own) => vec![own.request_id(node), own.reply_id(node)],
-            None => (1..=0xE).map(|function| Id::canopen(function << 7, node)).collect(),
+        match self.protocol {
+            Protocol::Own(own) => vec![own.request_id(node), own.reply_id(node)],
+            Protocol::Canopen | Protocol::BitFields => {
+                (1..=0xE).map(|function| Id::canopen(function << 7, node)).collect()
+            }
         }
     }
 

@@ -6,6 +6,7 @@
 
 pub(crate) mod bit_fields;
 pub(crate) mod bounds;
+mod data_file;
 pub(crate) mod defaults;
 #[cfg(feature = "miette")]
 mod diagnostic;
@@ -34,7 +35,7 @@ use std::path::Path;
 
 pub use drive_family::{
     ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, ModeChangeRule, ModeSet, OwnIdentifiers,
-    Plausible, VelocityUnit,
+    Plausible, Protocol, VelocityUnit,
 };
 pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;

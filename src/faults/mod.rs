@@ -31,6 +31,6 @@ pub use injector::{FaultEvent, FaultEvents, FaultInjector, Transition};
 pub use port::FaultyPort;
 pub use read::ScenarioError;
 pub use scenario::{Scenario, ScenarioFault};
-pub use selection::{Direction, FrameFunction, Selection};
+pub use selection::{Direction, DriveIdentifiers, FrameFunction, Selection};
 pub use trigger::{Trigger, TriggerTimes};
 pub use window::{FaultProgress, Window};

@@ -55,6 +55,39 @@ impl FrameFunction {
     }
 }
 
+/// By which identifiers the frames of a drive are known.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum DriveIdentifiers {
+    /// Those that CANopen gives to its node ID (CiA 301, 7.3.3), and these of the vendor's own protocol beside them. Frames of that are shorter
+    /// than those of SDO, which other nodes have with the same identifiers.
+    Node {
+        /// Of the vendor's own protocol.
+        own_protocol: Vec<Id>,
+    },
+    /// These. The drive is no CANopen node.
+    These(Vec<Id>),
+}
+
+impl Default for DriveIdentifiers {
+    /// Those of a CANopen node.
+    fn default() -> Self {
+        Self::Node { own_protocol: vec![] }
+    }
+}
+
+impl DriveIdentifiers {
+    fn include(&self, frame: &Frame, node: u8) -> bool {
+        let id = frame.id();
+        match self {
+            Self::Node { own_protocol } => {
+                let is_of_node = id.value() >= 0x080 && id.value() & 0x7F == u32::from(node);
+                !id.is_extended() && is_of_node || frame.payload().len() < 8 && own_protocol.contains(&id)
+            }
+            Self::These(ids) => ids.contains(&id),
+        }
+    }
+}
+
 /// Selects frames: a frame must meet all of these conditions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Selection {
@@ -64,11 +97,10 @@ pub struct Selection {
     pub ids: RangeInclusive<u32>,
     /// The function; `None` for any.
     pub function: Option<FrameFunction>,
-    /// The node ID in the identifier; `None` for any.
+    /// The node ID of the drive; `None` for any.
     pub node: Option<u8>,
-    /// The identifiers of the vendor's own protocol of this node. Its frames are shorter than those of SDO, which other nodes
-    /// have with the same identifiers.
-    pub own_protocol: Vec<Id>,
+    /// Which frames are those of the drive.
+    pub identifiers: DriveIdentifiers,
     /// The probability of being selected, 0 to 1.
     pub probability: f64,
     /// The largest number of frames; the fault ends with the last one. `None`: no limit.
@@ -85,7 +117,7 @@ impl Default for Selection {
             ids: 0..=0x1FFF_FFFF,
             function: None,
             node: None,
-            own_protocol: vec![],
+            identifiers: DriveIdentifiers::default(),
             probability: 1.0,
             count: None,
             seed: 1,
@@ -101,13 +133,7 @@ impl Selection {
         (self.direction == Direction::Both || self.direction == direction)
             && self.ids.contains(&id)
             && self.function.is_none_or(|function| is_canopen && function.includes(id))
-            && self.node.is_none_or(|node| {
-                is_canopen && id >= 0x080 && id & 0x7F == u32::from(node) || self.is_of_own_protocol(frame)
-            })
-    }
-
-    fn is_of_own_protocol(&self, frame: &Frame) -> bool {
-        frame.payload().len() < 8 && self.own_protocol.contains(&frame.id())
+            && self.node.is_none_or(|node| self.identifiers.include(frame, node))
     }
 }
 
@@ -183,7 +209,8 @@ mod tests {
     #[test]
     fn the_frames_of_the_vendors_own_protocol_belong_to_the_node_that_speaks_it() {
         let own = [0x642, 0x5C2].map(|id| Id::base(id).unwrap()).to_vec();
-        let of_2 = Selection { node: Some(2), own_protocol: own, ..Selection::default() };
+        let identifiers = DriveIdentifiers::Node { own_protocol: own };
+        let of_2 = Selection { node: Some(2), identifiers, ..Selection::default() };
         let of_66 = Selection { node: Some(66), ..Selection::default() };
         let question = Frame::of(Id::base(0x642).unwrap(), [0, 2]);
         assert!(of_2.includes(&question, Direction::Sent));
@@ -191,6 +218,17 @@ mod tests {
         let sdo = Frame::of(Id::base(0x642).unwrap(), [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
         assert!(!of_2.includes(&sdo, Direction::Sent) && of_66.includes(&sdo, Direction::Sent));
         assert!(of_2.includes(&frame(0x182), Direction::Received));
+    }
+
+    #[test]
+    fn a_drive_that_is_no_canopen_node_has_the_frames_with_its_own_identifiers_alone() {
+        let identifiers = DriveIdentifiers::These([0x001, 0x065].map(|id| Id::base(id).unwrap()).to_vec());
+        let of_1 = Selection { node: Some(1), identifiers, ..Selection::default() };
+        let reply = Frame::fd(Id::base(0x065).unwrap(), &[0; 16], true).unwrap();
+        assert!(of_1.includes(&reply, Direction::Received) && of_1.includes(&frame(0x001), Direction::Sent));
+        for other in [0x002, 0x066, 0x081, 0x181, 0x601] {
+            assert!(!of_1.includes(&frame(other), Direction::Sent), "{other:03X}");
+        }
     }
 
     #[test]

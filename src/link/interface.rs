@@ -98,6 +98,20 @@ pub enum InterfaceError {
         /// The command that sets it up, once it is down.
         command: String,
     },
+    /// The data phase of CAN FD frames is at another bit rate.
+    #[error(
+        "{name} runs at {found} bit/s in the data phase and {wanted} are configured; to change it: sudo ip link set {name} down && {command}"
+    )]
+    DataBitRateDiffers {
+        /// The interface.
+        name: String,
+        /// Bit/s in force.
+        found: u32,
+        /// Bit/s asked for.
+        wanted: u32,
+        /// The command that sets it up, once it is down.
+        command: String,
+    },
     /// CAN FD frames are configured, and the interface does not carry them.
     #[error("{name} does not carry CAN FD frames; to change it: sudo ip link set {name} down && {command}")]
     NoFd {
@@ -253,21 +267,18 @@ fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(),
     if status.state == BusState::BusOff && status.restart_ms == Some(0) {
         return Err(InterfaceError::IsOff { name: status.name.clone() });
     }
-    let pairs = [(status.timing, Some(settings.bit_rate)), (status.data_timing, settings.data_bit_rate)];
-    for (timing, wanted) in pairs {
-        if let (Some(timing), Some(wanted)) = (timing, wanted)
-            && timing.bit_rate != wanted
-        {
-            return Err(InterfaceError::BitRateDiffers {
-                name: status.name.clone(),
-                found: timing.bit_rate,
-                wanted,
-                command: command(status, settings),
-            });
-        }
+    let differs = |timing: Option<ControllerTiming>, wanted: Option<u32>| {
+        Some((timing?.bit_rate, wanted?)).filter(|(found, wanted)| found != wanted)
+    };
+    let (name, command) = (|| status.name.clone(), || command(status, settings));
+    if let Some((found, wanted)) = differs(status.timing, Some(settings.bit_rate)) {
+        return Err(InterfaceError::BitRateDiffers { name: name(), found, wanted, command: command() });
+    }
+    if let Some((found, wanted)) = differs(status.data_timing, settings.data_bit_rate) {
+        return Err(InterfaceError::DataBitRateDiffers { name: name(), found, wanted, command: command() });
     }
     if settings.data_bit_rate.is_some() && !status.has_fd {
-        return Err(InterfaceError::NoFd { name: status.name.clone(), command: command(status, settings) });
+        return Err(InterfaceError::NoFd { name: name(), command: command() });
     }
     Ok(())
 }
@@ -370,6 +381,14 @@ mod tests {
             "sudo ip link set can0 down && sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
         assert!(text.ends_with(command), "{text}");
         assert!(compare(&up(Some(1_000_000)), &CLASSIC).is_ok());
+        let slow = Some(ControllerTiming { bit_rate: 2_000_000, sample_point: 0.75 });
+        let data_phase = InterfaceStatus { has_fd: true, data_timing: slow, ..up(Some(1_000_000)) };
+        let text = compare(&data_phase, &FLEXIBLE).unwrap_err().to_string();
+        assert!(
+            text.contains("runs at 2000000 bit/s in the data phase and 5000000 are configured"),
+            "{text}"
+        );
+        assert!(text.contains("dbitrate 5000000 fd on"), "{text}");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use takt_rt::{FrameFormat, FrameKind, Id, TIME_ID, TransmissionType};
 
 use crate::canopen::function_code;
 use crate::config::bit_fields::{DescribedLifeCycle, FieldDevice, ReplyMoment};
-use crate::config::{Axis, Config, Master, Supervision};
+use crate::config::{Axis, Config, Master, Protocol, Supervision};
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 use crate::frame_time::FrameShape;
 
@@ -128,8 +128,8 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     let period_ns = config.bus_cycle(bus_index).period_ns;
     let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
     // What CANopen sends to all nodes is sent where there are nodes.
-    let is_node = |axis: &Axis| !axis.drive.has_field_frames && axis.drive.own_identifiers.is_none();
-    let is_canopen = axes().next().is_none() || axes().any(|(_, axis)| is_node(axis));
+    let is_node = |(_, axis): (usize, &Axis)| axis.drive.protocol == Protocol::Canopen;
+    let is_canopen = axes().next().is_none() || axes().any(is_node);
     let sync = || message(MessageKind::Sync, None, Id::canopen(0x080, 0), 0, period_ns);
     let mut messages: Vec<BusMessage> = is_canopen.then(sync).into_iter().collect();
     let Master { node, heartbeat_ns, time_ns, .. } = config.master;
@@ -150,7 +150,7 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     let is_guarded = |axis: &Axis| matches!(axis.supervision(&config.master), Supervision::Guarding { .. });
     // What a node sends for all of its axes counts once, with the first of them.
     let nodes = || {
-        axes().filter(|(_, axis)| !axis.drive.has_field_frames).filter(|(index, axis)| {
+        axes().filter(|(_, axis)| axis.drive.protocol != Protocol::BitFields).filter(|(index, axis)| {
             let is_its = |(_, other): &(usize, &Axis)| other.node == axis.node;
             axes().find(is_its).is_some_and(|(first, _)| first == *index)
         })
@@ -164,7 +164,7 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
         messages.extend(error_control(index, axis, config, guarded));
     }
     // Drives with a protocol of their own are spoken to while they are enabled, too.
-    let has_own = |(_, axis): &(usize, &Axis)| axis.drive.own_identifiers.is_some();
+    let has_own = |(_, axis): &(usize, &Axis)| axis.drive.protocol.own_identifiers().is_some();
     let served = nodes().filter(has_own).chain(nodes().filter(|node| !has_own(node)));
     messages.extend(
         served
@@ -290,7 +290,7 @@ fn error_control(index: usize, axis: &Axis, config: &Config, guarded: usize) -> 
 /// A drive answers after 0.3 to 1 ms, so two of its answers may follow each other more closely than a cycle.
 fn service(index: usize, axis: &Axis, period_ns: u64) -> [BusMessage; 2] {
     let node = axis.node;
-    let [(request, request_id), (reply, reply_id)] = match axis.drive.own_identifiers {
+    let [(request, request_id), (reply, reply_id)] = match axis.drive.protocol.own_identifiers() {
         Some(own) => {
             [(MessageKind::OwnRequest, own.request_id(node)), (MessageKind::OwnReply, own.reply_id(node))]
         }

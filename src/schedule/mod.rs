@@ -27,7 +27,7 @@ pub(crate) mod text;
 use serde::Serialize;
 use thiserror::Error;
 
-use crate::config::{Config, Cycle};
+use crate::config::{Axis, Config, Cycle, Protocol};
 use bound::Traffic;
 use messages::BusMessage;
 
@@ -223,7 +223,8 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
     let is_sent_while_enabled = |message: &BusMessage| allows_sdo || !message.kind.is_sdo();
     let enabled: Vec<&BusMessage> = all.iter().filter(|message| is_sent_while_enabled(message)).collect();
 
-    let on_bus = config.axes.iter().filter(|axis| axis.bus == index && !axis.drive.has_field_frames);
+    let is_timed = |axis: &&Axis| axis.bus == index && axis.drive.protocol != Protocol::BitFields;
+    let on_bus = config.axes.iter().filter(is_timed);
     let feedback_delay_ns = on_bus.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
     let slot = slot::worst_slot(&enabled, feedback_delay_ns, cycle, cycles, rates);
     let is_queue_empty_at_sync = slot.is_queue_empty_at_sync;

@@ -1,7 +1,7 @@
 //! Defects of a simulated drive or its joint. Unlike a [`DriveFault`](super::DriveFault), the drive itself may not
 //! detect them.
 
-use takt_rt::Frame;
+use takt_rt::{Frame, FrameKind};
 
 /// A defect of a drive or its joint. Most are states that last until they are removed; the others are momentary events
 /// ([`Defect::is_event`]).
@@ -60,10 +60,19 @@ impl Defect {
     }
 }
 
-/// The frame without its last byte.
+/// The frame with the next shorter length that one of its kind can have.
 pub(super) fn shorter(frame: Frame) -> Frame {
-    let shorter = frame.payload().split_last().and_then(|(_, rest)| Frame::data(frame.id(), rest).ok());
-    shorter.unwrap_or(frame)
+    let (id, payload) = (frame.id(), frame.payload());
+    let with_length = |length: usize| {
+        let rest = payload.get(..length)?;
+        match frame.kind() {
+            FrameKind::Data => Frame::data(id, rest).ok(),
+            FrameKind::Fd => Frame::fd(id, rest, false).ok(),
+            FrameKind::FdBitRateSwitch => Frame::fd(id, rest, true).ok(),
+            FrameKind::Remote => None,
+        }
+    };
+    (0..payload.len()).rev().find_map(with_length).unwrap_or(frame)
 }
 
 /// This simulated drive cannot have the defect.

@@ -315,9 +315,38 @@ fn a_motor_of_can_fd_shows_an_error_until_it_is_stopped_and_hears_no_classic_com
 #[test]
 fn defects_that_a_motor_cannot_have_are_refused() {
     let mut bench = Bench::new(HOLLOW, 0.0);
-    for defect in [Defect::StuckBrake, Defect::SilentSdoServer, Defect::Emergency { code: 1 }] {
+    let mode = Defect::OperationModeDisplay { mode: 9 };
+    for defect in [Defect::StuckBrake, Defect::SilentSdoServer, Defect::Emergency { code: 1 }, mode] {
         assert!(bench.bus.inject_defect(1, defect, true).is_err(), "{defect:?}");
     }
     bench.bus.inject_defect(1, Defect::EncoderJump { distance: 0.5 * TAU }, true).unwrap();
     assert_eq!(position_of(&bench.order(STOP)), 0xC000);
+}
+
+#[test]
+fn a_short_reply_has_the_next_length_that_its_kind_of_frame_can_have() {
+    let request = flexible(0, 0, 0, 2, 0, 0);
+    for (keys, command, whole, short) in
+        [(HOLLOW, packed(0x8000, 0x800, 0x800), 6, 5), (HOLLOW_FD, request, 16, 12)]
+    {
+        let mut bench = Bench::new(keys, 0.0);
+        let length = bench.ask(command).len();
+        bench.bus.inject_defect(1, Defect::ShortFeedback, true).unwrap();
+        assert_eq!((length, bench.ask(command).len()), (whole, short));
+        bench.bus.inject_defect(1, Defect::ShortFeedback, false).unwrap();
+        assert_eq!(bench.ask(command).len(), whole);
+    }
+}
+
+#[test]
+fn a_motor_of_can_fd_may_show_another_mode_than_its_own() {
+    let mut bench = Bench::new(HOLLOW_FD, 0.0);
+    let request = flexible(0, 0, 0, 2, 0, 0);
+    // By the numbers of object 6061: cyclic torque, cyclic velocity, and one that it does not have.
+    for (mode, code) in [(10, 0), (9, 1), (1, 0xFF)] {
+        bench.bus.inject_defect(1, Defect::OperationModeDisplay { mode }, true).unwrap();
+        assert_eq!(bench.ask(request)[11], code);
+        bench.bus.inject_defect(1, Defect::OperationModeDisplay { mode }, false).unwrap();
+        assert_eq!(bench.ask(request)[11], 2);
+    }
 }

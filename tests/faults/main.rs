@@ -12,4 +12,5 @@ mod reactions;
 mod rearming;
 mod repeatability;
 mod unreachable;
+mod without_canopen;
 mod wrapper;

@@ -1,9 +1,10 @@
-"""Tests a simulated SLCAN adapter with the package `python-can` as its host, and the drive behind it with the package `canopen`.
+"""Tests simulated SLCAN adapters with the package `python-can` as their host, and the drive behind one with the package `canopen`.
 
-    python tests/peers/slcan_host.py LINE
+    python tests/peers/slcan_host.py LINE SWITCHING PLAIN
 
-LINE is the pseudo-terminal of the adapter; behind it is the drive of configs/first.toml. Ends with 1 and a sentence at the first
-difference.
+These are the pseudo-terminals of three adapters. Behind LINE is the drive of configs/first.toml, behind SWITCHING and PLAIN are the
+motors of configs/hollow-leg-fd.toml, which take frames of CAN FD with and without bit-rate switching. Ends with 1 and a sentence at the
+first difference.
 """
 
 import sys
@@ -18,11 +19,18 @@ NO_OBJECT = 0x0602_0000
 DEVICE_TYPE = 0x0042_0192
 
 
-def main(line):
+# A hollow-shaft motor and its replies; position mode, without torque (chapter on CAN FD of its manual).
+MOTOR, MASTER = 0x001, 0x065
+AT_REST = bytes([0] * 11 + [2, 0, 0, 0, 0])
+
+
+def main(line, switching, plain):
     try:
         is_an_adapter(line)
         is_deaf_at_another_bit_rate(line)
         brings_the_drive(line)
+        brings_a_motor_of_can_fd(switching, has_switch=True)
+        brings_a_motor_of_can_fd(plain, has_switch=False)
     except Difference as difference:
         sys.exit(str(difference))
     print("slcan: all done")
@@ -66,9 +74,24 @@ def brings_the_drive(line):
         network.disconnect()
 
 
+def brings_a_motor_of_can_fd(line, has_switch):
+    rates = {"nom_bitrate": 1_000_000, "nom_sample_point": 80, "data_bitrate": 5_000_000, "data_sample_point": 75}
+    timing = can.BitTimingFd.from_sample_point(f_clock=80_000_000, **rates)
+    with can.Bus(interface="slcan", channel=line, timing=timing, sleep_after_open=0) as bus:
+        request = {"arbitration_id": MOTOR, "is_extended_id": False, "is_fd": True, "bitrate_switch": has_switch}
+        bus.send(can.Message(data=AT_REST, dlc=len(AT_REST), **request))
+        reply = bus.recv(5.0)
+        if reply is None:
+            raise Difference("the motor did not reply")
+        seen = reply.arbitration_id, reply.is_fd, reply.bitrate_switch
+        expect("the identifier and the kind of the reply", seen, (MASTER, True, has_switch))
+        # Position, velocity and current, the mode, no torque, nothing, 30 °C, the motor.
+        expect("the reply", bytes(reply.data), bytes([0] * 11 + [2, 0, 0, 30, 1]))
+
+
 def sdo_read():
     return can.Message(arbitration_id=0x600 + NODE, data=[0x40, 0, 0x10, 0, 0, 0, 0, 0], is_extended_id=False)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

@@ -1,6 +1,6 @@
 //! What an axis does when the controller is gone, by `kill -9` or by a broken cable, until its drive acts.
 
-use crate::config::{Axis, Config, Control, PositionUnit};
+use crate::config::{Axis, Config, Control, PositionUnit, Protocol};
 use crate::family;
 use serde::Serialize;
 
@@ -69,7 +69,7 @@ impl Unattended {
                     return Self::GoesOnForEver {
                         because: match master.heartbeat_ns {
                             _ if off_cycle.is_some() => "the drive has no watchdog on its controller",
-                            _ if axis.drive.has_field_frames => "the drive has no watchdog",
+                            _ if axis.drive.protocol == Protocol::BitFields => "the drive has no watchdog",
                             None => "[master] heartbeat is off",
                             Some(_) => "the drive has neither a consumer heartbeat (1016) nor node guarding",
                         },

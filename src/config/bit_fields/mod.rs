@@ -19,7 +19,7 @@ pub use expression::{IdExpression, PayloadByte};
 pub use read::{load, parse};
 pub use settings::{Setting, Settings};
 
-use super::quirks::Confirmation;
+pub use super::data_file::DescribedDrive;
 
 /// One drive: its description, and what the configuration says of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,19 +63,6 @@ pub struct Description {
     pub has_watchdog: bool,
     /// Its error codes in words.
     pub errors: Vec<(u16, String)>,
-}
-
-/// The drive that a description is about.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct DescribedDrive {
-    /// The vendor, for people.
-    pub vendor: String,
-    /// The product, for people.
-    pub product: String,
-    /// Whether it was tried.
-    pub confirmation: Confirmation,
-    /// The documents that it was taken from.
-    pub sources: Vec<String>,
 }
 
 /// A frame of bit fields.

@@ -9,18 +9,17 @@ use takt_rt::{
 use toml::de::DeTable;
 
 use super::{
-    Amount, BesideTargetKind, DescribedDrive, DescribedFrames, DescribedLifeCycle, DescribedScale,
-    Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, IdExpression,
-    PayloadByte, ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
+    Amount, BesideTargetKind, DescribedFrames, DescribedLifeCycle, DescribedScale, Description,
+    FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, IdExpression, PayloadByte,
+    ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
 };
 use crate::config::ConfigError;
 use crate::config::bounds::Bounds;
-use crate::config::quirks::Confirmation;
+use crate::config::data_file::{self, each, each_of_some, optional};
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::spot::{Problems, Spot};
-use crate::printable::printable_path;
 
 /// The longest delay and period; a longer one is a mistake in the unit.
 const LONGEST_S: f64 = 1.0;
@@ -65,21 +64,14 @@ const REFERENCES: [(&str, PositionReference); 2] =
     [("zero", PositionReference::Zero), ("present", PositionReference::Present)];
 const BESIDE_TARGET: [(&str, BesideTargetKind); 2] =
     [("feed-forward", BesideTargetKind::FeedForward), ("limits", BesideTargetKind::Limits)];
-const CONFIRMATIONS: [(&str, Confirmation); 2] = [
-    (Confirmation::DataSheetOnly.name(), Confirmation::DataSheetOnly),
-    (Confirmation::TriedOnHardware.name(), Confirmation::TriedOnHardware),
-];
+const ERROR_CODES: &str = "an error code, in decimal: 3 = \"over-voltage\"";
 
 /// Reads a description.
 ///
 /// # Errors
 /// The file cannot be read, or every problem of its text.
 pub fn load(path: &Path) -> Result<Description, ConfigError> {
-    let name = printable_path(path);
-    match crate::text_file::read(path) {
-        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?),
-        Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
-    }
+    data_file::load(path, parse)
 }
 
 /// Reads the text of a description. Messages call it `source_name`.
@@ -93,11 +85,13 @@ pub fn parse(source_name: &str, text: &str) -> Result<Description, ConfigError> 
 /// Reads every section, even after one has failed.
 fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Description> {
     let mut root = Section::new("", 0..0, table, problems);
-    let drive = drive(root.section("drive"));
+    let mut drive_section = root.section("drive");
+    let drive = data_file::drive(&mut drive_section);
+    drive_section.finish();
     let motor_ids = root.require("motor_ids", "the motor IDs that it may have: motor_ids = [1, 99]");
     let motor_ids = motor_ids.and_then(|entry| two(&entry, MOTOR_IDS));
     let modes = root.require("modes", "the modes that it has: modes = [\"position\", \"torque\"]");
-    let modes = modes.and_then(|entry| modes_of(&entry));
+    let modes = modes.and_then(|entry| each_of_some(&entry, "mode", |entry| entry.choice(&MODES)));
     let position_reference = root.get("position_reference").map(|entry| entry.choice(&REFERENCES));
     let wraps = root.get("wraps").map(|entry| entry.boolean());
     let beside = root.require(
@@ -119,8 +113,10 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
     let reply = frame(reply_section, &REPLY_VALUES);
     let life_cycle = life_cycle(root.section("life_cycle"));
     let setup: Vec<_> = root.sections("setup").into_iter().map(setup).collect();
-    let bytes_before_setup = root.get("reply_bytes_before_setup").map(|entry| entry.integer(1..9));
-    let errors = errors(root.get("errors"), problems);
+    let bytes_before_setup =
+        optional(root.get("reply_bytes_before_setup"), |entry| usize::try_from(entry.integer(1..9)?).ok());
+    let error_code = |key: &str| key.parse().ok();
+    let errors = data_file::errors(root.get("errors"), problems, error_code, ERROR_CODES);
     root.finish();
     let (lowest, highest) = motor_ids?;
     let description = Description {
@@ -135,10 +131,7 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
         reply_moment: reply_moment?,
         life_cycle: life_cycle?,
         setup: setup.into_iter().collect::<Option<_>>()?,
-        bytes_before_setup: match bytes_before_setup {
-            None => None,
-            Some(bytes) => Some(usize::try_from(bytes?).ok()?),
-        },
+        bytes_before_setup: bytes_before_setup?,
         modes: modes?,
         position_reference: position_reference.unwrap_or(Some(PositionReference::Zero))?,
         wraps: wraps.unwrap_or(Some(false))?,
@@ -199,30 +192,9 @@ fn states(mut section: Section<'_>) -> Option<StateCodes> {
     Some(StateCodes { stopped: stopped?, running: running? })
 }
 
-fn drive(mut section: Section<'_>) -> Option<DescribedDrive> {
-    let text = |entry: Entry<'_>| entry.text().map(str::to_owned);
-    let vendor = section.require("vendor", "the vendor: vendor = \"Acme\"").and_then(text);
-    let product = section.require("product", "the product: product = \"Servo 1\"").and_then(text);
-    let says = "whether anybody has tried it: status = \"from its data sheet, not tried on hardware\"";
-    let confirmation = section.require("status", says).and_then(|entry| entry.choice(&CONFIRMATIONS));
-    let sources = section.require("sources", "the documents that it was taken from: sources = [\"…\"]");
-    let sources = sources.and_then(|entry| {
-        let texts: Vec<_> = entry.list()?.iter().map(|entry| entry.text().map(str::to_owned)).collect();
-        texts.into_iter().collect::<Option<Vec<_>>>()
-    });
-    section.finish();
-    Some(DescribedDrive {
-        vendor: vendor?,
-        product: product?,
-        confirmation: confirmation?,
-        sources: sources?,
-    })
-}
-
 /// Two whole numbers, the lower one first.
 fn two(entry: &Entry<'_>, allowed: std::ops::Range<i64>) -> Option<(i64, i64)> {
-    let numbers: Vec<_> = entry.list()?.iter().map(|entry| entry.integer(allowed.clone())).collect();
-    let numbers: Vec<i64> = numbers.into_iter().collect::<Option<_>>()?;
+    let numbers = each(entry, |entry| entry.integer(allowed.clone()))?;
     match numbers.as_slice() {
         [low, high] if low <= high => Some((*low, *high)),
         _ => {
@@ -233,15 +205,6 @@ fn two(entry: &Entry<'_>, allowed: std::ops::Range<i64>) -> Option<(i64, i64)> {
             None
         }
     }
-}
-
-fn modes_of(entry: &Entry<'_>) -> Option<Vec<FieldMode>> {
-    let modes: Vec<_> = entry.list()?.iter().map(|entry| entry.choice(&MODES)).collect();
-    let modes: Vec<FieldMode> = modes.into_iter().collect::<Option<_>>()?;
-    if modes.is_empty() {
-        entry.report_range("an empty list".to_owned(), "at least one mode".to_owned());
-    }
-    (!modes.is_empty()).then_some(modes)
 }
 
 fn reply_moment(root: &mut Section<'_>) -> Option<ReplyMoment> {
@@ -459,25 +422,4 @@ fn setup(mut section: Section<'_>) -> Option<SetupFrame> {
     };
     section.finish();
     Some(SetupFrame { frame: frame?, number: number? })
-}
-
-/// Reads the error codes in words. Their keys are the codes, so this table has no fixed keys.
-fn errors(entry: Option<Entry<'_>>, problems: &Problems) -> Option<Vec<(u16, String)>> {
-    let Some(entry) = entry else { return Some(vec![]) };
-    let mut errors = vec![];
-    let mut are_right = true;
-    for (key, value) in entry.table()? {
-        let spot = Entry::new(format!("errors.{}", key.get_ref()), value, problems);
-        let code = key.get_ref().parse().ok();
-        if code.is_none() {
-            let allowed = "an error code, in decimal: 3 = \"over-voltage\"";
-            spot.report_range(format!("the key {:?}", key.get_ref()), allowed.to_owned());
-        }
-        match (code, spot.text()) {
-            (Some(code), Some(words)) => errors.push((code, words.to_owned())),
-            _ => are_right = false,
-        }
-    }
-    errors.sort();
-    are_right.then_some(errors)
 }

@@ -8,28 +8,8 @@ use takt_rt::{Nanoseconds, OperationMode};
 use super::PowerUpState;
 use crate::canopen::object::ObjectAddress;
 
+pub use super::data_file::Confirmation;
 pub use read::{load, parse};
-
-/// Whether anybody has tried what a quirk file says.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Confirmation {
-    /// It comes from documents alone.
-    #[default]
-    DataSheetOnly,
-    /// A real drive has shown it.
-    TriedOnHardware,
-}
-
-impl Confirmation {
-    /// For people.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::DataSheetOnly => "from its data sheet, not tried on hardware",
-            Self::TriedOnHardware => "tried on hardware",
-        }
-    }
-}
 
 /// The drive that a quirk file is about.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

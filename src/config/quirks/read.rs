@@ -6,24 +6,19 @@ use std::path::Path;
 use takt_rt::{Nanoseconds, OperationMode};
 use toml::de::DeTable;
 
-use super::{Confirmation, Delays, MotionUnit, ObjectPattern, Quirks, QuirkyDrive};
+use super::{Delays, MotionUnit, ObjectPattern, Quirks, QuirkyDrive};
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::objects::PROFILE_ACCELERATION;
 use crate::config::ConfigError;
+use crate::config::data_file::{self, DescribedDrive, each, each_of_some, optional};
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::spot::Problems;
 use crate::config::{MODES, PowerUpState};
-use crate::printable::printable_path;
 
 /// The longest delay; a longer one is a mistake in the unit.
 const LONGEST_S: f64 = 600.0;
-
-const CONFIRMATIONS: [(&str, Confirmation); 2] = [
-    (Confirmation::DataSheetOnly.name(), Confirmation::DataSheetOnly),
-    (Confirmation::TriedOnHardware.name(), Confirmation::TriedOnHardware),
-];
 
 /// The velocity and acceleration objects whose unit a file may give.
 const UNITS: [(&str, u16); 4] = [
@@ -38,11 +33,7 @@ const UNITS: [(&str, u16); 4] = [
 /// # Errors
 /// The file cannot be read, or every problem of its text.
 pub fn load(path: &Path) -> Result<Quirks, ConfigError> {
-    let name = printable_path(path);
-    match crate::text_file::read(path) {
-        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?),
-        Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
-    }
+    data_file::load(path, parse)
 }
 
 /// Reads the text of a quirk file. Messages call it `source_name`.
@@ -58,15 +49,8 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
     let mut root = Section::new("", 0..0, table, problems);
     let drive = drive(root.section("drive"));
     let known: Vec<_> = MODES.into_iter().chain([("homing", OperationMode::Homing)]).collect();
-    let modes = optional(root.get("modes"), |entry| {
-        each(&entry, |entry| entry.choice(&known)).filter(|modes| {
-            let has_modes = !modes.is_empty();
-            if !has_modes {
-                entry.report_range("an empty list".to_owned(), "at least one mode".to_owned());
-            }
-            has_modes
-        })
-    });
+    let modes =
+        optional(root.get("modes"), |entry| each_of_some(&entry, "mode", |entry| entry.choice(&known)));
     let counts_per_turn = optional(root.get("counts_per_turn"), |entry| {
         let counts = entry.integer(1..1 << 32)?;
         Some(counts as f64)
@@ -79,7 +63,7 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
     let power_up = optional(root.get("power_up"), |entry| entry.choice(&power_ups));
     let sdo_blocks = optional(root.get("sdo_blocks"), |entry| entry.boolean());
     let delays = delays(root.section("delays"));
-    let errors = errors(root.get("errors"), problems);
+    let errors = data_file::errors(root.get("errors"), problems, error_code, ERROR_CODES);
     root.finish();
     let (missing, constant) = objects?;
     let (statusword_set, statusword_clear) = statusword?;
@@ -99,41 +83,15 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
     })
 }
 
-/// An entry that may be absent: `Some(None)` then, and `None` when it is wrong.
-fn optional<'a, T>(entry: Option<Entry<'a>>, read: impl FnOnce(Entry<'a>) -> Option<T>) -> Option<Option<T>> {
-    match entry {
-        None => Some(None),
-        Some(entry) => read(entry).map(Some),
-    }
-}
-
-/// Every element of a list, even after one was wrong.
-fn each<'a, T>(entry: &Entry<'a>, read: impl Fn(&Entry<'a>) -> Option<T>) -> Option<Vec<T>> {
-    let read: Vec<Option<T>> = entry.list()?.iter().map(read).collect();
-    read.into_iter().collect()
-}
-
 fn drive(mut section: Section<'_>) -> Option<QuirkyDrive> {
-    let text = |entry: Entry<'_>| entry.text().map(str::to_owned);
-    let vendor = section.require("vendor", "the vendor: vendor = \"Acme\"").and_then(text);
-    let product = section.require("product", "the product: product = \"Servo 1\"").and_then(text);
+    let described = data_file::drive(&mut section);
     let number = |entry: &Entry<'_>| u32::try_from(entry.integer(0..1 << 32)?).ok();
     let vendor_number = optional(section.get("vendor_number"), |entry| number(&entry));
     let product_numbers = optional(section.get("product_numbers"), |entry| each(&entry, number));
-    let says = "whether anybody has tried it: status = \"from its data sheet, not tried on hardware\"";
-    let confirmation = section.require("status", says).and_then(|entry| entry.choice(&CONFIRMATIONS));
-    let says = "the documents that it was taken from: sources = [\"…\"]";
-    let sources = section.require("sources", says);
-    let sources = sources.and_then(|entry| each(&entry, |entry| entry.text().map(str::to_owned)));
     section.finish();
-    Some(QuirkyDrive {
-        vendor: vendor?,
-        product: product?,
-        vendor_number: vendor_number?,
-        product_numbers: product_numbers?.unwrap_or_default(),
-        confirmation: confirmation?,
-        sources: sources?,
-    })
+    let DescribedDrive { vendor, product, confirmation, sources } = described?;
+    let (vendor_number, product_numbers) = (vendor_number?, product_numbers?.unwrap_or_default());
+    Some(QuirkyDrive { vendor, product, vendor_number, product_numbers, confirmation, sources })
 }
 
 fn objects(mut section: Section<'_>) -> Option<(Vec<ObjectPattern>, Vec<ObjectPattern>)> {
@@ -230,24 +188,9 @@ fn delays(mut section: Section<'_>) -> Option<Delays> {
     })
 }
 
-/// Reads the error codes in words. Their keys are the codes, so this table has no fixed keys.
-fn errors(entry: Option<Entry<'_>>, problems: &Problems) -> Option<Vec<(u16, String)>> {
-    let Some(entry) = entry else { return Some(vec![]) };
-    let mut errors = vec![];
-    let mut are_right = true;
-    for (key, value) in entry.table()? {
-        let spot = Entry::new(format!("errors.{}", key.get_ref()), value, problems);
-        let code = (key.get_ref().len() == 4).then(|| u16::from_str_radix(key.get_ref(), 16).ok()).flatten();
-        if code.is_none() {
-            let allowed =
-                "an error code (object 603F) of four hexadecimal digits: 8611 = \"following error\"";
-            spot.report_range(format!("the key {:?}", key.get_ref()), allowed.to_owned());
-        }
-        match (code, spot.text()) {
-            (Some(code), Some(words)) => errors.push((code, words.to_owned())),
-            _ => are_right = false,
-        }
-    }
-    errors.sort();
-    are_right.then_some(errors)
+const ERROR_CODES: &str =
+    "an error code (object 603F) of four hexadecimal digits: 8611 = \"following error\"";
+
+fn error_code(key: &str) -> Option<u16> {
+    (key.len() == 4).then(|| u16::from_str_radix(key, 16).ok()).flatten()
 }

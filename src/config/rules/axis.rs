@@ -4,7 +4,7 @@ use takt_rt::{MAX_AXES, OperationMode};
 
 use super::loops::Surroundings;
 use super::{Fields, bit_fields, identifiers, limits, loops, master, name, simulation};
-use crate::config::drive_family::{DriveFacts, ModeChangeRule};
+use crate::config::drive_family::{DriveFacts, ModeChangeRule, Protocol};
 use crate::config::mode_words::{MODES, mode_word};
 use crate::config::model::{
     Axis, Config, Control, FeedForward, Feedback, Interface, Joint, Limits, PdoMapping, Travel,
@@ -81,7 +81,7 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
 
 /// A protocol that is not CANopen may have room for fewer node IDs.
 pub fn own_node(spot: &Spot<'_>, drive: &DriveFacts, node: u8) {
-    if let Some(own) = drive.own_identifiers.filter(|own| node > own.last_node) {
+    if let Some(own) = drive.protocol.own_identifiers().filter(|own| node > own.last_node) {
         spot.report_range(
             node.to_string(),
             format!("1 to {}, the node IDs of an {}", own.last_node, drive.name),
@@ -95,12 +95,12 @@ pub fn shared_identifier(
     (drive, node): (&DriveFacts, u8),
     (other, other_node): (&DriveFacts, u8),
 ) -> Option<ProblemKind> {
-    if drive.own_identifiers.is_none() && other.own_identifiers.is_none() {
-        return None;
-    }
-    // Theirs are those of their descriptions: `rules::identifiers` looks at them.
-    if drive.has_field_frames || other.has_field_frames {
-        return None;
+    match (drive.protocol, other.protocol) {
+        // The identifiers of bit fields are those of a description: `rules::identifiers` looks at them.
+        (Protocol::Canopen, Protocol::Canopen) | (Protocol::BitFields, _) | (_, Protocol::BitFields) => {
+            return None;
+        }
+        (Protocol::Own(_), _) | (_, Protocol::Own(_)) => {}
     }
     let theirs = other.identifiers(other_node);
     let id = drive.identifiers(node).into_iter().find(|id| theirs.contains(id))?;

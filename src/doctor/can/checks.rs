@@ -22,6 +22,14 @@ const BIT_RATE: Check = Check {
     why: "every node of a bus must have the same bit rate, and sample bits at about the same point",
 };
 
+const FRAMES: Check = Check {
+    key: "can_frames",
+    group: Group::Can,
+    title: "frames",
+    source: SOURCE,
+    why: "an interface for classic frames refuses those of CAN FD",
+};
+
 const RESTART: Check = Check {
     key: "can_restart_ms",
     group: Group::Can,
@@ -49,9 +57,14 @@ const QUEUE: Check = Check {
 /// A queue that holds at least what a cycle sends, and not what many cycles send.
 const QUEUE_LENGTHS: std::ops::RangeInclusive<u64> = 10..=128;
 
+fn wants_fd(wanted: Option<&WantedBus>) -> bool {
+    wanted.is_some_and(|bus| bus.data_bit_rate.is_some())
+}
+
 fn bring_up(name: &str, wanted: Option<&WantedBus>) -> String {
     if name.starts_with("vcan") || name.starts_with("vxcan") {
-        return format!("sudo ip link set {name} up");
+        let mtu = if wants_fd(wanted) { " mtu 72" } else { "" };
+        return format!("sudo ip link set {name}{mtu} up");
     }
     let bit_rate = wanted.map_or(1_000_000, |bus| bus.bit_rate);
     let data = wanted
@@ -104,6 +117,22 @@ pub fn state_of_flags(name: &str, flags: Option<&str>) -> Finding {
         Some(_) => down(name, None),
         None => STATE.not_known("cannot be read"),
     }
+}
+
+/// Whether a virtual interface carries the frames of CAN FD, where the configuration has them. That of a controller does when it has a
+/// data phase.
+pub fn frames(link: &Link, wanted: Option<&WantedBus>) -> Option<Finding> {
+    let name = &link.name;
+    if !wants_fd(wanted) {
+        return None;
+    }
+    Some(match link.has_fd {
+        true => FRAMES.good("CAN FD and classic ones").applied(true),
+        false => FRAMES
+            .forbids("classic ones; the configuration says CAN FD")
+            .applied(false)
+            .mend(format!("sudo ip link set {name} down && {}", bring_up(name, wanted))),
+    })
 }
 
 pub fn bit_rate(link: &Link, wanted: Option<&WantedBus>) -> Finding {
@@ -247,6 +276,19 @@ mod tests {
             needed.mend,
             ["sudo ip link set can0 up type can bitrate 500000 dbitrate 2000000 fd on restart-ms 250"]
         );
+    }
+
+    #[test]
+    fn a_virtual_interface_has_room_for_the_frames_of_the_configuration() {
+        let vcan = |has_fd| Link { name: "vcan2".to_owned(), has_fd, ..Link::default() };
+        let fd = wanted(1_000_000, Some(5_000_000));
+        assert_eq!(frames(&vcan(true), Some(&fd)).map(|finding| finding.verdict), Some(Verdict::Good));
+        let finding = frames(&vcan(false), Some(&fd)).unwrap();
+        assert_eq!(finding.verdict, Verdict::ForbidsRealTime);
+        assert_eq!(finding.mend, ["sudo ip link set vcan2 down && sudo ip link set vcan2 mtu 72 up"]);
+        assert_eq!(frames(&vcan(false), Some(&wanted(1_000_000, None))), None);
+        assert_eq!(frames(&vcan(false), None), None);
+        assert_eq!(state(&vcan(false), Some(&fd)).mend, ["sudo ip link set vcan2 mtu 72 up"]);
     }
 
     #[test]

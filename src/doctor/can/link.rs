@@ -5,12 +5,17 @@ use takt_rt::BusState;
 
 use crate::link::{ControllerTiming, InterfaceStatus};
 
+/// The bytes that the kernel hands an interface for CAN FD frames (`CANFD_MTU`); for classic ones they are 16.
+const FD_MTU: u64 = 72;
+
 /// A CAN interface as the kernel describes it. What is not told is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Link {
     pub name: String,
     /// Whether it was brought up.
     pub is_up: bool,
+    /// Whether it carries CAN FD frames.
+    pub has_fd: bool,
     /// `can`, `vcan`, `vxcan` …
     pub kind: Option<String>,
     pub queue_length: Option<u64>,
@@ -53,6 +58,7 @@ impl Link {
         Self {
             name: status.name.clone(),
             is_up: status.is_up,
+            has_fd: status.has_fd,
             queue_length,
             state: Some(state.to_owned()),
             restart_ms: status.restart_ms.map(Into::into),
@@ -80,6 +86,7 @@ fn link(entry: &Value) -> Option<Link> {
     Some(Link {
         name: entry["ifname"].as_str()?.to_owned(),
         is_up: has_flag("UP"),
+        has_fd: entry["mtu"] == FD_MTU,
         kind: text(&info["info_kind"]),
         queue_length: entry["txqlen"].as_u64(),
         queueing: text(&entry["qdisc"]),

@@ -119,6 +119,8 @@ fn of_interface(
                 findings.push(checks::bit_rate(link, wanted));
                 findings.push(checks::restart(link, wanted));
                 findings.push(checks::errors(link));
+            } else {
+                findings.extend(checks::frames(link, wanted));
             }
             findings.push(checks::queue(link));
         }

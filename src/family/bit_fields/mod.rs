@@ -21,7 +21,7 @@ use crate::config::bit_fields::{
 };
 use crate::config::{
     Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, ErrorControl, FamilyKeys,
-    ModeChangeRule, ModeSet, Quantity,
+    ModeChangeRule, ModeSet, Protocol, Quantity,
 };
 use crate::sim::Drive;
 use crate::sim::bit_fields::FieldSimulation;
@@ -174,7 +174,7 @@ impl BitFieldFamily {
             },
             bit_rates: self.bit_rates,
             has_fixed_process_data: description.beside_target == BesideTargetKind::Limits,
-            has_field_frames: true,
+            protocol: Protocol::BitFields,
             error_control: ErrorControl::None,
             consumes_heartbeat: false,
             sends_emergencies: false,

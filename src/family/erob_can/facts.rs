@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use takt_rt::OperationMode;
 
 use crate::config::{
-    DriveFacts, ErrorControl, ModeChangeRule, ModeSet, OwnIdentifiers, Plausible, VelocityUnit,
+    DriveFacts, ErrorControl, ModeChangeRule, ModeSet, OwnIdentifiers, Plausible, Protocol, VelocityUnit,
 };
 use crate::erob_can::frame;
 
@@ -20,7 +20,7 @@ pub static FACTS: DriveFacts = DriveFacts {
     bit_rates: &[1_000_000],
     has_fixed_process_data: true,
     reports_mode: false,
-    own_identifiers: Some(OwnIdentifiers {
+    protocol: Protocol::Own(OwnIdentifiers {
         request: frame::REQUEST,
         reply: frame::REPLY,
         last_node: *frame::NODES.end(),

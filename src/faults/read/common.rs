@@ -7,9 +7,9 @@ use takt_rt::Nanoseconds;
 use crate::config::bounds::Bounds;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
-use crate::config::{Axis, Config, Interface, Quantity};
+use crate::config::{Axis, Config, Interface, Protocol, Quantity};
 use crate::family;
-use crate::faults::selection::{Direction, FrameFunction, Selection};
+use crate::faults::selection::{Direction, DriveIdentifiers, FrameFunction, Selection};
 use crate::faults::trigger::Trigger;
 use crate::faults::window::Window;
 
@@ -152,6 +152,20 @@ pub fn seed(section: &mut Section<'_>) -> Option<u64> {
     u64::try_from(seed.unwrap_or(Some(1))?).ok()
 }
 
+/// By which identifiers the frames of an axis's drive are known.
+fn identifiers(axis: &Axis) -> DriveIdentifiers {
+    match axis.drive.protocol {
+        Protocol::Canopen => {
+            let other = family::of(&axis.drive).other_protocol(axis.node);
+            let own_protocol = other.map_or_else(Vec::new, |other| vec![other.request.id(), other.answer]);
+            DriveIdentifiers::Node { own_protocol }
+        }
+        Protocol::BitFields | Protocol::Own(_) => DriveIdentifiers::These(
+            axis.drive.frame_identifiers(axis.node).into_iter().map(|(id, _)| id).collect(),
+        ),
+    }
+}
+
 /// Reads `id`, `function`, `direction`, `probability`, `count` and `seed`. With `is_sent` the direction is fixed.
 pub fn selection(section: &mut Section<'_>, location: &Location<'_, '_>, is_sent: bool) -> Option<Selection> {
     let all = Selection::default();
@@ -184,10 +198,7 @@ pub fn selection(section: &mut Section<'_>, location: &Location<'_, '_>, is_sent
             Some(function) => Some(function?),
         },
         node: location.axis.map(|axis| axis.node),
-        own_protocol: location.axis.map_or_else(Vec::new, |axis| {
-            let other = family::of(&axis.drive).other_protocol(axis.node);
-            other.map_or_else(Vec::new, |other| vec![other.request.id(), other.answer])
-        }),
+        identifiers: location.axis.map(identifiers).unwrap_or_default(),
         probability: probability.unwrap_or(Some(all.probability))?,
         count: match count {
             None => None,

@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 
 use takt_rt::{
     DriveState, FieldMode, Frame, Id, ModeCodes, Nanoseconds, OperationMode, OwnFrame, PositionReference,
+    ReplyValue,
 };
 
 use super::defect::{Defect, Unsupported, shorter};
@@ -76,6 +77,37 @@ enum Power {
 struct Defects {
     is_blocked: bool,
     is_short: bool,
+    /// The mode that it shows in place of its own.
+    shown_mode: Option<ShownMode>,
+}
+
+/// A mode in a reply.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum ShownMode {
+    /// One that the drive can have.
+    Known(FieldMode),
+    /// A code that is none of its modes.
+    Unknown,
+}
+
+/// The number of a mode in object 6061 (CiA 402).
+const fn operation_mode(mode: FieldMode) -> i8 {
+    let mode = match mode {
+        FieldMode::Torque => OperationMode::CyclicSynchronousTorque,
+        FieldMode::Velocity => OperationMode::CyclicSynchronousVelocity,
+        FieldMode::Position => OperationMode::CyclicSynchronousPosition,
+    };
+    mode as i8
+}
+
+impl ShownMode {
+    /// By its number in object 6061.
+    fn of_number(mode: i8) -> Self {
+        [FieldMode::Torque, FieldMode::Velocity, FieldMode::Position]
+            .into_iter()
+            .find(|known| operation_mode(*known) == mode)
+            .map_or(Self::Unknown, Self::Known)
+    }
 }
 
 /// A simulated drive.
@@ -303,11 +335,14 @@ impl FieldSimulation {
     fn reply(&self) -> Option<Frame> {
         let FieldSimulationParameters { device, motor_id, shaft_per_joint, .. } = &self.parameters;
         let mode = match &device.description.life_cycle {
-            DescribedLifeCycle::ByFields(ModeCodes { torque, velocity, position }) => match self.mode {
-                FieldMode::Torque => *torque,
-                FieldMode::Velocity => *velocity,
-                FieldMode::Position => *position,
-            },
+            DescribedLifeCycle::ByFields(ModeCodes { torque, velocity, position }) => {
+                match self.defects.shown_mode.unwrap_or(ShownMode::Known(self.mode)) {
+                    ShownMode::Known(FieldMode::Torque) => *torque,
+                    ShownMode::Known(FieldMode::Velocity) => *velocity,
+                    ShownMode::Known(FieldMode::Position) => *position,
+                    ShownMode::Unknown => u8::MAX,
+                }
+            }
             DescribedLifeCycle::ByFrames(_) => 0,
         };
         let reply = Reply {
@@ -334,6 +369,10 @@ impl FieldSimulation {
             Some(payload) => Frame::data(self.reply_id, payload).ok(),
             None => Some(if self.defects.is_short { shorter(frame) } else { frame }),
         }
+    }
+
+    fn shows_mode(&self) -> bool {
+        self.parameters.device.description.reply.field(ReplyValue::Mode).is_some()
     }
 
     fn fail(&mut self, code: u16) {
@@ -424,11 +463,6 @@ impl Drive for FieldSimulation {
             Power::On => (DriveState::OperationEnabled, 0),
             Power::Fault(code) => (DriveState::Fault, code),
         };
-        let mode = match self.mode {
-            FieldMode::Torque => OperationMode::CyclicSynchronousTorque,
-            FieldMode::Velocity => OperationMode::CyclicSynchronousVelocity,
-            FieldMode::Position => OperationMode::CyclicSynchronousPosition,
-        };
         Observation {
             position: self.joint.position(),
             velocity: self.joint.velocity(),
@@ -438,7 +472,7 @@ impl Drive for FieldSimulation {
             state,
             statusword: 0,
             error_code,
-            operation_mode: mode as i8,
+            operation_mode: operation_mode(self.mode),
             nmt: NodeState::Operational,
             is_braked: false,
         }
@@ -484,11 +518,17 @@ impl Drive for FieldSimulation {
             Defect::Alarm { code } => self.fail(code),
             Defect::TorqueOff => self.stop(),
             Defect::EncoderJump { distance } => self.offset -= distance * self.parameters.shaft_per_joint,
+            Defect::OperationModeDisplay { mode } if self.shows_mode() => {
+                self.defects.shown_mode = is_present.then(|| ShownMode::of_number(mode));
+            }
+            Defect::OperationModeDisplay { .. } => {
+                let reason = "the replies of this drive do not show its mode";
+                return Err(Unsupported { defect, reason });
+            }
             Defect::StuckBrake
             | Defect::SilentSdoServer
             | Defect::OtherObjectMapped
             | Defect::Statusword { .. }
-            | Defect::OperationModeDisplay { .. }
             | Defect::Emergency { .. } => {
                 let reason =
                     "a drive of bit fields has no brake, no objects, no statusword and no emergency messages";

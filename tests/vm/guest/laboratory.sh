@@ -2,10 +2,10 @@
 
 guest=tests/vm/guest
 
-# Brings a virtual interface up.
+# vcan_up INTERFACE [MTU]: brings a virtual interface up; one with 72 bytes takes CAN FD frames.
 vcan_up() {
     ip link show "$1" >/dev/null 2>&1 || ip link add dev "$1" type vcan
-    ip link set "$1" up
+    ip link set "$1" mtu "${2:-16}" up
 }
 
 # What `takt doctor` advises where it finds long lists of free pages; another one's machine is left as it is.
@@ -59,9 +59,10 @@ load_off() {
     rm -f "$OUT/../share/scratch"
 }
 
-# record INTERFACE FRAMES FILE: so many SYNC frames (080) with kernel time stamps, by a listener that has nothing to do with the sender.
+# record INTERFACE FRAMES FILE [IDENTIFIER]: so many SYNC frames (080), or frames of another identifier, with kernel time stamps, by a
+# listener that has nothing to do with the sender.
 record() {
-    chrt --fifo 1 candump -L -r 4000000 -n "$2" "$1,080:7FF" > "$3"
+    chrt --fifo 1 candump -L -r 4000000 -n "$2" "$1,${4:-080}:7FF" > "$3"
 }
 
 # periods FILE PERIOD_US

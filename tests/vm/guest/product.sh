@@ -1,7 +1,8 @@
 # takt itself, with `takt sim` as the other side, its SYNC seen by a listener of its own: six axes on two virtual
 # interfaces, idle and under load, at 1 ms and 2 ms, with and without the spin guard; and three axes on the two emulated
-# controllers; and a stream, beside clients that behave badly. TAKT and UNRULY_CLIENTS name the programs; CYCLES, LOAD_CYCLES and
-# OTHER_CYCLES set how long. Leaves product.txt (the table, and
+# controllers; and a stream, beside clients that behave badly; and three hollow-shaft motors over CAN FD, whose requests take the place
+# of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT and UNRULY_CLIENTS name the programs;
+# CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long. Leaves product.txt (the table, and
 # when set-points and feedback were on the wire), jitter.txt (`takt jitter`), system_calls.txt, the recordings of SYNC and
 # the reports. Fails when a mean period drifts, a slot was missed, a period deviates further above what cyclictest finds than
 # is allowed, a set-point missed its slot, feedback was late, or there were more system calls than there may be.
@@ -9,17 +10,20 @@
 cycles=${CYCLES:-10000} load_cycles=${LOAD_CYCLES:-2000} other_cycles=${OTHER_CYCLES:-1000}
 # Beyond cyclictest's maximum, in microseconds.
 idle_allowance=5 load_allowance=${LOAD_ALLOWANCE:-10}
+# Requests leave when their cycle has been computed, and one in which a move is planned takes some 30 longer here.
+planning=35
 # Further than any deviation: not limited.
 any=100000
 
 mkdir -p "$OUT/configs"
 arm=$OUT/configs/arm.toml arm_2ms=$OUT/configs/arm-2ms.toml arm_sleep=$OUT/configs/arm-sleep.toml
-half=$OUT/configs/half.toml half_2ms=$OUT/configs/half-2ms.toml
+half=$OUT/configs/half.toml half_2ms=$OUT/configs/half-2ms.toml leg=$OUT/configs/leg.toml
 cp configs/arm6-erob.toml "$arm"
 first_bus_only "$arm" > "$half"
 two_ms() { sed 's/^period = "1 ms"/period = "2 ms"/' "$1"; }
 two_ms "$arm" > "$arm_2ms"
 two_ms "$half" > "$half_2ms"
+sed 's/"can"/"base"/' configs/hollow-leg-fd.toml > "$leg"
 sed 's/^\[cycle\]/[realtime]\nspin_guard = 0\n\n[cycle]/' "$arm" > "$arm_sleep"
 
 row() { printf '%-20s %-6s %-5s %8s %11s %8s %8s %8s %10s %7s\n' "$@" | tee -a "$OUT/product.txt"; }
@@ -48,14 +52,18 @@ machine() { # idle|load CYCLES
 # feedback was worked with, by the recording.
 wire_verdict() { # PERIOD_US LOG RECORDING
     local status=0 ages
-    awk -v period="$1" -f $guest/wire.awk "$2" > "$OUT/wire.txt" || status=1
+    case $timed in
+        080) awk -v period="$1" -f $guest/wire.awk "$2" ;;
+        *) awk -v requests="001 002 003" -v replies="065 066 067" -f $guest/requests.awk "$2" ;;
+    esac > "$OUT/wire.txt" || status=1
     ages=$(python3 $guest/feedback_age.py "$3") || status=1
     echo "  feedback worked with, by its age in cycles: $ages" | cat "$OUT/wire.txt" - | tee -a "$OUT/product.txt"
     rm "$OUT/wire.txt"
     return $status
 }
 
-program=("$TAKT" run) wire=judged
+# What is timed, and what else a listener sees; whether the wire is judged.
+program=("$TAKT" run) timed=080 drive_frames="180:780 200:780" wire=judged
 measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE...
     local name=$1 load=$2 count=$3 allowance=$4 period=$5 config=$6 listen=$7 seconds found listener witness status filters buses log
     shift 7
@@ -63,9 +71,9 @@ measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE.
     # SYNC begins with the bring-up, so that the motion lasts longer than the recording.
     seconds=$((count * period / 1000000 + 1))
     buses="--bus base=$1 ${2:+--bus wrist=$2}"
-    filters=$(printf '%s,080:7FF,180:780,200:780 ' "$@")
+    filters=$(printf "%s,$timed:7FF,${drive_frames// /,} " "$@")
     chrt --fifo 1 candump -L -r 4000000 $filters > "$log.wire" & witness=$!
-    record "$listen" "$count" "$log.log" & listener=$!
+    record "$listen" "$count" "$log.log" "$timed" & listener=$!
     chrt --other 0 "${program[@]}" "$config" $buses --require-realtime --duration $seconds --record "$log.mcap" > "$log.txt" 2>&1
     status=$?
     kill $witness; wait $witness
@@ -87,12 +95,30 @@ beside_clients() { # idle|load ALLOWANCE
     measure "takt, bad clients" "$1" "$other_cycles" "$2" 1000 "$arm" vcan0 vcan0 vcan1
 }
 
+# A leg of hollow-shaft motors, each of which answers its request 500 us later; the request to the first of them is timed.
+requests_of_leg() { # idle|load ALLOWANCE
+    local timed=001 drive_frames="002:7FF 003:7FF 065:7FF 066:7FF 067:7FF"
+    measure "takt, CAN FD leg" "$1" "$other_cycles" $(($2 + planning)) 1000 "$leg" vcan2 vcan2
+}
+
 # Both ways of waiting, as takt itself sees them.
-jitter() { # idle|load
-    "$TAKT" jitter --bus vcan0 --cycles 1000 2>/dev/null > "$OUT/jitter-$1.txt" || return
-    echo "takt jitter, $1" >> "$OUT/jitter.txt"
+jitter() { # idle|load INTERFACE
+    "$TAKT" jitter --bus "$2" --cycles 1000 2>/dev/null > "$OUT/jitter-$1.txt" || return
+    echo "takt jitter, $1, ${2%%:*}" >> "$OUT/jitter.txt"
     grep -E '── |^latency|^wake-up|^SYNC release|^missed' "$OUT/jitter-$1.txt" >> "$OUT/jitter.txt"
     rm "$OUT/jitter-$1.txt"
+}
+
+# SYNC as text on a pseudo-terminal: takt's own table, and what a reader at the other end saw.
+behind_adapter() { # idle|load
+    local adapter=$OUT/../adapter log=$OUT/slcan-$1.log reader status found
+    chrt --fifo 1 python3 $guest/slcan_reader.py "$adapter" "$log" & reader=$!
+    until [ -e "$adapter" ]; do kill -0 $reader || return; sleep 0.1; done
+    jitter "$1" "slcan:$adapter"; status=$?
+    kill $reader; wait $reader
+    [ $status = 0 ] || return $status
+    read -r -a found <<< "$(periods "$log" 1000)"
+    row "takt jitter, SLCAN" pty "$1" "${found[@]}"
 }
 
 # What the real-time thread asks of the kernel in some hundred cycles of motion; traced by the kernel, which stops nobody.
@@ -119,6 +145,7 @@ chrt --fifo --pid 1 $$ >/dev/null
 shorten_page_lists
 vcan_up vcan0
 vcan_up vcan1
+vcan_up vcan2 72
 row "(microseconds)" bus load frames mean min max range deviation missed
 
 machine idle "$cycles"
@@ -128,7 +155,7 @@ try measure "takt, sleep only" idle "$(at_most_ten_thousand "$other_cycles")" $a
 try measure "takt, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
 try beside_clients idle $idle_allowance
 try system_calls
-try jitter idle
+try jitter idle vcan0
 
 load_on vcan0
 machine load "$load_cycles"
@@ -136,7 +163,18 @@ try measure "takt" load "$load_cycles" $load_allowance 1000 "$arm" vcan0 vcan0 v
 try measure "takt, sleep only" load "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" load "$other_cycles" $load_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
 try beside_clients load $load_allowance
-try jitter load
+try jitter load vcan0
+load_off
+drives_off
+
+machine idle "$other_cycles"
+drives_on 70 "$leg" vcan2
+try requests_of_leg idle $idle_allowance
+try behind_adapter idle
+load_on vcan2
+machine load "$other_cycles"
+try requests_of_leg load $load_allowance
+try behind_adapter load
 load_off
 drives_off
 

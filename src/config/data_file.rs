@@ -1,0 +1,138 @@
+//! What quirk files and descriptions of bit fields have in common: how they are read, which drive they are about and how well it is known,
+//! and the errors of the drive in words.
+
+use std::path::Path;
+
+use super::ConfigError;
+use super::read::entry::Entry;
+use super::read::section::Section;
+use super::spot::Problems;
+use crate::printable::printable_path;
+
+/// Whether anybody has tried what a file says of a drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Confirmation {
+    /// It comes from documents alone.
+    #[default]
+    DataSheetOnly,
+    /// A real drive has shown it.
+    TriedOnHardware,
+}
+
+impl Confirmation {
+    /// For people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::DataSheetOnly => "from its data sheet, not tried on hardware",
+            Self::TriedOnHardware => "tried on hardware",
+        }
+    }
+}
+
+const CONFIRMATIONS: [(&str, Confirmation); 2] = [
+    (Confirmation::DataSheetOnly.name(), Confirmation::DataSheetOnly),
+    (Confirmation::TriedOnHardware.name(), Confirmation::TriedOnHardware),
+];
+
+/// The drive that a file is about.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DescribedDrive {
+    /// The vendor, for people.
+    pub vendor: String,
+    /// The product, for people.
+    pub product: String,
+    /// Whether it was tried.
+    pub confirmation: Confirmation,
+    /// The documents that it was taken from.
+    pub sources: Vec<String>,
+}
+
+/// Reads a file by what parses its text.
+///
+/// # Errors
+/// The file cannot be read, or every problem of its text.
+pub(super) fn load<T>(
+    path: &Path,
+    parse: impl FnOnce(&str, &str) -> Result<T, ConfigError>,
+) -> Result<T, ConfigError> {
+    let name = printable_path(path);
+    match crate::text_file::read(path) {
+        Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?),
+        Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
+    }
+}
+
+/// Reads the keys of `[drive]` that every file has.
+pub(super) fn drive(section: &mut Section<'_>) -> Option<DescribedDrive> {
+    let text = |entry: &Entry<'_>| entry.text().map(str::to_owned);
+    let vendor = section.require("vendor", "the vendor: vendor = \"Acme\"");
+    let vendor = vendor.and_then(|entry| text(&entry));
+    let product = section.require("product", "the product: product = \"Servo 1\"");
+    let product = product.and_then(|entry| text(&entry));
+    let says = "whether anybody has tried it: status = \"from its data sheet, not tried on hardware\"";
+    let confirmation = section.require("status", says).and_then(|entry| entry.choice(&CONFIRMATIONS));
+    let sources = section.require("sources", "the documents that it was taken from: sources = [\"…\"]");
+    let sources = sources.and_then(|entry| each(&entry, text));
+    Some(DescribedDrive {
+        vendor: vendor?,
+        product: product?,
+        confirmation: confirmation?,
+        sources: sources?,
+    })
+}
+
+/// Reads the error codes in words. Their keys are the codes, so this table has no fixed keys. `allowed` says how `code` wants them.
+pub(super) fn errors(
+    entry: Option<Entry<'_>>,
+    problems: &Problems,
+    code: impl Fn(&str) -> Option<u16>,
+    allowed: &str,
+) -> Option<Vec<(u16, String)>> {
+    let Some(entry) = entry else { return Some(vec![]) };
+    let mut errors = vec![];
+    let mut are_right = true;
+    for (key, value) in entry.table()? {
+        let spot = Entry::new(format!("errors.{}", key.get_ref()), value, problems);
+        let code = code(key.get_ref());
+        if code.is_none() {
+            spot.report_range(format!("the key {:?}", key.get_ref()), allowed.to_owned());
+        }
+        match (code, spot.text()) {
+            (Some(code), Some(words)) => errors.push((code, words.to_owned())),
+            _ => are_right = false,
+        }
+    }
+    errors.sort();
+    are_right.then_some(errors)
+}
+
+/// An entry that may be absent: `Some(None)` then, and `None` when it is wrong.
+pub(super) fn optional<'a, T>(
+    entry: Option<Entry<'a>>,
+    read: impl FnOnce(Entry<'a>) -> Option<T>,
+) -> Option<Option<T>> {
+    match entry {
+        None => Some(None),
+        Some(entry) => read(entry).map(Some),
+    }
+}
+
+/// Every element of a list, even after one was wrong.
+pub(super) fn each<'a, T>(entry: &Entry<'a>, read: impl Fn(&Entry<'a>) -> Option<T>) -> Option<Vec<T>> {
+    let read: Vec<Option<T>> = entry.list()?.iter().map(read).collect();
+    read.into_iter().collect()
+}
+
+/// Every element of a list that must have one, even after one was wrong.
+pub(super) fn each_of_some<'a, T>(
+    entry: &Entry<'a>,
+    what: &str,
+    read: impl Fn(&Entry<'a>) -> Option<T>,
+) -> Option<Vec<T>> {
+    let found = each(entry, read)?;
+    if found.is_empty() {
+        entry.report_range("an empty list".to_owned(), format!("at least one {what}"));
+    }
+    (!found.is_empty()).then_some(found)
+}
