@@ -86,6 +86,15 @@ pub mod family {
     }
 }
 
+pub mod hollow {
+    pub mod encoder_output {
+        pub use crate::family::hollow::encoder_output::*;
+    }
+    pub mod pwm {
+        pub use crate::family::hollow::pwm::*;
+    }
+}
+
 pub mod hollow_lines {
     pub use crate::hollow_lines::*;
 }
@@ -112,9 +121,7 @@ pub mod modbus {
 }
 
 pub mod procedure {
-    pub use crate::procedure::{
-        ErobCanSession, ModbusClient, ModbusSession, Procedure, ProcedureError, ProcedureEvent,
-    };
+    pub use crate::procedure::{ModbusClient, ModbusSession, Procedure, ProcedureError, ProcedureEvent};
 }
 
 pub mod schedule {

@@ -90,7 +90,8 @@ fn only_what_runs_beside_the_real_time_thread_tells_tracing() {
 }
 
 /// How families and makers are called, in small letters.
-const NAMES: [&str; 21] = [
+const NAMES: [&str; 22] = [
+    "hollow",
     "erob",
     "zeroerr",
     "yz_aim",
@@ -116,9 +117,9 @@ const NAMES: [&str; 21] = [
 
 /// The files that may name a family, and why.
 const MAY_NAME: [(&str, &str); 7] = [
+    ("src/cli/sim.rs", "its help lists the simulated devices on serial lines"),
+    ("src/cli/sim/serial.rs", "it is the list of the simulated devices on serial lines"),
     ("src/lib.rs", "it declares the folder of a maker's own protocol"),
-    ("src/procedure/mod.rs", "it declares the session of that protocol"),
-    ("src/procedure/erob_can_session.rs", "it is the session of that protocol"),
     ("src/family/registry.rs", "it is the list of the families"),
     ("src/family/mod.rs", "it declares their folders, and their names for configurations in code"),
     ("src/internals.rs", "it shows the simulated drives to the tests"),
@@ -130,10 +131,11 @@ fn only_its_own_folder_and_the_simulation_name_a_family() {
     let mut files = rust_files("src");
     files.extend(rust_files("rt/src"));
     let is_of_family = |name: &str| {
-        let folders = ["erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402"]
+        let folders = ["erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402", "hollow"]
             .map(|family| format!("src/family/{family}/"));
         name.starts_with("src/sim/")
             || name.starts_with("src/erob_can/")
+            || name.starts_with("src/hollow_lines/")
             || folders.iter().any(|folder| name.starts_with(folder))
     };
     let (mut found, mut needless) = (vec![], vec![]);

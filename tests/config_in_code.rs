@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use takt::SessionOptions;
 use takt::config::{
-    Axis, Bus, Config, Control, DriveFamily, Feedback, Interface, Limits, Program, ProgramMove,
-    ProgramTarget, SlcanLine, StreamDelay, Travel,
+    Axis, Bus, CanLine, Config, Control, DriveFamily, Feedback, Interface, Limits, Program, ProgramMove,
+    ProgramTarget, StreamDelay, Travel,
 };
 use takt::family;
 use takt::internals::controller::assemble;
@@ -88,7 +88,7 @@ const CASES: &[Case] = &[
     ("interface", |c| bus(c).interface = Interface::SocketCan("sim".into()), &[BUS, "`bus.interface`"]),
     (
         "adapter",
-        |c| bus(c).interface = Interface::Slcan(SlcanLine { device: "ttyACM0".into(), baud_rate: 1_000_000 }),
+        |c| bus(c).interface = Interface::Slcan(CanLine { device: "ttyACM0".into(), baud_rate: 1_000_000 }),
         &[BUS, "\"ttyACM0\" cannot be the path of a serial line"],
     ),
     (

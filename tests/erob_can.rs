@@ -10,7 +10,8 @@ use takt::internals::family::erob_can::module;
 use takt::internals::family::erob_can::motion::{
     self, Direction, End, Ended, Motion, MotionFailure, Profile, Run,
 };
-use takt::internals::procedure::{ErobCanSession, Procedure, ProcedureError, ProcedureEvent};
+use takt::internals::family::erob_can::session::ErobCanSession;
+use takt::internals::procedure::{Procedure, ProcedureError, ProcedureEvent};
 use takt::internals::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Defect, DriveFault, SimulatedBus, WireBitRates};

@@ -20,7 +20,7 @@
 //!    drive units ([`Scale`]), and PDO mappings compiled to shifts and masks ([`Mapping`]).
 //! 8. `bit_fields`: the same for drives without an object dictionary, which are spoken to by frames of fixed bit fields
 //!    ([`FieldDrive`], [`FrameLayout`]). [`Exchange`] is where an axis has the one or the other.
-//! 9. [`slcan`]: CAN frames as text, for an adapter on a serial line.
+//! 9. [`slcan`]: CAN frames as text, for an adapter on a serial line; [`transparent`]: CAN FD frames as blocks of bytes, for a converter.
 //!
 //! What crosses the border of the real-time thread:
 //!
@@ -64,6 +64,7 @@ mod stop;
 mod stop_category;
 mod time;
 mod time_of_day;
+pub mod transparent;
 mod units;
 mod watch;
 mod wire;
@@ -77,8 +78,8 @@ pub use bit_fields::{
     BesideTarget, BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits,
     FieldDrive, FieldDriveParameters, FieldFrame, FieldGains, FieldMode, FieldTargets, FieldValue,
     FrameLayout, LayoutError, Life, LifeCycle, LifeState, LifeStep, LifeWish, LinearScale, MAX_FIELD_BYTES,
-    MAX_FIELDS, ModeCodes, Number, OwnFrame, OwnFrames, PositionReference, ReplyError, ReplyValue,
-    ReplyValues, RunningMode, Setting, StateCodes,
+    MAX_FIELDS, MAX_SETUP_FRAMES, ModeCodes, Number, OwnFrame, OwnFrames, PositionReference, ReplyError,
+    ReplyValue, ReplyValues, RunningMode, SetUpAgain, Setting, StateCodes,
 };
 pub use bit_set::BitSet;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};

@@ -56,6 +56,7 @@ fn hollow(motor: u8) -> FieldDriveParameters {
         beside_target: BesideTarget::Limits { velocity: LIMITS.velocity, torque: TORQUE_LIMIT },
         gains: FieldGains::default(),
         position_span: None,
+        set_up_again: None,
     }
 }
 
@@ -95,6 +96,7 @@ fn impedance(motor: u8) -> FieldDriveParameters {
         beside_target: BesideTarget::FeedForward,
         gains: FieldGains::Commanded,
         position_span: None,
+        set_up_again: None,
     }
 }
 

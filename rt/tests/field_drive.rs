@@ -6,7 +6,7 @@ use takt_rt::{
     BesideTarget, BitField, BitRange, ByteOrder, CommandValue, DriveState, FieldBits, FieldDrive,
     FieldDriveParameters, FieldFrame, FieldGains, FieldMode, FieldTargets, Frame, FrameFormat, Id, LifeCycle,
     LifeState, LifeWish, LinearScale, ModeCodes, Number, OwnFrame, OwnFrames, PositionReference, ReplyError,
-    ReplyValue, RunningMode, Setting,
+    ReplyValue, RunningMode, SetUpAgain, Setting,
 };
 
 const MOTOR: Id = Id::canopen(0, 1);
@@ -54,6 +54,7 @@ fn flexible() -> FieldDriveParameters {
         life_cycle: LifeCycle::ByFields { modes: ModeCodes { torque: 0, velocity: 1, position: 2 } },
         position_reference: PositionReference::Zero,
         position_span: None,
+        set_up_again: None,
         beside_target: BesideTarget::Limits { velocity: VELOCITY, torque: TORQUE },
         gains: FieldGains::default(),
     }
@@ -92,6 +93,7 @@ fn packed(is_extended: bool) -> FieldDriveParameters {
         }),
         position_reference: if is_extended { PositionReference::Present } else { PositionReference::Zero },
         position_span: is_extended.then_some(4096.0 * TAU),
+        set_up_again: None,
         beside_target: BesideTarget::Limits { velocity: VELOCITY, torque: TORQUE },
         gains: FieldGains::default(),
     }
@@ -372,4 +374,47 @@ fn a_motor_shows_what_its_replies_carry_and_nothing_else() {
     assert_eq!(drive.state(), LifeState::Stopping);
     let frame = drive.step(LifeWish::Stop, &to(2.0));
     assert_eq!(frame.payload()[12], 0);
+}
+
+/// The frame that switches a motor to extended mode.
+fn extended_mode() -> OwnFrame {
+    OwnFrame { id: Id::extended(1).unwrap(), payload: [0; 8] }
+}
+
+#[test]
+fn a_drive_that_replies_as_before_its_set_up_is_set_up_again_while_it_is_told_to_stop_and_never_while_it_runs()
+ {
+    let again = SetUpAgain { reply_bytes: 6, frames: [extended_mode()].into_iter().collect() };
+    let by = FieldDriveParameters { set_up_again: Some(again), ..packed(true) };
+    let short = Frame::data(MASTER, &[1, 0x80, 0, 0, 0, 0]).unwrap();
+    let long = Frame::data(MASTER, &[1, 0, 0, 0, 0, 0, 0, 0]).unwrap();
+    let (mut drive, targets) = (FieldDrive::default(), FieldTargets::default());
+    let is_set_up = |frame: &Frame| frame.id().is_extended();
+    // It has been switched on just now.
+    assert!(!is_set_up(&drive.step(&by, RUN, &targets)));
+    assert_eq!(drive.receive(&by, &short), Err(ReplyError::Length { expected: 8, received: 6 }));
+    assert!(is_set_up(&drive.step(&by, RUN, &targets)));
+    // Once for each short reply: the next frame tells it to stop as before.
+    assert!(!is_set_up(&drive.step(&by, RUN, &targets)));
+    for _ in 0..40 {
+        drive.receive(&by, &long).unwrap();
+        drive.step(&by, RUN, &targets);
+    }
+    assert_eq!(drive.state(), LifeState::Running(FieldMode::Position));
+    // It loses its power while it runs.
+    for _ in 0..5 {
+        drive.receive(&by, &short).unwrap_err();
+        assert!(!is_set_up(&drive.step(&by, RUN, &targets)));
+    }
+    let stopped: Vec<bool> = (0..3).map(|_| is_set_up(&drive.step(&by, LifeWish::Stop, &targets))).collect();
+    assert_eq!(stopped.iter().filter(|is_set_up| **is_set_up).count(), 1, "{stopped:?}");
+}
+
+#[test]
+fn a_reply_of_any_other_length_sets_nothing_up() {
+    let again = SetUpAgain { reply_bytes: 6, frames: [extended_mode()].into_iter().collect() };
+    let by = FieldDriveParameters { set_up_again: Some(again), ..packed(true) };
+    let (mut drive, targets) = (FieldDrive::default(), FieldTargets::default());
+    drive.receive(&by, &Frame::data(MASTER, &[1, 0x80]).unwrap()).unwrap_err();
+    assert!((0..5).all(|_| !drive.step(&by, LifeWish::Stop, &targets).id().is_extended()));
 }

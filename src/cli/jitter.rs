@@ -43,7 +43,9 @@ pub struct Arguments {
 }
 
 fn interface(text: &str) -> Result<Interface, String> {
-    text.parse().map_err(|error: crate::config::InterfaceError| format!("{error}: {}", error.help()))
+    let interface: Interface =
+        text.parse().map_err(|error: crate::config::InterfaceError| format!("{error}: {}", error.help()))?;
+    interface.lacks_canopen().map_or(Ok(interface), Err)
 }
 
 impl Arguments {

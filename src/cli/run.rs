@@ -34,7 +34,8 @@ use super::usage_error::UsageError;
 pub struct Arguments {
     /// The configuration (TOML)
     config: PathBuf,
-    /// Connect a bus to another interface than the configuration says: sim, can0, vcan0 …, slcan:/dev/ttyACM0
+    /// Connect a bus to another interface than the configuration says: sim, can0, vcan0 …, slcan:/dev/ttyACM0,
+    /// rs485-canfd:/dev/ttyUSB0
     #[arg(long = "bus", value_name = "NAME=INTERFACE")]
     buses: Vec<BusOverride>,
     /// Repeat the program until this many seconds are over

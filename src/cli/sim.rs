@@ -20,6 +20,7 @@ use crate::family::simulated_drives;
 use crate::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
 use crate::link::{OpenError, RealInterface, SocketCanOptions};
 use crate::sim::LiveDrives;
+use crate::sim::line_faults::LineFault;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -37,7 +38,8 @@ pub struct Arguments {
     /// The configuration (TOML)
     #[arg(required_unless_present_any = ["sheet", "serial"])]
     config: Option<PathBuf>,
-    /// Connect a bus to another interface than the configuration says: can0, vcan0 …, slcan:/dev/ttyACM0
+    /// Connect a bus to another interface than the configuration says: can0, vcan0 …, slcan:/dev/ttyACM0,
+    /// rs485-canfd:/dev/ttyUSB0
     #[arg(long = "bus", value_name = "NAME=INTERFACE")]
     buses: Vec<BusOverride>,
     /// Put every simulated bus behind an SLCAN adapter on a pseudo-terminal, and say its path
@@ -48,10 +50,14 @@ pub struct Arguments {
     adapters: Vec<AdapterLink>,
     /// Simulate what is on a serial line instead, on a pseudo-terminal: FAMILY:ADDRESS[,ADDRESS…], or a device of the hollow-shaft motors
     ///
-    /// Devices: hollow-rs485 (the RS-485 module with motors 1 to 4), hollow-console, hollow-encoder. Any master opens the line as it would
+    /// Devices: hollow-rs485 (the RS-485 module with motors 1 to 4), hollow-modbus (the same in its Modbus mode), hollow-console,
+    /// hollow-encoder, hollow-pulse. Any master opens the line as it would
     /// open /dev/ttyUSB0; --pty LINK gives it a second name.
     #[arg(long, value_name = "DRIVES", conflicts_with_all = ["config", "buses", "lss_devices", "sheet"])]
     serial: Option<OnSerialLine>,
+    /// Give the line of such a device a fault: disturbed=N (a wrong bit in each Nth byte), silent=S (nothing from S seconds after the first byte)
+    #[arg(long = "line-fault", value_name = "FAULT", requires = "serial")]
+    line_faults: Vec<LineFault>,
     /// Put a device beside the drives that has LSS and nothing else: [BUS=]IDENTITY, as in `takt lss --simulate`
     ///
     /// Without BUS it is on the first bus that has a real interface.
@@ -105,7 +111,9 @@ impl FromStr for LssOnBus {
 pub fn run(arguments: &Arguments) -> Exit {
     match &arguments.serial {
         Some(OnSerialLine::Drives(drives)) => return serial_line::host(drives, &arguments.adapters),
-        Some(OnSerialLine::Device(kind)) => return serial::run(*kind, &arguments.adapters),
+        Some(OnSerialLine::Device(kind)) => {
+            return serial::run(*kind, &arguments.line_faults, &arguments.adapters);
+        }
         None => {}
     }
     match data_sheet::open(&arguments.data_sheet) {

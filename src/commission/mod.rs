@@ -14,7 +14,7 @@ pub mod bus_session;
 pub mod layer_settings;
 
 pub(crate) use crate::family::commission::{
-    CommandValue, DriveTask, Failure, MotionProfile, MoveKind, ProcedureError, Report, RunningTask,
-    TargetDrive, Task, ValueText, command_value, dictionary,
+    CommandValue, DriveTask, Failure, GainFactors, MotionProfile, MoveKind, ProcedureError, PulseQuantity,
+    PulseWidth, Report, RunningTask, TargetDrive, Task, ValueText, command_value, dictionary,
 };
 pub(crate) use crate::procedure::{AxisReading, ProcedureEvent};

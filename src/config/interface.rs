@@ -6,14 +6,14 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::model::{Interface, SlcanLine};
+use super::model::{CanLine, Interface};
 use crate::printable::excerpt;
 
 /// The longest name of a network interface of Linux (IFNAMSIZ less the final zero).
 const LONGEST_NAME: usize = 15;
 /// The longest path of Linux (PATH_MAX less the final zero).
 const LONGEST_PATH: usize = 4_095;
-/// The baud rate that the manuals of SLCAN adapters name.
+/// The baud rate that the manuals of SLCAN adapters name, and that of a converter.
 const USUAL_BAUD_RATE: u32 = 1_000_000;
 /// What chips for serial lines can do, from the slowest to the fastest.
 const BAUD_RATES: RangeInclusive<u32> = 9_600..=12_000_000;
@@ -21,14 +21,17 @@ const BAUD_RATES: RangeInclusive<u32> = 9_600..=12_000_000;
 impl FromStr for Interface {
     type Err = InterfaceError;
 
-    /// `sim`, the name of a SocketCAN interface (`can0`, `vcan0`), or an SLCAN adapter: `slcan:/dev/ttyACM0`,
-    /// `slcan:/dev/ttyUSB0@2000000`.
+    /// `sim`, the name of a SocketCAN interface (`can0`, `vcan0`), an SLCAN adapter: `slcan:/dev/ttyACM0`,
+    /// `slcan:/dev/ttyUSB0@2000000`, or a transparent converter: `rs485-canfd:/dev/ttyUSB0`.
     fn from_str(text: &str) -> Result<Self, InterfaceError> {
         if text == "sim" {
             return Ok(Self::Simulated);
         }
         if let Some(line) = text.strip_prefix("slcan:") {
             return line.parse().map(Self::Slcan);
+        }
+        if let Some(line) = text.strip_prefix("rs485-canfd:") {
+            return line.parse().map(Self::Converter);
         }
         let is_sound = (1..=LONGEST_NAME).contains(&text.len())
             && !matches!(text, "." | "..")
@@ -41,7 +44,16 @@ impl FromStr for Interface {
     }
 }
 
-impl FromStr for SlcanLine {
+impl Interface {
+    /// Why frames of CANopen cannot pass; `None` where every frame can.
+    pub(crate) fn lacks_canopen(&self) -> Option<String> {
+        matches!(self, Self::Converter(_)).then(|| {
+            format!("{self} carries CAN FD frames of 16 bytes alone, those of drives of bit fields: name a CAN bus")
+        })
+    }
+}
+
+impl FromStr for CanLine {
     type Err = InterfaceError;
 
     /// `/dev/ttyACM0`, or with a baud rate `/dev/ttyUSB0@2000000`.
@@ -65,7 +77,7 @@ impl FromStr for SlcanLine {
     }
 }
 
-impl fmt::Display for SlcanLine {
+impl fmt::Display for CanLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.device)?;
         if self.baud_rate == USUAL_BAUD_RATE { Ok(()) } else { write!(f, "@{}", self.baud_rate) }
@@ -78,6 +90,7 @@ impl fmt::Display for Interface {
             Self::Simulated => f.write_str("sim"),
             Self::SocketCan(name) => f.write_str(name),
             Self::Slcan(line) => write!(f, "slcan:{line}"),
+            Self::Converter(line) => write!(f, "rs485-canfd:{line}"),
         }
     }
 }
@@ -123,7 +136,7 @@ impl InterfaceError {
             ),
             Self::Name { .. } => {
                 "\"sim\", a name of at most 15 letters, digits and -_. as `ip link` shows it (\"can0\", \"vcan0\"), or \
-                 \"slcan:\" and the path of an adapter on a serial line"
+                 \"slcan:\" and the path of an adapter on a serial line; \"rs485-canfd:\" and that of a converter between RS-485 and CAN FD"
                     .to_owned()
             }
         }
@@ -147,7 +160,7 @@ mod tests {
     #[test]
     fn an_adapter_is_named_by_its_device_and_where_it_matters_its_baud_rate() {
         let line =
-            |device: &str, baud_rate| Interface::Slcan(SlcanLine { device: device.to_owned(), baud_rate });
+            |device: &str, baud_rate| Interface::Slcan(CanLine { device: device.to_owned(), baud_rate });
         assert_eq!("slcan:/dev/ttyACM0".parse(), Ok(line("/dev/ttyACM0", 1_000_000)));
         assert_eq!("slcan:/dev/ttyUSB0@2000000".parse(), Ok(line("/dev/ttyUSB0", 2_000_000)));
     }

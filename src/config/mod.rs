@@ -73,6 +73,11 @@ impl Config {
         match self.buses.iter().position(|bus| bus.name == name) {
             None => Err(OverrideError::UnknownBus { name: name.to_owned(), known: known() }),
             Some(bus) => {
+                if matches!(interface, Interface::Converter(_))
+                    && let Some(reason) = rules::converter::reason(self, bus)
+                {
+                    return Err(OverrideError::NotCarried { interface, reason });
+                }
                 if let Some(bus) = self.buses.get_mut(bus) {
                     bus.interface = interface;
                 }
@@ -100,6 +105,14 @@ pub enum OverrideError {
         /// Why.
         #[from]
         reason: InterfaceError,
+    },
+    /// It does not carry the frames of an axis of the bus.
+    #[error("{interface} does not carry the frames of this bus: {reason}")]
+    NotCarried {
+        /// The interface.
+        interface: Interface,
+        /// The axis, and why.
+        reason: String,
     },
     /// Another bus is connected to it.
     #[error("the interface {interface} already belongs to the bus {bus:?}")]

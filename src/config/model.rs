@@ -180,12 +180,14 @@ pub enum Interface {
     /// A SocketCAN network interface, by name.
     SocketCan(String),
     /// An SLCAN adapter on a serial line.
-    Slcan(SlcanLine),
+    Slcan(CanLine),
+    /// A transparent converter between RS-485 and CAN FD on a serial line.
+    Converter(CanLine),
 }
 
-/// The serial line of an SLCAN adapter.
+/// The serial line of an adapter or a converter, behind which a bus is.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SlcanLine {
+pub struct CanLine {
     /// The path of the device: `/dev/ttyACM0`.
     pub device: String,
     /// Baud of the line. Default 1,000,000. An adapter without a chip for a serial line (`/dev/ttyACM…`) ignores it.

@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 use takt_rt::Frame;
-use takt_rt::linux::{SlcanPort, SocketCanPort};
+use takt_rt::linux::{SlcanPort, SocketCanPort, TransparentPort};
 use takt_rt::{BusHealth, BusPort, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 use super::buses::socket_options;
@@ -24,6 +24,8 @@ pub enum Port {
     SocketCan(Box<SocketCanPort>),
     /// An SLCAN adapter on a serial line of this machine.
     Slcan(Box<SlcanPort>),
+    /// A transparent converter between RS-485 and CAN FD on a serial line of this machine.
+    Converter(Box<TransparentPort>),
     /// Any port whose frames are copied to the logger.
     Traced(Box<TracedPort<Port>>),
     /// Any port with injected faults.
@@ -47,7 +49,7 @@ impl Port {
     pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
         match self {
             Self::Simulated(bus) => Some(bus),
-            Self::SocketCan(_) | Self::Slcan(_) => None,
+            Self::SocketCan(_) | Self::Slcan(_) | Self::Converter(_) => None,
             Self::Traced(port) => port.inner_mut().simulated_mut(),
             Self::Faulty(port) => port.inner_mut().simulated_mut(),
         }
@@ -80,6 +82,7 @@ impl From<LinkPort> for Port {
         match port {
             LinkPort::SocketCan(port) => Self::SocketCan(port),
             LinkPort::Slcan(port) => Self::Slcan(port),
+            LinkPort::Converter(port) => Self::Converter(port),
         }
     }
 }
@@ -96,6 +99,7 @@ impl BusPort for Port {
             Self::Simulated(port) => port.send(now_ns, frames),
             Self::SocketCan(port) => port.send(now_ns, frames),
             Self::Slcan(port) => port.send(now_ns, frames),
+            Self::Converter(port) => port.send(now_ns, frames),
             Self::Traced(port) => port.send(now_ns, frames),
             Self::Faulty(port) => port.send(now_ns, frames),
         }
@@ -110,6 +114,7 @@ impl BusPort for Port {
                 Self::Traced(port) => traced.push(Outgoing { port: port.as_mut(), frames, taken }),
                 Self::Simulated(port) => **taken = port.send(now_ns, frames),
                 Self::Slcan(port) => **taken = port.send(now_ns, frames),
+                Self::Converter(port) => **taken = port.send(now_ns, frames),
                 Self::Faulty(port) => **taken = port.send(now_ns, frames),
             }
         }
@@ -126,6 +131,7 @@ impl BusPort for Port {
             Self::Simulated(port) => port.receive(now_ns, batch),
             Self::SocketCan(port) => port.receive(now_ns, batch),
             Self::Slcan(port) => port.receive(now_ns, batch),
+            Self::Converter(port) => port.receive(now_ns, batch),
             Self::Traced(port) => port.receive(now_ns, batch),
             Self::Faulty(port) => port.receive(now_ns, batch),
         }
@@ -136,6 +142,7 @@ impl BusPort for Port {
             Self::Simulated(port) => port.unconfirmed(now_ns),
             Self::SocketCan(port) => port.unconfirmed(now_ns),
             Self::Slcan(port) => port.unconfirmed(now_ns),
+            Self::Converter(port) => port.unconfirmed(now_ns),
             Self::Traced(port) => port.unconfirmed(now_ns),
             Self::Faulty(port) => port.unconfirmed(now_ns),
         }
@@ -146,6 +153,7 @@ impl BusPort for Port {
             Self::Simulated(port) => port.health(),
             Self::SocketCan(port) => port.health(),
             Self::Slcan(port) => port.health(),
+            Self::Converter(port) => port.health(),
             Self::Traced(port) => port.health(),
             Self::Faulty(port) => port.health(),
         }
@@ -164,6 +172,10 @@ impl Injectable for Port {
                 port.send(now_ns, &[*frame]);
                 Delivery::ToOthers
             }
+            Self::Converter(port) => {
+                port.send(now_ns, &[*frame]);
+                Delivery::ToOthers
+            }
             Self::Traced(port) => port.send_foreign(now_ns, frame),
             Self::Faulty(port) => port.send_foreign(now_ns, frame),
         }
@@ -172,7 +184,7 @@ impl Injectable for Port {
     fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
         match self {
             Self::Simulated(port) => port.inject(node, effect, is_present),
-            Self::SocketCan(_) | Self::Slcan(_) => Err(InjectError::NotSimulated),
+            Self::SocketCan(_) | Self::Slcan(_) | Self::Converter(_) => Err(InjectError::NotSimulated),
             Self::Traced(port) => port.inject(node, effect, is_present),
             Self::Faulty(port) => port.inject(node, effect, is_present),
         }

@@ -1,5 +1,6 @@
-//! What is to be known about a bus behind an SLCAN adapter.
+//! What is to be known about a bus behind an SLCAN adapter or a converter on a serial line.
 
+use crate::config::bit_fields::FieldDevice;
 use crate::config::{Config, Interface};
 use crate::family::WarningKind;
 use crate::family::bring_up::ProcessData;
@@ -14,7 +15,14 @@ const WITHOUT_SERIAL_CHIP: &str = "ttyACM";
 /// The warnings about a bus, if it is behind an adapter.
 pub fn of_bus(config: &Config, bus: usize) -> Vec<WarningKind> {
     let Some(settings) = config.buses.get(bus) else { return vec![] };
-    let Interface::Slcan(line) = &settings.interface else { return vec![] };
+    let line = match &settings.interface {
+        Interface::Slcan(line) => line,
+        // Its load is that of its bus: the schedule has the time on the line, too.
+        Interface::Converter(_) => {
+            return vec![WarningKind::Adapter { interface: settings.interface.to_string() }];
+        }
+        Interface::Simulated | Interface::SocketCan(_) => return vec![],
+    };
     let mut kinds = vec![WarningKind::Adapter { interface: settings.interface.to_string() }];
     let characters = longest_direction(config, bus);
     let line_ns = characters * BITS_PER_CHARACTER * 1_000_000_000 / u64::from(line.baud_rate.max(1));
@@ -33,6 +41,11 @@ fn longest_direction(config: &Config, bus: usize) -> u64 {
     let (mut to_drives, mut from_drives) = (sync, 0);
     for axis in config.axes.iter().filter(|axis| axis.bus == bus) {
         let data = ProcessData::of(axis, config);
+        if let Some(device) = axis.drive.description::<FieldDevice>() {
+            let FieldDevice { description, .. } = device;
+            to_drives += LINE_CHARACTERS + 2 * description.command.bytes as u64;
+            from_drives += LINE_CHARACTERS + 2 * description.reply.bytes as u64;
+        }
         let characters = |length: usize| LINE_CHARACTERS + 2 * length as u64;
         to_drives += data.commands.iter().map(|pdo| characters(pdo.length())).sum::<u64>();
         let sent = data.feedback.iter().chain(&data.unused);
@@ -61,6 +74,14 @@ mod tests {
         for interface in ["sim", "can0"] {
             assert_eq!(warnings(interface, 1_000_000), Vec::<String>::new());
         }
+    }
+
+    #[test]
+    fn a_bus_behind_a_converter_is_not_hard_real_time_either() {
+        let mut config = Config::load(Path::new("configs/hollow-leg-fd.toml")).unwrap();
+        config.buses[0].interface = "rs485-canfd:/dev/ttyUSB0".parse().unwrap();
+        let words: Vec<String> = of_bus(&config, 0).iter().map(ToString::to_string).collect();
+        assert!(words.len() == 1 && words[0].contains("USB is not hard real time"), "{words:?}");
     }
 
     #[test]

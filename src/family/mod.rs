@@ -51,7 +51,7 @@ use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
 pub use crate::family::commission::NamedEntry;
 use crate::family::commission::dictionary::ObjectEntry;
-use crate::family::commission::{DriveTask, Failure, TargetDrive, Task};
+use crate::family::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use crate::sim::{DevicesOnLine, Drive};
 
 /// ZeroErr eRob with CANopen firmware.
@@ -66,6 +66,21 @@ pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + 'a>>;
 pub trait Family: ConfiguredFamily {
     /// A drive without a configuration; `None` where the family knows nothing of a drive without one.
     fn unconfigured(&self) -> Option<DriveFamily>;
+
+    /// The node ID of a drive that is alone on its line, where none is given.
+    fn usual_node(&self) -> Option<u8> {
+        None
+    }
+
+    /// What a pulse at the PWM input of a model is, by the table of its data sheet; `None` where the drives of the family have no such input.
+    fn pulse_width(&self, _model: &str, _asked: &PulseWidth) -> Option<Result<Report, Failure>> {
+        None
+    }
+
+    /// Whether a drive without a configuration is known by the keys that an axis has in one.
+    fn is_named_by_keys(&self) -> bool {
+        false
+    }
 
     /// The process data of an axis. A drive whose own mapping is used tells it at bring-up; until then this has as many PDOs as a
     /// written mapping, each of full length.

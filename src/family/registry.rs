@@ -6,7 +6,7 @@ use super::{Family, bit_fields, cia402, erob_can, erob_canopen, erob_modbus, hol
 use crate::config::DriveFamily;
 
 /// The families that come with takt.
-static SHIPPED: [&dyn Family; 8] = [
+static SHIPPED: [&dyn Family; 11] = [
     &erob_canopen::ErobCanopen,
     &yz_aim::YzAim,
     &cia402::Cia402,
@@ -14,6 +14,9 @@ static SHIPPED: [&dyn Family; 8] = [
     &erob_modbus::ErobModbus,
     &hollow::CAN,
     &hollow::CAN_FD,
+    &hollow::CONSOLE,
+    &hollow::ENCODER,
+    &hollow::PULSE,
     &bit_fields::FROM_FILE,
 ];
 /// Those of the program that embeds takt.

@@ -46,6 +46,8 @@ pub enum ConsoleCommand {
     SetZeroPoint,
     /// The zero of the factory counts again. Assumed.
     ClearZeroPoint,
+    /// STEP_CONFIG, what the pins for encoder pulses are used for; its value comes next. Assumed.
+    StepConfig,
 }
 
 /// A command that cannot be typed or read.
@@ -89,6 +91,7 @@ impl ConsoleCommand {
             Self::Value(value) => number(value)?,
             Self::SetZeroPoint => "setzeropoint".to_owned(),
             Self::ClearZeroPoint => "clrzeropoint".to_owned(),
+            Self::StepConfig => "step_config".to_owned(),
         };
         Ok(text + TERMINATOR)
     }
@@ -105,6 +108,7 @@ impl ConsoleCommand {
             "s" => Ok(Self::ParameterMenu),
             "setzeropoint" => Ok(Self::SetZeroPoint),
             "clrzeropoint" => Ok(Self::ClearZeroPoint),
+            "step_config" => Ok(Self::StepConfig),
             _ => {
                 let mut characters = line.chars();
                 match (characters.next().ok_or_else(unknown)?, characters.as_str()) {
@@ -355,6 +359,7 @@ mod tests {
             ConsoleCommand::Value(-0.5),
             ConsoleCommand::SetZeroPoint,
             ConsoleCommand::ClearZeroPoint,
+            ConsoleCommand::StepConfig,
         ];
         for command in commands {
             let text = command.encode().unwrap();

@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
+/// The bytes of a command and of a reply.
+pub use takt_rt::transparent::DATA_BYTES;
 use thiserror::Error;
 
-/// The bytes of a command and of a reply.
-pub const DATA_BYTES: usize = 16;
 /// Counts of one turn of the position.
 pub const COUNTS_PER_TURN: f64 = 1_048_576.0;
 /// The bits of the position.

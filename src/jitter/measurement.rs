@@ -201,6 +201,7 @@ fn config(options: &JitterOptions) -> Result<Config, ConfigError> {
         // The path of an adapter is no name.
         bus.name = match interface {
             Interface::Slcan(_) => "slcan".to_owned(),
+            Interface::Converter(_) => "converter".to_owned(),
             interface => interface.to_string(),
         };
         // SYNC is the same at any bit rate: a bus that is up is taken as it is.

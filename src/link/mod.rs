@@ -1,5 +1,6 @@
 //! The buses: what they are connected to, and who commands them.
 
+mod converter;
 pub(crate) mod interface;
 #[cfg_attr(
     not(feature = "internals"),
@@ -23,6 +24,7 @@ mod slcan;
 pub(crate) mod socketcan;
 pub(crate) mod trace;
 
+pub use converter::ConverterError;
 pub use interface::InterfaceError;
 pub(crate) use interface::{
     ControllerTiming, InterfaceSettings, InterfaceStatus, interface_status, transmit_queue_length,

@@ -1,5 +1,6 @@
 //! Opens an interface for a bus: brings it up as far as that is permitted, and opens a port on it.
 
+use super::converter::ConverterError;
 use super::interface::{InterfaceError, InterfaceSettings};
 use super::port::LinkPort;
 use super::real_interface::RealInterface;
@@ -27,6 +28,15 @@ pub enum OpenError {
         /// The reason.
         #[source]
         error: SocketCanError,
+    },
+    /// The converter on the serial line cannot be used.
+    #[error("bus `{bus}`: {error}")]
+    Converter {
+        /// The name of the bus.
+        bus: String,
+        /// The reason.
+        #[source]
+        error: ConverterError,
     },
     /// The adapter on the serial line cannot be used.
     #[error("bus `{bus}`: {error}")]

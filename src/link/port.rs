@@ -1,6 +1,6 @@
 //! The port of a real interface, of any kind.
 
-use takt_rt::linux::{SlcanPort, SocketCanPort};
+use takt_rt::linux::{SlcanPort, SocketCanPort, TransparentPort};
 use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch};
 
 #[cfg(feature = "cli")]
@@ -13,6 +13,8 @@ pub enum LinkPort {
     SocketCan(Box<SocketCanPort>),
     /// An SLCAN adapter on a serial line.
     Slcan(Box<SlcanPort>),
+    /// A transparent converter between RS-485 and CAN FD on a serial line.
+    Converter(Box<TransparentPort>),
 }
 
 #[cfg(feature = "cli")]
@@ -22,6 +24,7 @@ impl LinkPort {
         match self {
             Self::SocketCan(port) => port,
             Self::Slcan(port) => port,
+            Self::Converter(port) => port,
         }
     }
 }
@@ -31,6 +34,7 @@ impl BusPort for LinkPort {
         match self {
             Self::SocketCan(port) => port.send(now_ns, frames),
             Self::Slcan(port) => port.send(now_ns, frames),
+            Self::Converter(port) => port.send(now_ns, frames),
         }
     }
 
@@ -38,6 +42,7 @@ impl BusPort for LinkPort {
         match self {
             Self::SocketCan(port) => port.receive(now_ns, batch),
             Self::Slcan(port) => port.receive(now_ns, batch),
+            Self::Converter(port) => port.receive(now_ns, batch),
         }
     }
 
@@ -45,6 +50,7 @@ impl BusPort for LinkPort {
         match self {
             Self::SocketCan(port) => port.unconfirmed(now_ns),
             Self::Slcan(port) => port.unconfirmed(now_ns),
+            Self::Converter(port) => port.unconfirmed(now_ns),
         }
     }
 
@@ -52,6 +58,7 @@ impl BusPort for LinkPort {
         match self {
             Self::SocketCan(port) => port.health(),
             Self::Slcan(port) => port.health(),
+            Self::Converter(port) => port.health(),
         }
     }
 }

@@ -2,13 +2,14 @@
 
 use std::fmt;
 
+use super::converter::open_converter;
 use super::interface::{InterfaceSettings, interface_index, prepare_interface};
 use super::open::OpenError;
 use super::port::LinkPort;
 use super::serial_line::device_number;
 use super::slcan::open_slcan;
 use super::socketcan::{SocketCanOptions, open_socketcan};
-use crate::config::{Interface, SlcanLine};
+use crate::config::{CanLine, Interface};
 
 /// An interface of this machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,7 +17,9 @@ pub enum RealInterface {
     /// A SocketCAN network interface, by name.
     SocketCan(String),
     /// An SLCAN adapter on a serial line.
-    Slcan(SlcanLine),
+    Slcan(CanLine),
+    /// A transparent converter between RS-485 and CAN FD on a serial line.
+    Converter(CanLine),
 }
 
 impl RealInterface {
@@ -26,6 +29,7 @@ impl RealInterface {
             Interface::Simulated => None,
             Interface::SocketCan(name) => Some(Self::SocketCan(name.clone())),
             Interface::Slcan(line) => Some(Self::Slcan(line.clone())),
+            Interface::Converter(line) => Some(Self::Converter(line.clone())),
         }
     }
 
@@ -40,6 +44,10 @@ impl RealInterface {
                 Ok(number) => Ok(format!("line-{number}")),
                 Err(error) => Err(OpenError::Slcan { bus: bus.to_owned(), error: error.into() }),
             },
+            Self::Converter(line) => match device_number(&line.device) {
+                Ok(number) => Ok(format!("line-{number}")),
+                Err(error) => Err(OpenError::Converter { bus: bus.to_owned(), error: error.into() }),
+            },
         }
     }
 
@@ -50,7 +58,7 @@ impl RealInterface {
                 Ok(_) => Ok(()),
                 Err(error) => Err(OpenError::Interface { bus: bus.to_owned(), error }),
             },
-            Self::Slcan(_) => Ok(()),
+            Self::Slcan(_) | Self::Converter(_) => Ok(()),
         }
     }
 
@@ -70,6 +78,10 @@ impl RealInterface {
                 Ok(port) => Ok(LinkPort::Slcan(Box::new(port))),
                 Err(error) => Err(OpenError::Slcan { bus: bus.to_owned(), error }),
             },
+            Self::Converter(line) => match open_converter(line, settings.bit_rate) {
+                Ok(port) => Ok(LinkPort::Converter(Box::new(port))),
+                Err(error) => Err(OpenError::Converter { bus: bus.to_owned(), error }),
+            },
         }
     }
 }
@@ -79,6 +91,7 @@ impl fmt::Display for RealInterface {
         match self {
             Self::SocketCan(name) => f.write_str(name),
             Self::Slcan(line) => write!(f, "slcan:{line}"),
+            Self::Converter(line) => write!(f, "rs485-canfd:{line}"),
         }
     }
 }

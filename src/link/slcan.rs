@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::interface::InterfaceSettings;
 use super::serial_line::{SerialLine, SerialLineError, SerialSettings};
-use crate::config::SlcanLine;
+use crate::config::CanLine;
 
 /// How long an adapter has to answer a command. A CANable never answers.
 const ANSWER_TIME: Duration = Duration::from_millis(50);
@@ -80,9 +80,9 @@ fn rates(allowed: &[u32]) -> String {
 ///
 /// # Errors
 /// See [`SlcanError`]. The adapter is left closed.
-pub fn open_slcan(line: &SlcanLine, settings: &InterfaceSettings) -> Result<SlcanPort, SlcanError> {
+pub fn open_slcan(line: &CanLine, settings: &InterfaceSettings) -> Result<SlcanPort, SlcanError> {
     let InterfaceSettings { bit_rate, data_bit_rate, .. } = *settings;
-    let SlcanLine { device, baud_rate } = line;
+    let CanLine { device, baud_rate } = line;
     let commands = commands(device, bit_rate, data_bit_rate)?;
     let mut adapter = Adapter { line: open_line(device, *baud_rate)?, reader: LineReader::default() };
     adapter.close_channel()?;
@@ -187,8 +187,8 @@ mod tests {
     const CLASSIC: InterfaceSettings =
         InterfaceSettings { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };
 
-    fn line(device: &str) -> SlcanLine {
-        SlcanLine { device: device.to_owned(), baud_rate: 1_000_000 }
+    fn line(device: &str) -> CanLine {
+        CanLine { device: device.to_owned(), baud_rate: 1_000_000 }
     }
 
     fn refused(device: &str, settings: &InterfaceSettings) -> SlcanError {

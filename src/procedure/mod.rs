@@ -13,18 +13,16 @@
 //!    │
 //! client ── one protocol with one drive: frames, or bytes
 //!    ├── canopen_client, canopen_session ── SDO, NMT, EMCY, heartbeat
-//!    ├── erob_can_session ── reads, writes and commands of eRob's own protocol
 //!    └── modbus_session ── registers of a slave on a Modbus line
 //! ```
 //!
 //! A waiting procedure is given up by dropping its code: [`ProcedureSession::give_up_when`], or the whole [`Procedure`].
-//! The engine knows no family of drives, and no failure of its users: they say what a failed transfer means.
+//! A family with a protocol of its own has its session in its folder. The engine knows no family of drives, and no failure of its users: they say what a failed transfer means.
 
 mod access;
 mod canopen_client;
 mod canopen_session;
 mod client;
-mod erob_can_session;
 mod event;
 #[cfg_attr(
     not(feature = "internals"),
@@ -44,7 +42,6 @@ pub use access::Access;
 pub use canopen_client::CanopenClient;
 pub use canopen_session::{CanopenSession, POLL_NS};
 pub use client::Client;
-pub use erob_can_session::ErobCanSession;
 pub use event::{AxisReading, ProcedureEvent};
 pub use modbus_session::{ModbusClient, ModbusSession};
 pub use parallel::Parallel;

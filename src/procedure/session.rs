@@ -71,12 +71,12 @@ impl<C> ProcedureSession<C> {
     }
 
     /// The client. The borrow must end before anything is awaited.
-    pub(super) fn client(&self) -> Ref<'_, C> {
+    pub(crate) fn client(&self) -> Ref<'_, C> {
         Ref::map(self.state(), |state| &state.client)
     }
 
     /// As [`ProcedureSession::client`], to change it.
-    pub(super) fn client_mut(&self) -> RefMut<'_, C> {
+    pub(crate) fn client_mut(&self) -> RefMut<'_, C> {
         RefMut::map(self.state_mut(), |state| &mut state.client)
     }
 

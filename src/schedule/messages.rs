@@ -3,9 +3,10 @@
 use std::collections::HashSet;
 
 use serde::Serialize;
-use takt_rt::{FrameFormat, FrameKind, Id, TIME_ID, TransmissionType};
+use takt_rt::{FrameFormat, FrameKind, Id, TIME_ID, TransmissionType, transparent};
 
 use crate::canopen::function_code;
+use crate::config::Interface;
 use crate::config::bit_fields::{DescribedLifeCycle, FieldDevice, ReplyMoment};
 use crate::config::{Axis, Config, Master, Protocol, Supervision};
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
@@ -115,6 +116,8 @@ const EMERGENCY_INTERVAL_NS: u64 = 1_000_000_000;
 
 /// Frames of bit fields with a meaning of their own.
 const FIXED_BYTES: usize = 8;
+/// A start bit, eight bits, a stop bit.
+const LINE_BITS_PER_BYTE: u64 = 10;
 const SERVICE_BYTES: usize = 8;
 const EMERGENCY_BYTES: usize = 8;
 const HEARTBEAT_BYTES: usize = 1;
@@ -193,7 +196,8 @@ fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period
 
 fn axis_messages(index: usize, axis: &Axis, config: &Config, period_ns: u64) -> Vec<BusMessage> {
     if let Some(device) = axis.drive.description() {
-        return field_messages(index, axis, device, period_ns);
+        let line_ns = config.buses.get(axis.bus).map_or(0, |bus| line_ns(&bus.interface));
+        return field_messages(index, axis, device, period_ns, line_ns);
     }
     let data = ProcessData::of(axis, config);
     let of_axis =
@@ -223,8 +227,23 @@ fn axis_messages(index: usize, axis: &Axis, config: &Config, period_ns: u64) -> 
     messages
 }
 
+/// How long a request and its reply are on the line of a converter: ten bits for each byte of their blocks. Over a bus it is no time.
+fn line_ns(interface: &Interface) -> u64 {
+    let Interface::Converter(line) = interface else { return 0 };
+    let bits = 2 * transparent::FRAME_BYTES as u64 * LINE_BITS_PER_BYTE;
+    bits * 1_000_000_000 / u64::from(line.baud_rate.max(1))
+}
+
 /// The request of each cycle to a drive of bit fields, and what it sends. A frame of its own in place of a command is no longer than that.
-fn field_messages(index: usize, axis: &Axis, device: &FieldDevice, period_ns: u64) -> Vec<BusMessage> {
+///
+/// Behind a converter the reply is late by the time that both are on its line, `line_ns`.
+fn field_messages(
+    index: usize,
+    axis: &Axis,
+    device: &FieldDevice,
+    period_ns: u64,
+    line_ns: u64,
+) -> Vec<BusMessage> {
     let (command, reply) = (&device.description.command, &device.description.reply);
     let shape = |format: FrameFormat, id: Id, length| FrameShape {
         kind: device.format(format).kind(),
@@ -240,6 +259,7 @@ fn field_messages(index: usize, axis: &Axis, device: &FieldDevice, period_ns: u6
         ReplyMoment::AfterCommand { delay_ns } => (MessageKind::Reply, period_ns, delay_ns),
         ReplyMoment::Cyclic { period_ns } => (MessageKind::Feedback, period_ns, 0),
     };
+    let delay_ns = delay_ns.saturating_add(line_ns);
     let reply = BusMessage {
         shape: shape(reply.format, reply_id, reply.bytes),
         jitter_ns: delay_ns,

@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use takt_rt::Frame;
-use takt_rt::linux::{MonotonicClock, SlcanPort, SocketCanPort};
+use takt_rt::linux::{LineCodec, LinePort, MonotonicClock, SocketCanPort};
 use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::drive::Drive;
@@ -26,7 +26,7 @@ impl LivePort for SocketCanPort {
     }
 }
 
-impl LivePort for SlcanPort {
+impl<C: LineCodec + Send> LivePort for LinePort<C> {
     fn wait(&self, timeout_ns: Nanoseconds) {
         self.wait(timeout_ns);
     }

@@ -65,6 +65,7 @@ pub(crate) mod hollow_lines;
 pub mod homing_switches;
 #[cfg(feature = "cli")]
 #[cfg_attr(not(feature = "internals"), allow(unnameable_types, reason = "only the port of a link names it"))]
+pub(crate) mod line_faults;
 pub(crate) mod live;
 mod loops;
 #[cfg(feature = "cli")]
@@ -87,6 +88,7 @@ pub(crate) mod serial_device;
 #[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "`takt sim` hosts them"))]
 pub(crate) mod serial_line;
 mod servo;
+mod silent_drive;
 #[cfg(feature = "cli")]
 pub(crate) mod slcan_adapter;
 pub(crate) mod wire_length;
@@ -101,3 +103,4 @@ pub use medium::WireBitRates;
 pub use plant::Gravity;
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
 pub use serial_line::DevicesOnLine;
+pub(crate) use silent_drive::SilentDrive;

@@ -13,12 +13,32 @@ pub struct Servo {
     torque_limit: f64,
     velocity_limit: f64,
     integral: f64,
+    factors: LoopFactors,
+}
+
+/// What the gains of the inner loops are multiplied by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoopFactors {
+    /// Proportional gain of the velocity loop.
+    pub velocity_kp: f64,
+    /// Integral gain of the velocity loop.
+    pub velocity_ki: f64,
+}
+
+impl LoopFactors {
+    /// The gains as they were preset.
+    pub const PRESET: Self = Self { velocity_kp: 1.0, velocity_ki: 1.0 };
 }
 
 impl Servo {
     /// Loops at rest. The torque limit is the peak torque; the velocity limit applies in every mode.
     pub fn new(inertia: f64, torque_limit: f64, velocity_limit: f64) -> Self {
-        Self { inertia, torque_limit, velocity_limit, integral: 0.0 }
+        Self { inertia, torque_limit, velocity_limit, integral: 0.0, factors: LoopFactors::PRESET }
+    }
+
+    /// Multiplies the preset gains.
+    pub fn set_factors(&mut self, factors: LoopFactors) {
+        self.factors = factors;
     }
 
     /// Changes the torque limit.
@@ -46,12 +66,13 @@ impl Servo {
     /// Torque for a velocity set-point, with torque feed-forward.
     pub fn velocity(&mut self, demand: f64, velocity: f64, torque_forward: f64, duration_s: f64) -> f64 {
         let error = demand.clamp(-self.velocity_limit, self.velocity_limit) - velocity;
-        let gain = self.inertia * VELOCITY_RATE;
+        let preset = self.inertia * VELOCITY_RATE;
+        let gain = preset * self.factors.velocity_kp;
         let torque = torque_forward + gain * error + self.integral;
         let limited = torque.clamp(-self.torque_limit, self.torque_limit);
         // Anti-windup: at the torque limit, the integrator may only decrease.
         if torque == limited || (torque - limited) * error < 0.0 {
-            self.integral += gain * INTEGRAL_RATE * error * duration_s;
+            self.integral += preset * INTEGRAL_RATE * self.factors.velocity_ki * error * duration_s;
         }
         limited
     }

@@ -175,6 +175,18 @@ fn a_motor_whose_supply_dips_loses_extended_mode_and_stops_the_group() {
 }
 
 #[test]
+fn a_motor_whose_supply_dips_while_it_is_stopped_is_set_up_again_and_runs() {
+    let mut world = holding(&format!("{HOLLOW}extended = true\n"));
+    world.request(Request::Disable);
+    world.run_until(|world| world.phase() == Phase::Disabled);
+    world.port(0).bus.power_cycle(1).unwrap();
+    world.run_for(600);
+    world.request(Request::Enable);
+    world.run_until(|world| world.phase() == Phase::Holding);
+    assert_eq!(world.observe(0).state, DriveState::OperationEnabled);
+}
+
+#[test]
 fn a_fault_that_a_motor_shows_stops_the_group() {
     let mit = format!("{MIT}description = \"damiao-dm-mit\"\n");
     for keys in [HOLLOW_FD, &mit] {

@@ -256,6 +256,40 @@ fn extended_mode_is_selected_by_a_frame_shown_by_longer_replies_and_lost_with_th
 }
 
 #[test]
+fn the_gain_frames_change_how_a_motor_follows_and_are_lost_with_the_power() {
+    // 10 rad/s of 200, under the whole torque: how fast the joint is after 2 ms.
+    let speed = |setup: &[[u8; 8]], loses_power: bool| {
+        let mut bench = Bench::new(HOLLOW, 0.0);
+        setup.iter().for_each(|frame| drop(bench.set_up(*frame)));
+        if loses_power {
+            bench.bus.power_cycle(1).unwrap();
+            bench.run_ns(10 * MILLISECOND_NS);
+        }
+        bench.order(STOP);
+        bench.order(VELOCITY);
+        bench.ask(packed(0x8000, 0x800, 0xFFF));
+        bench.order(START);
+        bench.repeat(packed(0x8000, 0x800 + 0x66, 0xFFF), 2);
+        bench.seen().velocity
+    };
+    let factor = |index: u8, factor: f32| {
+        let [a, b, c, d] = factor.to_be_bytes();
+        [0, index, a, b, c, d, 0, 0]
+    };
+    let preset = speed(&[], false);
+    assert!(preset > 0.2, "{preset}");
+    // 1.0 leaves a gain as it is.
+    assert_eq!(speed(&[[0, 1, 0x3F, 0x80, 0, 0, 0, 0]], false), preset);
+    let soft = [factor(1, 0.01), factor(2, 0.0)];
+    assert!(speed(&soft, false) < 0.5 * preset, "{}", speed(&soft, false));
+    assert_eq!(speed(&soft, true), preset);
+    // Without a gain of the current loop there is no torque.
+    assert!(speed(&[factor(3, 0.0)], false).abs() < 1e-9);
+    // No gain can be this: it is left as it was.
+    assert_eq!(speed(&[factor(1, -1.0), factor(1, f32::NAN)], false), preset);
+}
+
+#[test]
 fn a_command_of_extended_mode_is_the_way_from_the_present_position_and_the_reply_wraps_at_2048_turns() {
     let mut bench = Bench::new(&format!("{HOLLOW}extended = true\n"), 2_047.9 * TAU);
     bench.set_up(EXTENDED);

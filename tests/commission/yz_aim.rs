@@ -71,6 +71,7 @@ fn with(drives: Vec<YzAimParameters>) -> Bench {
         counts_per_turn: 32_768.0,
         rated_torque: None,
         scale: Scale::new(scale).unwrap(),
+        axis: None,
         limits: Some(limits()),
         patience_ns: SECOND,
     };

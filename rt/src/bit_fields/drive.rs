@@ -1,7 +1,9 @@
 //! A drive that is spoken to by bit fields: in each cycle one frame to it, and one reply.
 
+use arrayvec::ArrayVec;
+
 use super::frame::{FieldFrame, ReplyError};
-use super::life_cycle::{FieldMode, Life, LifeCycle, LifeState, LifeStep, LifeWish};
+use super::life_cycle::{FieldMode, Life, LifeCycle, LifeState, LifeStep, LifeWish, OwnFrame};
 use super::values::{CommandValue, CommandValues, ReplyValue, ReplyValues};
 use crate::cia402::DriveState;
 use crate::frame::Frame;
@@ -23,6 +25,20 @@ pub struct FieldDriveParameters {
     pub gains: FieldGains,
     /// The width of the range in which the reported position wraps around: rad (m). `None` where it does not.
     pub position_span: Option<f64>,
+    /// How a drive is set up that replies otherwise until it is; `None` where nothing shows that.
+    pub set_up_again: Option<SetUpAgain>,
+}
+
+/// The most frames by which a drive is set up.
+pub const MAX_SETUP_FRAMES: usize = 8;
+
+/// The frames that set a drive up which forgets that with its power, and the length by which its replies show that it has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SetUpAgain {
+    /// The length in bytes of a reply of the drive before it is set up.
+    pub reply_bytes: usize,
+    /// The frames, in their order.
+    pub frames: ArrayVec<OwnFrame, MAX_SETUP_FRAMES>,
 }
 
 /// What the fields for velocity and torque are, where the drive follows a position, and that for torque, where it follows a velocity.
@@ -105,6 +121,8 @@ pub struct FieldDrive {
     /// `None` before the first reply.
     position: Option<ExtendedPosition>,
     ways: Ways,
+    /// The next frame that sets the drive up, where it has shown that it is not.
+    set_up: Option<u8>,
 }
 
 /// The ways (rad, m) that a drive has been commanded which counts from where it is. Each one that is commanded twice is gone twice.
@@ -153,7 +171,14 @@ impl ExtendedPosition {
 impl FieldDrive {
     /// The one frame of this cycle, which leads the drive where it is wanted. The targets count while it runs; until then its target
     /// is rest at its actual position, with the same gains.
+    ///
+    /// A drive whose replies show that it has lost its power is set up again while it is told to stop, and at no other time.
     pub fn step(&mut self, by: &FieldDriveParameters, wish: LifeWish, targets: &FieldTargets) -> Frame {
+        if self.set_up.is_some()
+            && let Some(frame) = self.next_of_set_up(by)
+        {
+            return frame;
+        }
         let (run, zero, mode, is_at_rest) = match self.life.step(wish, &by.life_cycle) {
             LifeStep::Own(frame) => return frame,
             LifeStep::Command { run, zero, mode, is_at_rest } => (run, zero, mode, is_at_rest),
@@ -188,6 +213,18 @@ impl FieldDrive {
         by.command.frame(&values)
     }
 
+    /// The next frame that sets the drive up, if it is told to stop.
+    #[inline(never)]
+    fn next_of_set_up(&mut self, by: &FieldDriveParameters) -> Option<Frame> {
+        if !matches!(self.life.state(), LifeState::Stopping | LifeState::Stopped) {
+            return None;
+        }
+        let at = self.set_up.take()?;
+        let own = by.set_up_again.as_ref()?.frames.get(usize::from(at))?;
+        self.set_up = Some(at.saturating_add(1));
+        Some(Frame::of(own.id, own.payload))
+    }
+
     /// Velocity and torque of a command: targets, what is fed forward, or limits. A drive that is not to run gets no limit to use.
     fn beside(&self, by: &FieldDriveParameters, wish: LifeWish, targets: &FieldTargets) -> (f64, f64) {
         let FieldTargets { velocity, torque, .. } = *targets;
@@ -205,7 +242,10 @@ impl FieldDrive {
     /// # Errors
     /// The frame is no reply of this drive. Nothing is changed then.
     pub fn receive(&mut self, by: &FieldDriveParameters, frame: &Frame) -> Result<(), ReplyError> {
-        by.reply.receive(frame, &mut self.reply)?;
+        if let Err(error) = by.reply.receive(frame, &mut self.reply) {
+            self.see_whether_set_up(by, error);
+            return Err(error);
+        }
         self.ways = Ways::default();
         let reported = self.reply.get(ReplyValue::Position);
         self.position = Some(match (self.position, by.position_span) {
@@ -215,6 +255,17 @@ impl FieldDrive {
         });
         self.life.receive(self.shows_torque(by));
         Ok(())
+    }
+
+    /// Notes that the drive replies as it does before it is set up.
+    #[cold]
+    fn see_whether_set_up(&mut self, by: &FieldDriveParameters, error: ReplyError) {
+        if let (Some(again), ReplyError::Length { received, .. }) = (&by.set_up_again, error)
+            && received == again.reply_bytes
+        {
+            // The frames under way are sent to their end first.
+            self.set_up.get_or_insert(0);
+        }
     }
 
     /// Whether the last reply shows that the drive has torque; `None` for a drive that does not show it.

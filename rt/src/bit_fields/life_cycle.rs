@@ -58,7 +58,7 @@ impl LifeCycle {
 
 impl ModeCodes {
     /// The mode with this code.
-    pub(super) fn mode(&self, code: f64) -> Option<FieldMode> {
+    pub fn mode(&self, code: f64) -> Option<FieldMode> {
         let Self { torque, velocity, position } = *self;
         let modes =
             [(position, FieldMode::Position), (velocity, FieldMode::Velocity), (torque, FieldMode::Torque)];

@@ -12,7 +12,8 @@ mod life_cycle;
 mod values;
 
 pub use drive::{
-    BesideTarget, FieldDrive, FieldDriveParameters, FieldGains, FieldTargets, PositionReference, RunningMode,
+    BesideTarget, FieldDrive, FieldDriveParameters, FieldGains, FieldTargets, MAX_SETUP_FRAMES,
+    PositionReference, RunningMode, SetUpAgain,
 };
 pub use frame::{FieldFrame, ReplyError, StateCodes};
 pub use layout::{

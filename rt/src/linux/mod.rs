@@ -9,6 +9,7 @@
 #![allow(unsafe_code)] // System calls need it. Every unsafe block says why it is sound.
 
 mod can;
+mod can_line;
 mod clock;
 mod kernel;
 mod latency;
@@ -16,19 +17,18 @@ mod memory;
 mod paced_clock;
 mod scheduling;
 mod send_path;
-mod slcan;
 mod spin_guard;
 mod step;
 mod thread;
 mod wire_time;
 
 pub use can::{DescriptorError, SocketCanPort};
+pub use can_line::{Arrival, LineCodec, LinePort, SlcanCodec, SlcanPort, TransparentCodec, TransparentPort};
 pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};
 pub use paced_clock::PacedClock;
 pub use scheduling::{Policy, Scheduling, set_nice};
-pub use slcan::SlcanPort;
 pub use spin_guard::SpinGuard;
 pub use step::{Outcome, STEP_COUNT, Step, StepResult};
 pub use thread::{RealtimeThread, ThreadConfig, ThreadReport};

@@ -2,9 +2,11 @@
 
 mod entries;
 mod inspection;
+mod keys;
 mod line;
 mod motion;
 mod output;
+mod pulse_width;
 mod session;
 mod target;
 mod upkeep;
@@ -22,7 +24,8 @@ use target::Place;
 /// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
 /// one), or a node on an interface (`takt drive --bus can0 --node 1 --family FAMILY …`) or on a serial line
 /// (`takt drive --bus serial:/dev/ttyUSB0 --node 1 --family FAMILY …`), of which no limits are
-/// known; a drive without a family of its own is named by its data sheet (`--eds drive.eds`). Values have a unit and
+/// known; a drive without a family of its own is named by its data sheet (`--eds drive.eds`), one of bit fields by the keys that an
+/// axis has in a configuration (`--set KEY=VALUE`, also for its limits). Values have a unit and
 /// are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the drive's own. Every motion ends at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
 #[derive(Args, Debug)]
 #[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
@@ -58,6 +61,7 @@ struct Options {
 #[derive(Subcommand, Debug)]
 enum Action {
     Entries(entries::Arguments),
+    PulseWidth(pulse_width::Arguments),
     #[command(flatten)]
     Task(TaskAction),
 }
@@ -97,6 +101,9 @@ pub fn run(arguments: &Arguments) -> Exit {
     let action = match &arguments.action {
         Action::Entries(entries) => {
             return entries::run(entries, arguments.target.drive(), arguments.options.json);
+        }
+        Action::PulseWidth(asked) => {
+            return pulse_width::run(asked, arguments.target.family(), arguments.options.json);
         }
         Action::Task(action) => action,
     };

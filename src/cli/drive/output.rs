@@ -239,7 +239,8 @@ fn seconds(at_ns: Nanoseconds) -> String {
     format!("{:11.6}", at_ns as f64 / 1e9)
 }
 
-fn render(report: &Report) -> String {
+/// A report in aligned lines.
+pub fn render(report: &Report) -> String {
     let findings = report.items();
     let width = findings.iter().map(|finding| finding.label.chars().count()).max().unwrap_or(0);
     let lines = findings.iter().map(|finding| format!("  {:<width$}  {}\n", finding.label, finding.text));

@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
 use crate::commission::{DriveTask, Failure, ProcedureError, Report, TargetDrive, Task, bus_session};
+use crate::config::Interface;
 use crate::controller::VirtualClock;
 use crate::controller::port::{Port, open_configured};
 use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
@@ -32,6 +33,9 @@ pub fn run(
     options: Options,
     output: &mut Output,
 ) -> Result<Result<Report, ProcedureError>, Exit> {
+    if let Some(failure) = not_carried(bus, &task) {
+        return Ok(Err(ProcedureError { step: "command line", failure }));
+    }
     let DriveTask { procedure, words } = match target.family().commission(target.clone(), task) {
         Ok(task) => task,
         Err(failure) => return Ok(Err(ProcedureError { step: "command line", failure })),
@@ -83,6 +87,18 @@ pub fn run(
         );
     }
     Ok(outcome)
+}
+
+/// Why a converter between the line and the bus does not carry a task.
+fn not_carried(bus: &Bus, task: &Task) -> Option<Failure> {
+    let Bus::Configured { config, bus } = bus else { return None };
+    let interface = &config.buses.get(*bus)?.interface;
+    let is_lost = matches!((interface, task), (Interface::Converter(_), Task::GainFactors(_)));
+    is_lost.then(|| Failure::Unsupported {
+        what: "the converter between RS-485 and CAN FD does not carry the frames that multiply gains"
+            .to_owned(),
+        instead: "send them over a CAN bus".to_owned(),
+    })
 }
 
 /// Whether no frame that was sent has been acknowledged.

@@ -1,8 +1,10 @@
-//! `takt drive … zero | save | restore | set-id | set-bitrate | release-brake | clear-fault | gains | gear | auto-home | interpolation`
+//! `takt drive … zero | save | restore | set-id | set-bitrate | release-brake | clear-fault | gains | mode | gear | auto-home | interpolation`
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use crate::commission::{Failure, Task};
+use takt_rt::FieldMode;
+
+use crate::commission::{Failure, GainFactors, Task};
 use crate::config::Quantity;
 
 /// Setting a drive up.
@@ -32,6 +34,11 @@ pub enum Action {
     ClearFault(Agreement),
     /// Read the gains of the loops, or change some (some drives)
     Gains(Gains),
+    /// Tell the drive what it follows, without torque (some drives; every motion tells it, too)
+    Mode {
+        /// What it follows
+        mode: Follows,
+    },
     /// Read the electronic gear of the pulse input, or change it (some drives)
     Gear {
         /// Numerator:denominator, reduced: "4:1"
@@ -62,6 +69,13 @@ pub enum Switch {
     Off,
 }
 
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum Follows {
+    Position,
+    Velocity,
+    Torque,
+}
+
 #[derive(Args, Debug)]
 pub struct Gains {
     /// Position loop, proportional (60FB:01): 60 to 30000
@@ -73,6 +87,47 @@ pub struct Gains {
     /// Velocity loop, integration time (60F9:02): 2 to 2000 ms
     #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u16).range(2..=2_000))]
     velocity_integration: Option<u16>,
+    /// Stiffness of the position loop, 0 to 255 (some drives)
+    #[arg(long, value_name = "N", requires = "damping", conflicts_with_all = OWN_GAINS)]
+    stiffness: Option<u8>,
+    /// Damping of the position loop, 0 to 255
+    #[arg(long, value_name = "N", requires = "stiffness", conflicts_with_all = OWN_GAINS)]
+    damping: Option<u8>,
+    /// Multiply the preset proportional gain of the velocity loop (some drives); until the power is off, as all factors
+    #[arg(long, value_name = "FACTOR", conflicts_with_all = OWN_GAINS)]
+    velocity_kp: Option<f64>,
+    /// Multiply the preset integral gain of the velocity loop
+    #[arg(long, value_name = "FACTOR", conflicts_with_all = OWN_GAINS)]
+    velocity_ki: Option<f64>,
+    /// Multiply the preset proportional gain of the current loop
+    #[arg(long, value_name = "FACTOR", conflicts_with_all = OWN_GAINS)]
+    current_kp: Option<f64>,
+    /// Multiply the preset integral gain of the current loop
+    #[arg(long, value_name = "FACTOR", conflicts_with_all = OWN_GAINS)]
+    current_ki: Option<f64>,
+}
+
+/// The gains that a drive has as such; another kind of drive takes factors.
+const OWN_GAINS: [&str; 3] = ["position_proportional", "velocity_proportional", "velocity_integration"];
+
+impl Gains {
+    fn task(&self) -> Task {
+        let factors = GainFactors {
+            position_loop: self.stiffness.zip(self.damping),
+            velocity_kp: self.velocity_kp,
+            velocity_ki: self.velocity_ki,
+            current_kp: self.current_kp,
+            current_ki: self.current_ki,
+        };
+        if !factors.is_empty() {
+            return Task::GainFactors(factors);
+        }
+        Task::Gains {
+            position_proportional: self.position_proportional.map(i64::from),
+            velocity_proportional: self.velocity_proportional.map(i64::from),
+            velocity_integration: self.velocity_integration.map(i64::from),
+        }
+    }
 }
 
 /// A bit rate of CAN, 10 kbit/s to 1 Mbit/s.
@@ -111,6 +166,7 @@ impl Action {
             Self::ReleaseBrake(_) => "release-brake",
             Self::ClearFault(_) => "clear-fault",
             Self::Gains(_) => "gains",
+            Self::Mode { .. } => "mode",
             Self::Gear { .. } => "gear",
             Self::AutoHome { .. } => "auto-home",
             Self::Interpolation => "interpolation",
@@ -127,11 +183,12 @@ impl Action {
             Self::SetBitRate { rate } => Task::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
             Self::ReleaseBrake(agreement) => Task::ReleaseBrake { is_confirmed: agreement.yes },
             Self::ClearFault(agreement) => Task::ClearFault { is_confirmed: agreement.yes },
-            Self::Gains(gains) => Task::Gains {
-                position_proportional: gains.position_proportional.map(i64::from),
-                velocity_proportional: gains.velocity_proportional.map(i64::from),
-                velocity_integration: gains.velocity_integration.map(i64::from),
-            },
+            Self::Gains(gains) => gains.task(),
+            Self::Mode { mode } => Task::Mode(match mode {
+                Follows::Position => FieldMode::Position,
+                Follows::Velocity => FieldMode::Velocity,
+                Follows::Torque => FieldMode::Torque,
+            }),
             Self::Gear { ratio } => Task::Gear { ratio: *ratio },
             Self::AutoHome { switch, agreement } => {
                 Task::AutoHome { is_on: matches!(switch, Switch::On), is_confirmed: agreement.yes }

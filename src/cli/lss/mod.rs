@@ -152,6 +152,9 @@ pub fn run(arguments: &Arguments) -> Exit {
     };
     let is_interrupted = || interrupted.load(Ordering::Relaxed);
     let refuse = |words: String| UsageError::from(words).print(arguments.json);
+    if let Some(reason) = arguments.bus.lacks_canopen() {
+        return refuse(reason);
+    }
     match RealInterface::of(&arguments.bus) {
         None if arguments.simulate.is_empty() => {
             refuse("a simulated bus has no devices of its own: add --simulate IDENTITY".to_owned())

@@ -6,8 +6,9 @@ use super::adapters::AdapterLink;
 use crate::cli::exit::Exit;
 use crate::cli::interruption;
 use crate::cli::usage_error::UsageError;
-use crate::hollow_lines::{console, transparent};
-use crate::sim::hollow_lines::{Bridge, Console, Encoder};
+use crate::hollow_lines::{console, registers, transparent};
+use crate::sim::hollow_lines::{Bridge, Console, Encoder, PulseModule, RegisterBridge};
+use crate::sim::line_faults::{FaultyLine, LineFault};
 use crate::sim::pseudo_terminal::PseudoTerminal;
 use crate::sim::serial_device::{LiveSerialDevice, SerialDevice};
 
@@ -21,10 +22,14 @@ const ENCODER_COUNTS: u32 = 678_257;
 pub enum SerialKind {
     /// The RS-485 module of the hollow-shaft motors in transparent mode, with motors 1 to 4 behind it
     HollowRs485,
+    /// The RS-485 module in its Modbus mode, with motors 1 to 4 behind it
+    HollowModbus,
     /// The serial console of a hollow-shaft motor
     HollowConsole,
     /// The hollow encoder
     HollowEncoder,
+    /// The pulse module
+    HollowPulse,
 }
 
 impl SerialKind {
@@ -40,6 +45,8 @@ impl SerialKind {
     fn device(self) -> Box<dyn SerialDevice> {
         match self {
             Self::HollowRs485 => Box::new(Bridge::new(&MOTORS)),
+            Self::HollowModbus => Box::new(RegisterBridge::new(&MOTORS)),
+            Self::HollowPulse => Box::new(PulseModule::default()),
             Self::HollowConsole => Box::new(Console::new()),
             Self::HollowEncoder => Box::new(Encoder::new(ENCODER_COUNTS)),
         }
@@ -56,14 +63,18 @@ impl SerialKind {
             Self::HollowConsole => {
                 format!("{} baud on a real line; each command ends with LF CR", console::BAUD_RATE)
             }
+            Self::HollowModbus => {
+                format!("{} baud on a real line; Modbus-RTU, 16 registers from 0x0000", registers::BAUD_RATE)
+            }
+            Self::HollowPulse => "settings of six bytes; nothing is answered".to_owned(),
             Self::HollowEncoder => "a request and its reply have the form of the RS-485 module".to_owned(),
         }
     }
 }
 
 /// Runs the device until Ctrl-C or SIGTERM.
-pub fn run(kind: SerialKind, wishes: &[AdapterLink]) -> Exit {
-    let mut device = match open(kind, wishes) {
+pub fn run(kind: SerialKind, faults: &[LineFault], wishes: &[AdapterLink]) -> Exit {
+    let mut device = match open(kind, faults, wishes) {
         Ok(device) => device,
         Err(error) => return error.print(false),
     };
@@ -84,7 +95,11 @@ pub fn run(kind: SerialKind, wishes: &[AdapterLink]) -> Exit {
     }
 }
 
-fn open(kind: SerialKind, wishes: &[AdapterLink]) -> Result<LiveSerialDevice, UsageError> {
+fn open(
+    kind: SerialKind,
+    faults: &[LineFault],
+    wishes: &[AdapterLink],
+) -> Result<LiveSerialDevice, UsageError> {
     let failed = |error: std::io::Error| UsageError::from(format!("opening a pseudo-terminal: {error}"));
     let mut line = PseudoTerminal::open().map_err(failed)?;
     for link in wishes.iter().filter_map(AdapterLink::link) {
@@ -92,5 +107,6 @@ fn open(kind: SerialKind, wishes: &[AdapterLink]) -> Result<LiveSerialDevice, Us
             UsageError::from(format!("naming the pseudo-terminal {}: {error}", link.display()))
         })?;
     }
-    Ok(LiveSerialDevice::new(line, kind.device()))
+    let device = FaultyLine::new(kind.device(), faults.to_vec());
+    Ok(LiveSerialDevice::new(line, Box::new(device)))
 }

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use takt_rt::{
     BesideTarget, BitField, CommandValue, FieldDriveParameters, FieldFrame, FieldGains, FieldValue,
-    LayoutError, LifeCycle, LinearScale, OwnFrames, PositionReference, ReplyValue, SenderByte,
+    LayoutError, LifeCycle, LinearScale, MAX_SETUP_FRAMES, Number, OwnFrames, PositionReference, ReplyValue,
+    SenderByte, SetUpAgain,
 };
 
 use super::{
@@ -148,6 +149,10 @@ impl FieldDevice {
             },
             gains: self.gains(&axis.control),
             position_span: self.position_span(by),
+            set_up_again: description.bytes_before_setup.map(|reply_bytes| SetUpAgain {
+                reply_bytes,
+                frames: self.setup(axis.node).into_iter().take(MAX_SETUP_FRAMES).collect(),
+            }),
         })
     }
 
@@ -203,6 +208,12 @@ impl FieldDevice {
         let LinearScale { codes_per_unit, zero_code } = self.scale(field.scale, Transmission::of(axis));
         let (_, highest) = field.code_range();
         Some((highest - zero_code) / codes_per_unit.abs())
+    }
+
+    /// What one code of a reported value is at the joint, if the reply has such a field of whole codes.
+    pub fn step(&self, value: ReplyValue, axis: &Axis) -> Option<f64> {
+        let field = self.description.reply.field(value).filter(|field| field.number != Number::Float)?;
+        Some(1.0 / self.scale(field.scale, Transmission::of(axis)).codes_per_unit.abs())
     }
 
     fn life_cycle(&self, motor: u8) -> LifeCycle {

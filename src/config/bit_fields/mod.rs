@@ -374,16 +374,35 @@ impl FieldDevice {
     /// The frames that set the drive with this motor ID up, in their order.
     pub fn setup(&self, motor: u8) -> Vec<OwnFrame> {
         let frames = self.description.setup.iter().filter_map(|setup| {
-            let mut own = self.fixed(&setup.frame, motor);
-            if let Some(SetupNumber { at, setting }) = setup.number {
-                let bytes = (self.settings.get(setting)? as f32).to_be_bytes();
-                for (to, from) in own.payload.iter_mut().skip(at).zip(bytes) {
-                    *to = from;
-                }
-            }
-            Some(own)
+            let number = setup.number.map_or(Some(0.0), |number| self.settings.get(number.setting))?;
+            Some(self.filled(setup, motor, number))
         });
         frames.collect()
+    }
+
+    /// The frame that gives the drive with this motor ID a number of its set-up, if it has such a frame.
+    pub fn setup_of(&self, motor: u8, setting: Setting, number: f64) -> Option<OwnFrame> {
+        let has_it = |setup: &&SetupFrame| setup.number.is_some_and(|number| number.setting == setting);
+        let setup = self.description.setup.iter().find(has_it)?;
+        Some(self.filled(setup, motor, number))
+    }
+
+    /// The frames of the set-up that carry no number.
+    pub fn setup_without_numbers(&self, motor: u8) -> Vec<OwnFrame> {
+        let plain = self.description.setup.iter().filter(|setup| setup.number.is_none());
+        plain.map(|setup| self.fixed(&setup.frame, motor)).collect()
+    }
+
+    /// A frame of the set-up with this number in the place of its own.
+    fn filled(&self, setup: &SetupFrame, motor: u8, number: f64) -> OwnFrame {
+        let mut own = self.fixed(&setup.frame, motor);
+        if let Some(SetupNumber { at, .. }) = setup.number {
+            let bytes = (number as f32).to_be_bytes();
+            for (to, from) in own.payload.iter_mut().skip(at).zip(bytes) {
+                *to = from;
+            }
+        }
+        own
     }
 
     /// Codes of one turn of the shaft in the reported position.

@@ -219,7 +219,10 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let axis = build();
     if let Some(axis) = &axis {
         let at = |key: &str| section.spot(key);
-        rules::bit_fields::axis(axis, machine.bus(bus).and_then(|bus| bus.bus.as_ref()), at);
+        let read_bus = machine.bus(bus).and_then(|bus| bus.bus.as_ref());
+        rules::bit_fields::axis(axis, read_bus, at);
+        let before = earlier.iter().filter_map(|other| other.axis.as_ref());
+        rules::converter::axis(axis, before, read_bus.map(|bus| &bus.interface), at);
         let others = earlier.iter().filter_map(|other| Some((other.axis.as_ref()?, Some(&other.header))));
         rules::identifiers::axis(axis, others, machine.master_node, at);
     }

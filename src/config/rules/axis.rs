@@ -3,7 +3,7 @@
 use takt_rt::{MAX_AXES, OperationMode};
 
 use super::loops::Surroundings;
-use super::{Fields, bit_fields, identifiers, limits, loops, master, name, simulation};
+use super::{Fields, bit_fields, converter, identifiers, limits, loops, master, name, simulation};
 use crate::config::drive_family::{DriveFacts, ModeChangeRule, Protocol};
 use crate::config::mode_words::{MODES, mode_word};
 use crate::config::model::{
@@ -39,6 +39,7 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
         validate_process_data(axis, &fields);
         let at = |key: &str| fields.at(key);
         bit_fields::axis(axis, config.buses.get(axis.bus), at);
+        converter::axis(axis, earlier.iter(), config.buses.get(axis.bus).map(|bus| &bus.interface), at);
         identifiers::axis(axis, earlier.iter().map(|other| (other, None)), config.master.node, at);
     }
 }

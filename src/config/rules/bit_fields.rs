@@ -3,7 +3,7 @@
 use takt_rt::{CommandValue, FrameFormat};
 
 use crate::config::bit_fields::{FieldDevice, Setting};
-use crate::config::model::{Axis, Bus, Control};
+use crate::config::model::{Axis, Bus, Control, Interface};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Short;
@@ -19,7 +19,10 @@ pub fn axis<'a>(axis: &Axis, bus: Option<&Bus>, at: impl Fn(&str) -> Spot<'a>) {
         at("node").report_range(axis.node.to_string(), allowed);
     }
     let is_classic = device.format(description.command.format) == FrameFormat::Classic;
-    if !is_classic && bus.is_some_and(|bus| bus.data_bit_rate.is_none()) {
+    // A converter sets the bus behind it up by itself.
+    let is_set_up =
+        |bus: &Bus| bus.data_bit_rate.is_some() || matches!(bus.interface, Interface::Converter(_));
+    if !is_classic && bus.is_some_and(|bus| !is_set_up(bus)) {
         at("drive").report_range(
             format!("a {} on a classic bus", description.drive.product),
             "a bus for CAN FD frames: give it a `data_bit_rate`, which may be that of the arbitration phase"

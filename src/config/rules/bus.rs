@@ -58,7 +58,10 @@ pub fn duplicate_interface(interface: &Interface) -> ProblemKind {
 /// Simulated buses are each a bus of their own.
 pub fn is_same_device(one: &Interface, other: &Interface) -> bool {
     match (one, other) {
-        (Interface::Slcan(one), Interface::Slcan(other)) => one.device == other.device,
+        (
+            Interface::Slcan(one) | Interface::Converter(one),
+            Interface::Slcan(other) | Interface::Converter(other),
+        ) => one.device == other.device,
         _ => one == other && *one != Interface::Simulated,
     }
 }
@@ -68,7 +71,7 @@ fn interface(spot: &Spot<'_>, interface: &Interface) {
     let given = match interface {
         Interface::Simulated => return,
         Interface::SocketCan(name) => name.clone(),
-        Interface::Slcan(_) => interface.to_string(),
+        Interface::Slcan(_) | Interface::Converter(_) => interface.to_string(),
     };
     match given.parse::<Interface>() {
         Ok(parsed) if parsed == *interface => {}

@@ -4,6 +4,7 @@
 pub mod axis;
 pub mod bit_fields;
 pub mod bus;
+pub mod converter;
 pub mod cycle;
 pub mod group;
 pub mod identifiers;

@@ -2,19 +2,20 @@
 //! `description = "damiao-dm-mit"`, or the path of a description file.
 //!
 //! A description says everything of a make of drive; nothing here knows one. It comes with takt (`drives/bit-fields/`), or from a file of
-//! your own. Families of one vendor (`family/hollow`) are the same with their own words.
+//! your own. Families of one vendor are the same with their own words.
 
+mod commission;
 mod device;
 
 use std::f64::consts::TAU;
 
 use takt_rt::{
-    CommandValue, FieldDriveParameters, FieldMode, Frame, FrameFormat, ModeCondition, Nanoseconds,
+    CommandValue, FieldDriveParameters, FieldMode, Frame, FrameFormat, Id, ModeCondition, Nanoseconds,
     OperationMode,
 };
 
 use super::bring_up::{AxisSession, ProcessData};
-use super::commission::{DriveTask, Failure, TargetDrive, Task};
+use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use super::{DataSheet, Family, SettingUp};
 use crate::config::bit_fields::{
     self, BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings,
@@ -25,6 +26,11 @@ use crate::config::{
 };
 use crate::sim::Drive;
 use crate::sim::bit_fields::FieldSimulation;
+
+/// Makes a task with a drive on a serial line of a bit rate.
+pub type BeginOnLine = fn(TargetDrive, Task, u32) -> Result<DriveTask<Vec<u8>>, Failure>;
+/// Calculates a pulse at the PWM input of a model.
+pub type CalculatePulse = fn(&str, &PulseWidth) -> Result<Report, Failure>;
 
 /// A family whose drives are described by a file.
 #[derive(Clone, Copy, Debug)]
@@ -37,11 +43,21 @@ pub struct BitFieldFamily {
     pub bit_rates: &'static [u32],
     /// Finds the description. What is wrong with the keys is reported to them, and the answer is `None`.
     pub describe: fn(&mut FamilyKeys<'_, '_>) -> Option<Description>,
+    /// A task with a drive on a serial line of this bit rate, where the drives may be there.
+    pub on_line: Option<BeginOnLine>,
+    /// What a pulse at the PWM input of a model is, where the drives have one.
+    pub pulse_width: Option<CalculatePulse>,
 }
 
 /// Drives whose description the configuration names.
-pub static FROM_FILE: BitFieldFamily =
-    BitFieldFamily { word: "bit-fields", name: "drive", bit_rates: &[], describe: described };
+pub static FROM_FILE: BitFieldFamily = BitFieldFamily {
+    word: "bit-fields",
+    name: "drive",
+    bit_rates: &[],
+    describe: described,
+    on_line: None,
+    pulse_width: None,
+};
 
 /// The descriptions that come with takt.
 const SHIPPED: [(&str, &str); 7] = [
@@ -96,6 +112,24 @@ fn described(keys: &mut FamilyKeys<'_, '_>) -> Option<Description> {
 /// The drive of the axis is of another family.
 pub fn device(axis: &Axis) -> &FieldDevice {
     axis.drive.description().expect("a drive of this family is made from its description")
+}
+
+/// A task with a drive, to which a frame may go in each period.
+///
+/// # Errors
+/// Such a drive cannot do it, or a value is wrong.
+pub fn task(target: TargetDrive, task: Task, period_ns: Nanoseconds) -> Result<DriveTask<Frame>, Failure> {
+    commission::begin(target, task, period_ns)
+}
+
+/// The identifier by which a drive replies.
+///
+/// # Errors
+/// Nothing is known of the drive.
+pub fn reply_id(target: &TargetDrive) -> Result<Id, Failure> {
+    let device: Option<&FieldDevice> = target.drive.description();
+    let unknown = || Failure::Unsuitable("nothing is known of the identifiers of the motor".to_owned());
+    device.map(|device| device.reply_id(target.node)).ok_or_else(unknown)
 }
 
 /// The numbers that a configuration may give are beyond all use outside of these.
@@ -213,7 +247,7 @@ impl ConfiguredFamily for BitFieldFamily {
 const SETUP_PAUSE_NS: Nanoseconds = 2_000_000;
 
 impl Family for BitFieldFamily {
-    /// Nothing is known of a drive without its scales.
+    /// Nothing is known of a drive without its scales: the keys of an axis.
     fn unconfigured(&self) -> Option<DriveFamily> {
         None
     }
@@ -277,12 +311,25 @@ impl Family for BitFieldFamily {
         Some("the IDs of such a drive are set with its vendor's tool")
     }
 
-    fn commission(&self, _: TargetDrive, _: Task) -> Result<DriveTask<Frame>, Failure> {
-        Err(Failure::Unsupported {
-            what: "the drive has no object dictionary".to_owned(),
-            instead: "move it with `takt run` or `takt play`, and set it up with its vendor's tool"
-                .to_owned(),
-        })
+    fn is_named_by_keys(&self) -> bool {
+        true
+    }
+
+    fn commission(&self, target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failure> {
+        commission::begin(target, task, commission::CAN_PERIOD_NS)
+    }
+
+    fn commission_on_line(
+        &self,
+        target: TargetDrive,
+        task: Task,
+        bit_rate: u32,
+    ) -> Option<Result<DriveTask<Vec<u8>>, Failure>> {
+        self.on_line.map(|begin| begin(target, task, bit_rate))
+    }
+
+    fn pulse_width(&self, model: &str, asked: &PulseWidth) -> Option<Result<Report, Failure>> {
+        self.pulse_width.map(|pulse_width| pulse_width(model, asked))
     }
 
     fn simulated(&self, axis: &Axis, _: &Config) -> Box<dyn Drive> {

@@ -36,7 +36,8 @@ fn unsupported(task: &Task) -> Failure {
             "the bit rate is not part of the drive profile",
             "`takt lss` sets it where the drive has layer setting services; otherwise switches or the vendor's tool",
         ),
-        Task::Gains { .. } => {
+        Task::Mode(_) => ("the mode is an object", "`write 6060 …`; each motion sets its own"),
+        Task::Gains { .. } | Task::GainFactors(_) => {
             ("the gains are the vendor's own objects", "`read` and `write` them by index:subindex")
         }
         Task::ReleaseBrake { .. } => {

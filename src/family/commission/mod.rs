@@ -40,4 +40,4 @@ pub use running::{DriveTask, ProcedureError, RunningTask};
 pub use sdo_session::SdoSession;
 pub use sdo_task::over_sdo;
 pub use target::{CommandValue, TargetDrive};
-pub use task::{MoveKind, Task, ValueText};
+pub use task::{GainFactors, MoveKind, PulseQuantity, PulseWidth, Task, ValueText};

@@ -35,6 +35,8 @@ pub struct TargetDrive {
     pub scale: Scale,
     /// The rated torque in N·m (N) by the configuration, if it says one.
     pub rated_torque: Option<f64>,
+    /// The axis of the configuration, if there is one.
+    pub axis: Option<Box<Axis>>,
     /// The limits of the axis, if known.
     pub limits: Option<Limits>,
     /// How long to wait for the first answer.
@@ -58,6 +60,7 @@ impl TargetDrive {
             counts_per_turn: axis.counts_per_turn,
             scale: axis.scale()?,
             rated_torque: axis.joint.rated_torque,
+            axis: Some(Box::new(axis.clone())),
             limits: Some(axis.limits),
             patience_ns: PATIENCE_NS.saturating_add(axis.power_up_ns),
         })
@@ -86,6 +89,7 @@ impl TargetDrive {
                 rated_torque: 1.0,
             })?,
             rated_torque: None,
+            axis: None,
             limits: None,
             patience_ns: PATIENCE_NS,
         })

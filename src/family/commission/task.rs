@@ -1,6 +1,6 @@
 //! The tasks that commissioning can carry out with a drive.
 
-use takt_rt::Nanoseconds;
+use takt_rt::{FieldMode, Nanoseconds};
 
 use super::motion_profile::MotionProfile;
 use super::target::CommandValue;
@@ -125,6 +125,10 @@ pub enum Task {
         /// Integration time of the velocity loop.
         velocity_integration: Option<i64>,
     },
+    /// Multiply preset gains of the drive's inner loops.
+    GainFactors(GainFactors),
+    /// Tell the drive what it follows, without torque.
+    Mode(FieldMode),
     /// Read or set the electronic gear of the pulse input.
     Gear {
         /// Numerator and denominator.
@@ -155,6 +159,56 @@ impl Task {
         }
         self
     }
+}
+
+/// Factors by which preset gains are multiplied; 1 leaves a gain as it is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct GainFactors {
+    /// Stiffness and damping of the position loop, where they are no factors.
+    pub position_loop: Option<(u8, u8)>,
+    /// Proportional gain of the velocity loop.
+    pub velocity_kp: Option<f64>,
+    /// Integral gain of the velocity loop.
+    pub velocity_ki: Option<f64>,
+    /// Proportional gain of the current loop.
+    pub current_kp: Option<f64>,
+    /// Integral gain of the current loop.
+    pub current_ki: Option<f64>,
+}
+
+impl GainFactors {
+    /// Whether none is given.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// What is asked of a pulse at the PWM input of a drive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PulseWidth {
+    /// The pulse for a value.
+    Of {
+        /// What it is.
+        quantity: PulseQuantity,
+        /// rad, Hz or A.
+        value: f64,
+    },
+    /// What a pulse means.
+    Means {
+        /// µs
+        width_us: f64,
+    },
+}
+
+/// What the width of a pulse may stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PulseQuantity {
+    /// rad
+    Position,
+    /// Hz, as the table of the drive has it.
+    Velocity,
+    /// A
+    Current,
 }
 
 /// A value to write, as the user wrote it.

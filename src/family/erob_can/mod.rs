@@ -16,6 +16,7 @@ pub mod follower;
 pub mod module;
 pub mod motion;
 mod reading;
+pub mod session;
 mod simulated;
 
 pub use facts::FACTS;

@@ -5,7 +5,7 @@ use takt_rt::Nanoseconds;
 use crate::erob_can::client::{RequestError, RequestFailure};
 use crate::erob_can::entries::{self, Entry};
 use crate::erob_can::module_information::ModuleNumbers;
-use crate::procedure::ErobCanSession;
+use crate::family::erob_can::session::ErobCanSession;
 
 /// The time that a module needs to save its parameters; its power must stay on.
 const SAVING_NS: Nanoseconds = 3_000_000_000;

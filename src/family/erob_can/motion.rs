@@ -12,7 +12,8 @@ use super::reading::{self, STANDING};
 use crate::erob_can::client::{RequestError, RequestFailure};
 use crate::erob_can::entries::{self, Entry};
 use crate::family::commission::{Failure, TargetDrive};
-use crate::procedure::{AxisReading, ErobCanSession};
+use crate::family::erob_can::session::ErobCanSession;
+use crate::procedure::AxisReading;
 
 /// From one reading of a moving joint to the next.
 const READING_NS: Nanoseconds = 50_000_000;

@@ -3,7 +3,8 @@
 use crate::erob_can::client::RequestError;
 use crate::erob_can::entries;
 use crate::family::commission::TargetDrive;
-use crate::procedure::{AxisReading, ErobCanSession};
+use crate::family::erob_can::session::ErobCanSession;
+use crate::procedure::AxisReading;
 
 /// A joint slower than this stands: counts/s. The readings of a joint at rest are not quite 0.
 pub const STANDING: i32 = 300;

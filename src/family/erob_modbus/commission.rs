@@ -397,7 +397,10 @@ fn unsupported(task: &Task) -> Option<Failure> {
             "its bit rates are those of a serial line",
             "`write \"bit rate\" \"115200 bit/s\"`, then `save`, then switch it off and on",
         ),
-        Task::Gains { .. } => (
+        Task::Mode(_) => {
+            ("the mode is an entry of an eRob", "`write \"operating mode\" …`; each motion sets its own")
+        }
+        Task::Gains { .. } | Task::GainFactors(_) => (
             "the gains of an eRob suit most applications, and have no ranges in the manual",
             "`read` and `write` them: \"position loop gain\", \"velocity loop gain\", \"velocity loop integral\"",
         ),

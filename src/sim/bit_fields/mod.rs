@@ -5,6 +5,7 @@
 //! watchdog: without commands it goes on with the last one. What it was told beside that, it forgets with its power.
 
 mod bits;
+mod current_loop;
 mod shaft;
 
 use std::f64::consts::TAU;
@@ -19,8 +20,11 @@ use super::drive::{Drive, DriveFault, NodeState, Observation};
 use super::mailbox::Mailbox;
 use super::motion::{Actual, Generator};
 use super::plant::{Gravity, Joint, JointParameters};
-use super::servo::Servo;
-use crate::config::bit_fields::{BesideTargetKind, DescribedLifeCycle, FieldDevice, ReplyMoment, SetupFrame};
+use super::servo::{LoopFactors, Servo};
+use crate::config::bit_fields::{
+    BesideTargetKind, DescribedLifeCycle, FieldDevice, ReplyMoment, Setting, SetupFrame,
+};
+use current_loop::CurrentLoop;
 pub use shaft::{Command, Reply};
 
 /// The period of the drive's loops.
@@ -126,6 +130,8 @@ pub struct FieldSimulation {
     commanded_ns: Nanoseconds,
     demand: Generator,
     servo: Servo,
+    factors: LoopFactors,
+    current_loop: CurrentLoop,
     joint: Joint,
     /// At the joint: N·m (N).
     torque: f64,
@@ -154,6 +160,8 @@ impl FieldSimulation {
             commanded_ns: 0,
             demand: Generator::default(),
             servo: Servo::new(joint.inertia, parameters.peak_torque, parameters.highest_velocity),
+            factors: LoopFactors::PRESET,
+            current_loop: CurrentLoop::default(),
             joint: Joint::new(*joint, parameters.initial_position),
             torque: 0.0,
             offset: 0.0,
@@ -172,6 +180,10 @@ impl FieldSimulation {
         self.power = Power::Off;
         (self.command, self.torque) = (None, 0.0);
         self.setup.iter_mut().for_each(|(_, _, is_taken)| *is_taken = false);
+        // It forgets every gain with its power.
+        self.factors = LoopFactors::PRESET;
+        self.servo.set_factors(self.factors);
+        self.current_loop = CurrentLoop::default();
         self.ready_ns = now_ns.saturating_add(self.parameters.power_up_ns);
         self.reply_ns = match self.parameters.device.description.reply_moment {
             ReplyMoment::AfterCommand { .. } => None,
@@ -265,7 +277,7 @@ impl FieldSimulation {
     /// Whether the frame sets the drive up; it is taken then.
     fn take_setup(&mut self, frame: &Frame) -> bool {
         let payload = frame.payload();
-        let mut is_taken = false;
+        let (mut is_taken, mut given) = (false, None);
         for (setup, own, was_taken) in &mut self.setup {
             let number = setup.number.map(|number| number.at..number.at + 4);
             let is_same = |(at, (one, other)): (usize, (&u8, &u8))| {
@@ -276,8 +288,30 @@ impl FieldSimulation {
                 && payload.iter().zip(&own.payload).enumerate().all(is_same);
             *was_taken |= is_it;
             is_taken |= is_it;
+            if let Some(number) = setup.number.filter(|_| is_it) {
+                let bytes = payload.get(number.at..number.at + 4).and_then(|bytes| bytes.try_into().ok());
+                given = bytes.map(|bytes| (number.setting, f64::from(f32::from_be_bytes(bytes))));
+            }
+        }
+        if let Some((setting, factor)) = given {
+            self.multiply(setting, factor);
         }
         is_taken
+    }
+
+    /// Multiplies a preset gain. A drive ignores what no gain can be.
+    fn multiply(&mut self, setting: Setting, factor: f64) {
+        if !(factor.is_finite() && factor >= 0.0) {
+            return;
+        }
+        match setting {
+            Setting::VelocityLoopKp => self.factors.velocity_kp = factor,
+            Setting::VelocityLoopKi => self.factors.velocity_ki = factor,
+            Setting::CurrentLoopKp => self.current_loop.kp = factor,
+            Setting::CurrentLoopKi => self.current_loop.ki = factor,
+            _ => {}
+        }
+        self.servo.set_factors(self.factors);
     }
 
     /// Whether every frame has come that the drive needs before it is spoken to as described.
@@ -289,8 +323,14 @@ impl FieldSimulation {
         while self.stepped_ns + STEP_NS <= now_ns {
             self.stepped_ns += STEP_NS;
             self.torque = match (self.power, self.command) {
-                (Power::On, Some(command)) => self.step(&command),
-                _ => 0.0,
+                (Power::On, Some(command)) => {
+                    let demand = self.step(&command);
+                    self.current_loop.step(demand, STEP_S)
+                }
+                _ => {
+                    self.current_loop.reset();
+                    0.0
+                }
             };
             match self.defects.is_blocked {
                 true => self.joint.halt(),

@@ -29,6 +29,8 @@ enum Menu {
     Parameters,
     /// The value of a parameter comes next.
     Value(Parameter),
+    /// The value of STEP_CONFIG comes next.
+    StepConfig,
 }
 
 /// A motor with its console.
@@ -40,6 +42,8 @@ pub struct Console {
     /// The values of the parameters, in the order of the menu.
     values: [u16; PARAMETERS.len()],
     zero: Option<ZeroPoint>,
+    /// What the pins for encoder pulses are used for, in degrees; 0 for an input.
+    step_config: u16,
 }
 
 impl Console {
@@ -47,7 +51,15 @@ impl Console {
     pub fn new() -> Self {
         let values = [500, 0, 20, 20, 1, 0, 1, 100, 0];
         let (reader, motor) = (ConsoleReader::default(), Motor::new(1));
-        Self { reader, menu: Menu::Main, motor, mode: MotorMode::Position, values, zero: None }
+        Self {
+            reader,
+            menu: Menu::Main,
+            motor,
+            mode: MotorMode::Position,
+            values,
+            zero: None,
+            step_config: 0,
+        }
     }
 
     fn obey(&mut self, now_ns: Nanoseconds, line: &str) -> String {
@@ -92,6 +104,17 @@ impl Console {
                 _ => say("not open"),
             },
             (Menu::Value(parameter), ConsoleCommand::Value(value)) => self.set(parameter, value),
+            (_, ConsoleCommand::StepConfig) => {
+                self.menu = Menu::StepConfig;
+                say("STEP_CONFIG")
+            }
+            (Menu::StepConfig, ConsoleCommand::Value(value)) => {
+                self.menu = Menu::Parameters;
+                if value.fract() == 0.0 && (0.0..=360.0).contains(&value) {
+                    self.step_config = value as u16;
+                }
+                self.parameters()
+            }
             (_, ConsoleCommand::SetZeroPoint) => self.set_zero(),
             (_, ConsoleCommand::ClearZeroPoint) => {
                 self.zero = None;
@@ -143,7 +166,10 @@ impl Console {
         let lines =
             lines.map(|(parameter, value)| say(&format!("{}) {} {value}", parameter.item, parameter.name)));
         let zero = self.zero.map_or(0.0, ZeroPoint::degrees);
-        lines.collect::<String>() + &say(&format!("SetZeroPoint {zero:.2}")) + &say("ClrZeroPoint")
+        lines.collect::<String>()
+            + &say(&format!("STEP_CONFIG {}", self.step_config))
+            + &say(&format!("SetZeroPoint {zero:.2}"))
+            + &say("ClrZeroPoint")
     }
 }
 

@@ -11,7 +11,7 @@ use crate::erob_can::frame::NODES;
 use crate::erob_can::module_information::{ModuleNumbers, UnknownField};
 use crate::family::commission::scan::report;
 use crate::family::commission::{Failure, Report, TargetDrive};
-use crate::procedure::ErobCanSession;
+use crate::family::erob_can::session::ErobCanSession;
 
 /// So long a scan waits for the answer of a node. A drive answers within 1 ms.
 const SCAN: RequestTiming = RequestTiming { timeout_ns: 10_000_000, silence_ns: 0, read_retries: 0 };

@@ -21,7 +21,8 @@ use crate::erob_can::frame::NODES;
 use crate::family::commission::{
     AnsweredProtocol, DriveTask, Failure, NamedEntry, Report, TargetDrive, Task,
 };
-use crate::procedure::{ErobCanSession, Procedure};
+use crate::family::erob_can::session::ErobCanSession;
+use crate::procedure::Procedure;
 
 /// How long to wait for an answer of CANopen firmware.
 const OTHER_PROTOCOL_NS: Nanoseconds = 50_000_000;
@@ -159,7 +160,10 @@ fn unsupported(task: &Task) -> Option<Failure> {
         Task::SetBitRate { .. } => {
             ("the bit rate of an eRob is fixed at 1 Mbit/s", "set the bus to 1 Mbit/s instead")
         }
-        Task::Gains { .. } => (
+        Task::Mode(_) => {
+            ("the mode is an entry of an eRob", "`write \"operating mode\" …`; each motion sets its own")
+        }
+        Task::Gains { .. } | Task::GainFactors(_) => (
             "the gains of an eRob suit most applications, and have no ranges in the manual",
             "`read` and `write` them: \"position loop gain\", \"velocity loop gain\", \"velocity loop integral\"",
         ),

@@ -9,7 +9,7 @@ use super::connect;
 use crate::erob_can::entries;
 use crate::family::commission::polling;
 use crate::family::commission::{CommandValue, Failure, MotionProfile, MoveKind, Report, TargetDrive};
-use crate::procedure::ErobCanSession;
+use crate::family::erob_can::session::ErobCanSession;
 
 /// Default velocity limit of torque control as a share of the axis' limit.
 const PERMITTED: f64 = 0.25;

@@ -9,7 +9,7 @@ use crate::erob_can::frame::EntryAddress;
 use crate::family::commission::command_value;
 use crate::family::commission::dictionary::integer;
 use crate::family::commission::{Failure, Report, TargetDrive, ValueText};
-use crate::procedure::ErobCanSession;
+use crate::family::erob_can::session::ErobCanSession;
 
 /// Units that a number may have beside those of the joint, each with the unit on the wire and how many of it they are.
 const UNITS: [(&str, Unit, f64); 15] = [

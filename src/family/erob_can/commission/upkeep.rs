@@ -9,7 +9,7 @@ use crate::erob_can::entries;
 use crate::erob_can::frame::NODES;
 use crate::family::commission::polling;
 use crate::family::commission::{Failure, Report, TargetDrive};
-use crate::procedure::ErobCanSession;
+use crate::family::erob_can::session::ErobCanSession;
 
 /// `save`
 pub async fn save(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, Failure> {

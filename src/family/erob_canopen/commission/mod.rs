@@ -39,7 +39,8 @@ fn unsupported(task: &Task) -> Failure {
         Task::SetBitRate { .. } => {
             ("the bit rate of an eRob is fixed at 1 Mbit/s", "set the bus to 1 Mbit/s instead")
         }
-        Task::Gains { .. } => (
+        Task::Mode(_) => ("the mode is an object", "`write 6060 …`; each motion sets its own"),
+        Task::Gains { .. } | Task::GainFactors(_) => (
             "the gains of an eRob are set with the vendor's tool and suit most applications",
             "they can be read and written as the objects 2380, 2381 and 2382",
         ),

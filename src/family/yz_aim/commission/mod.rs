@@ -55,6 +55,15 @@ pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Re
         Task::Gains { position_proportional, velocity_proportional, velocity_integration } => {
             settings::gains(c, s, position_proportional, velocity_proportional, velocity_integration).await
         }
+        Task::GainFactors(_) => Err(Failure::Unsupported {
+            what: "a YZ-AIM takes its gains, and no factors for them".to_owned(),
+            instead: "give them by --position-proportional, --velocity-proportional, --velocity-integration"
+                .to_owned(),
+        }),
+        Task::Mode(_) => Err(Failure::Unsupported {
+            what: "the mode of a YZ-AIM is an object".to_owned(),
+            instead: "`write 6060 …`; each motion sets its own".to_owned(),
+        }),
         Task::Gear { ratio } => settings::gear(c, s, ratio).await,
         Task::AutoHome { is_on, is_confirmed } => settings::auto_home(c, s, is_on, is_confirmed).await,
         Task::Interpolation => settings::interpolation(c, s).await,

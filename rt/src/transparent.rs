@@ -1,14 +1,16 @@
-//! The RS-485 module in transparent mode: frames of 21 bytes at 1 Mbaud (section 7.1 of the manual).
+//! CAN FD frames of 16 bytes on an RS-485 line, as a transparent converter between the two has them: 21 bytes at 1 Mbaud.
 //!
-//! A frame is an identifier, 16 bytes of data, and the CRC-32 of both, least significant byte first. It has no beginning that
-//! could be recognised: the CRC alone says where a frame is.
+//! A frame is an identifier of one byte, 16 bytes of data, and the CRC-32 of both (IEEE 802.3), least significant byte first. It has no
+//! beginning that could be recognised: the CRC alone says where a frame is. This module has no input or output.
 
 use arrayvec::ArrayVec;
 
-use super::motor_data::DATA_BYTES;
+use crate::frame::{Frame, FrameKind, Id};
 
 /// The baud rate of the line, which cannot be changed.
 pub const BAUD_RATE: u32 = 1_000_000;
+/// The data of a frame.
+pub const DATA_BYTES: usize = 16;
 /// The bytes of a frame.
 pub const FRAME_BYTES: usize = 1 + DATA_BYTES + CRC_BYTES;
 const CRC_BYTES: usize = 4;
@@ -25,18 +27,36 @@ pub struct TransparentFrame {
 impl TransparentFrame {
     /// The bytes of the frame.
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
+        let mut content = [0; 1 + DATA_BYTES];
+        for (to, from) in content.iter_mut().zip([self.id].iter().chain(&self.data)) {
+            *to = *from;
+        }
+        let crc = crc32fast::hash(&content).to_le_bytes();
         let mut bytes = [0; FRAME_BYTES];
-        let (content, end) = bytes.split_at_mut(1 + DATA_BYTES);
-        let (id, data) = content.split_at_mut(1);
-        id.copy_from_slice(&[self.id]);
-        data.copy_from_slice(&self.data);
-        end.copy_from_slice(&crc32fast::hash(content).to_le_bytes());
+        for (to, from) in bytes.iter_mut().zip(content.iter().chain(&crc)) {
+            *to = *from;
+        }
         bytes
+    }
+
+    /// The frame as the converter has it on the line; `None` for a frame that it does not carry: another length, another kind, or an
+    /// identifier above 255.
+    pub fn of(frame: &Frame) -> Option<Self> {
+        let id =
+            u8::try_from(frame.id().value()).ok().filter(|_| frame.is_fd() && !frame.id().is_extended())?;
+        Some(Self { id, data: frame.payload().try_into().ok()? })
+    }
+
+    /// The frame on the bus.
+    pub fn frame(&self) -> Frame {
+        // Eight bits are always those of an 11-bit identifier.
+        let id = Id::base(self.id.into()).unwrap_or(Id::canopen(0, 0));
+        Frame::filled(id, FrameKind::Fd, &self.data)
     }
 
     /// Reads the bytes of a frame; `None` if their CRC is wrong.
     pub fn decode(bytes: &[u8; FRAME_BYTES]) -> Option<Self> {
-        let (content, end) = bytes.split_at(1 + DATA_BYTES);
+        let (content, end) = bytes.split_at_checked(1 + DATA_BYTES)?;
         let (id, data) = content.split_first()?;
         let is_sound = crc32fast::hash(content).to_le_bytes() == end;
         is_sound.then_some(Self { id: *id, data: data.try_into().ok()? })
@@ -86,8 +106,10 @@ impl FrameReader {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
     use proptest::prelude::*;
+    use std::vec::Vec;
 
     fn any_frame() -> impl Strategy<Value = TransparentFrame> {
         (any::<u8>(), any::<[u8; DATA_BYTES]>()).prop_map(|(id, data)| TransparentFrame { id, data })
@@ -125,6 +147,21 @@ mod tests {
         assert_eq!(read(&mut reader, &frame.encode()[1..]), []);
         assert_eq!(read(&mut reader, &[frame.encode(), frame.encode()].concat()), [frame, frame]);
         assert_eq!(reader.discarded(), 20);
+    }
+
+    #[test]
+    fn only_frames_of_16_bytes_with_a_short_identifier_are_carried() {
+        let id = |id| Id::base(id).unwrap();
+        let long = Frame::fd(id(1), &[7; DATA_BYTES], false).unwrap();
+        let carried = TransparentFrame::of(&long).unwrap();
+        assert_eq!((carried.id, carried.frame()), (1, long));
+        let others = [
+            Frame::fd(id(0x100), &[7; DATA_BYTES], false).unwrap(),
+            Frame::fd(Id::extended(1).unwrap(), &[7; DATA_BYTES], false).unwrap(),
+            Frame::fd(id(1), &[7; 12], false).unwrap(),
+            Frame::data(id(1), &[7; 8]).unwrap(),
+        ];
+        assert!(others.iter().all(|other| TransparentFrame::of(other).is_none()));
     }
 
     #[test]

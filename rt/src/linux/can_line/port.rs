@@ -1,26 +1,33 @@
-//! The descriptor of an adapter.
+//! The descriptor of an adapter or a converter.
 
 use super::super::can::DescriptorError;
 use super::super::clock::monotonic_ns;
 use super::byte_line::Descriptor;
 use super::channel::Channel;
+use super::codec::{LineCodec, SlcanCodec, TransparentCodec};
 use crate::frame::Frame;
 use crate::port::{BusHealth, BusPort, ReceiveBatch};
 use crate::time::Nanoseconds;
 
-/// An SLCAN adapter as a bus port.
+/// An SLCAN adapter as a bus port. The caller opens the channel of the adapter; dropping the port closes it.
+pub type SlcanPort = LinePort<SlcanCodec>;
+
+/// A transparent converter between RS-485 and CAN FD as a bus port. It carries frames of 16 bytes with an identifier below 256, and no
+/// others. Its line has one direction at a time: a request and its reply must not meet the next request.
+pub type TransparentPort = LinePort<TransparentCodec>;
+
+/// A CAN bus behind a serial line as a bus port.
 ///
-/// The caller opens and configures the serial line, and opens the channel of the adapter. The line must be raw, and a reading
-/// of it must wait for at least one byte (`VMIN` 1): then an adapter that was unplugged differs from a silent one. Dropping the
-/// port closes the channel.
+/// The caller opens and configures the serial line. The line must be raw, and a reading
+/// of it must wait for at least one byte (`VMIN` 1): then an adapter that was unplugged differs from a silent one.
 ///
 /// # What is weaker than with a CAN interface of Linux
 /// - No frame is confirmed by the bus. A frame counts as sent when its line has left this machine.
 /// - A frame has the time at which it was read, not the time of its arrival.
 /// - An adapter does not report the state of its controller. The bus is [`Down`](crate::port::BusState::Down) when the adapter
 ///   is gone, and otherwise counts as error active.
-pub struct SlcanPort {
-    channel: Channel<Descriptor>,
+pub struct LinePort<C: LineCodec> {
+    channel: Channel<Descriptor, C>,
 }
 
 impl SlcanPort {
@@ -34,9 +41,23 @@ impl SlcanPort {
     /// [`DescriptorError`] where the descriptor is not an open one, or the process has no more descriptors.
     pub fn new(descriptor: i32, bit_rate: u32, data_bit_rate: Option<u32>) -> Result<Self, DescriptorError> {
         let line = Descriptor::duplicate(descriptor)?;
-        Ok(Self { channel: Channel::new(line, bit_rate, data_bit_rate) })
+        let codec = SlcanCodec::new(data_bit_rate.is_some());
+        Ok(Self { channel: Channel::new(line, codec, bit_rate, data_bit_rate) })
     }
+}
 
+impl TransparentPort {
+    /// Makes a port on the serial line `descriptor`, as [`SlcanPort::new`] does. The bit rate is that of the bus behind the converter.
+    ///
+    /// # Errors
+    /// As [`SlcanPort::new`].
+    pub fn transparent(descriptor: i32, bit_rate: u32) -> Result<Self, DescriptorError> {
+        let line = Descriptor::duplicate(descriptor)?;
+        Ok(Self { channel: Channel::new(line, TransparentCodec::default(), bit_rate, None) })
+    }
+}
+
+impl<C: LineCodec> LinePort<C> {
     /// Waits until something has arrived, but not longer than `timeout_ns`.
     ///
     /// This is for programs that react to frames, such as a simulated drive. The cycle waits for the clock instead.
@@ -47,7 +68,7 @@ impl SlcanPort {
     }
 }
 
-impl BusPort for SlcanPort {
+impl<C: LineCodec> BusPort for LinePort<C> {
     fn send(&mut self, _now_ns: Nanoseconds, frames: &[Frame]) -> usize {
         self.channel.send(frames)
     }
@@ -65,15 +86,15 @@ impl BusPort for SlcanPort {
     }
 }
 
-impl Drop for SlcanPort {
+impl<C: LineCodec> Drop for LinePort<C> {
     fn drop(&mut self) {
         self.channel.close();
     }
 }
 
-impl core::fmt::Debug for SlcanPort {
+impl<C: LineCodec> core::fmt::Debug for LinePort<C> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.debug_struct("SlcanPort").field("health", &self.channel.health()).finish_non_exhaustive()
+        f.debug_struct("LinePort").field("health", &self.channel.health()).finish_non_exhaustive()
     }
 }
 

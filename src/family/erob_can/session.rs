@@ -2,11 +2,10 @@
 
 use takt_rt::{Frame, Id, Nanoseconds};
 
-use super::client::Client;
-use super::session::ProcedureSession;
 use crate::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure, RequestTiming};
 use crate::erob_can::entries::Entry;
 use crate::erob_can::frame::{EntryAddress, Reply, Request};
+use crate::procedure::{Client, ProcedureSession};
 
 impl Client for RequestClient {
     type Message = Frame;

@@ -1,12 +1,12 @@
-//! Frames to lines and back.
+//! Frames to the bytes of a line and back.
 
 use arrayvec::ArrayVec;
 
 use super::accounting::LineAccounting;
 use super::byte_line::ByteLine;
+use super::codec::{Arrival, FrameBytes, LineCodec};
 use crate::frame::Frame;
 use crate::port::{BusHealth, ReceiveBatch, Received};
-use crate::slcan::{AdapterLine, Command, LINE_BYTES, LineReader, encode_frame};
 use crate::time::Nanoseconds;
 
 /// Bytes that are handed to the serial line in one call.
@@ -20,29 +20,27 @@ const READ_BYTES: usize = 1_024;
 const READS_MAX: usize = 8;
 
 /// The open channel of an adapter.
-pub(super) struct Channel<L: ByteLine> {
+pub(super) struct Channel<L: ByteLine, C: LineCodec> {
     line: L,
-    reader: LineReader,
+    codec: C,
     /// Bytes that were read and not yet looked at, because the caller's batch was full.
     input: ArrayVec<u8, READ_BYTES>,
     /// How many bytes of `input` are done.
     done: usize,
     /// The end of a line that the serial line took only in part. It must go before anything else.
-    rest: ArrayVec<u8, LINE_BYTES>,
+    rest: FrameBytes,
     accounting: LineAccounting,
-    takes_fd: bool,
 }
 
-impl<L: ByteLine> Channel<L> {
-    pub(super) fn new(line: L, bit_rate: u32, data_bit_rate: Option<u32>) -> Self {
+impl<L: ByteLine, C: LineCodec> Channel<L, C> {
+    pub(super) fn new(line: L, codec: C, bit_rate: u32, data_bit_rate: Option<u32>) -> Self {
         Self {
             line,
-            reader: LineReader::default(),
+            codec,
             input: ArrayVec::new(),
             done: 0,
             rest: ArrayVec::new(),
             accounting: LineAccounting::new(bit_rate, data_bit_rate),
-            takes_fd: data_bit_rate.is_some(),
         }
     }
 
@@ -57,8 +55,8 @@ impl<L: ByteLine> Channel<L> {
 
     /// Hands frames to the serial line, the first one first, and returns how many it took.
     pub(super) fn send(&mut self, frames: &[Frame]) -> usize {
-        let is_refused = |frame: &Frame| frame.is_fd() && !self.takes_fd;
-        let permitted = frames.split(is_refused).next().unwrap_or_default();
+        let permitted = frames.iter().take_while(|frame| self.codec.carries(frame)).count();
+        let permitted = frames.get(..permitted).unwrap_or_default();
         let mut taken = 0;
         while let Some(rest) = permitted.get(taken..).filter(|rest| !rest.is_empty()) {
             let (count, is_all) = self.send_block(rest);
@@ -80,7 +78,7 @@ impl<L: ByteLine> Channel<L> {
         let mut block = ArrayVec::<u8, BLOCK_BYTES>::new();
         let mut lines = ArrayVec::<(&Frame, usize), BLOCK_LINES>::new();
         for frame in frames.iter().take(BLOCK_LINES) {
-            let text = encode_frame(frame);
+            let text = self.codec.encode(frame);
             if block.try_extend_from_slice(&text).is_err() {
                 break;
             }
@@ -163,15 +161,14 @@ impl<L: ByteLine> Channel<L> {
         while !batch.is_full() {
             let Some(byte) = self.input.get(self.done) else { return };
             self.done += 1;
-            let Some(line) = self.reader.push(*byte) else { continue };
-            match AdapterLine::decode(line) {
-                Ok(AdapterLine::Frame(frame)) => {
+            match self.codec.push(*byte) {
+                Some(Arrival::Frame(frame)) => {
                     self.accounting.received(&frame);
                     // There is room: it was asked for above.
                     let _ = batch.try_push(Received { frame, at_ns });
                 }
-                Ok(AdapterLine::Accepted | AdapterLine::Information) => {}
-                Ok(AdapterLine::Refused) | Err(_) => self.accounting.disturbed(),
+                Some(Arrival::Disturbed) => self.accounting.disturbed(),
+                None => {}
             }
         }
     }
@@ -191,8 +188,9 @@ impl<L: ByteLine> Channel<L> {
 
     /// Asks the adapter to leave the bus. One attempt: a line that is full or gone is left as it is.
     pub(super) fn close(&mut self) {
-        if self.send_rest() {
-            let _ = self.line.write(&Command::Close.text());
+        let farewell = self.codec.farewell();
+        if self.send_rest() && !farewell.is_empty() {
+            let _ = self.line.write(&farewell);
         }
     }
 }
@@ -200,9 +198,12 @@ impl<L: ByteLine> Channel<L> {
 #[cfg(test)]
 mod tests {
     extern crate std;
+    use super::super::codec::{SlcanCodec, TransparentCodec};
     use super::*;
     use crate::frame::Id;
     use crate::port::BusState;
+    use crate::slcan::encode_frame;
+    use crate::transparent::TransparentFrame;
     use std::vec::Vec;
 
     /// A serial line that takes `room` bytes, and brings `input` in pieces of at most `piece` bytes.
@@ -255,8 +256,12 @@ mod tests {
         }
     }
 
-    fn channel(line: Fake) -> Channel<Fake> {
-        Channel::new(line, 1_000_000, None)
+    fn channel(line: Fake) -> Channel<Fake, SlcanCodec> {
+        Channel::new(line, SlcanCodec::new(false), 1_000_000, None)
+    }
+
+    fn converter(line: Fake) -> Channel<Fake, TransparentCodec> {
+        Channel::new(line, TransparentCodec::default(), 1_000_000, None)
     }
 
     fn frame(number: u32) -> Frame {
@@ -267,7 +272,7 @@ mod tests {
         frames.iter().flat_map(encode_frame).collect()
     }
 
-    fn received(channel: &mut Channel<Fake>) -> Vec<Frame> {
+    fn received<C: LineCodec>(channel: &mut Channel<Fake, C>) -> Vec<Frame> {
         let mut batch = ReceiveBatch::new();
         channel.receive(5, &mut batch);
         batch.iter().map(|received| received.frame).collect()
@@ -290,7 +295,7 @@ mod tests {
 
     #[test]
     fn the_rest_of_a_line_leaves_when_the_bus_is_read_or_asked_too() {
-        let acts: [fn(&mut Channel<Fake>); 2] =
+        let acts: [fn(&mut Channel<Fake, SlcanCodec>); 2] =
             [|channel| assert_eq!(received(channel), []), |channel| assert_eq!(channel.unconfirmed(), 0)];
         for act in acts {
             let mut channel = channel(Fake { room: 3, ..Fake::default() });
@@ -317,7 +322,7 @@ mod tests {
         assert_eq!(classic.send(&[frame(1), long, frame(2)]), 1);
         assert_eq!((classic.line.written.clone(), classic.health().errors), (text(&[frame(1)]), 2));
         let line = Fake { room: 100_000, ..Fake::default() };
-        let mut fd = Channel::new(line, 1_000_000, Some(5_000_000));
+        let mut fd = Channel::new(line, SlcanCodec::new(true), 1_000_000, Some(5_000_000));
         assert_eq!(fd.send(&[long; 64]), 64);
         assert_eq!(fd.line.written, text(&[long; 64]));
     }
@@ -373,6 +378,29 @@ mod tests {
         assert_eq!((received(&mut reading), reading.health().state), (Vec::new(), BusState::Down));
         let mut sending = channel(Fake { is_hung_up: true, ..Fake::default() });
         assert_eq!((sending.send(&[frame(1)]), sending.health().state), (0, BusState::Down));
+    }
+
+    #[test]
+    fn a_transparent_converter_takes_blocks_and_a_disturbed_one_is_an_error_and_costs_no_other() {
+        let long = |number| Frame::fd(Id::base(number).unwrap(), &[number as u8; 16], false).unwrap();
+        let blocks = |frames: &[Frame]| -> Vec<u8> {
+            frames.iter().flat_map(|frame| TransparentFrame::of(frame).unwrap().encode()).collect()
+        };
+        let mut sending = converter(Fake { room: 1_000, ..Fake::default() });
+        assert_eq!(sending.send(&[long(1), long(2), frame(3)]), 2);
+        assert_eq!(sending.line.written, blocks(&[long(1), long(2)]));
+        assert_eq!(sending.health().errors, 1);
+        sending.close();
+        assert_eq!(sending.line.written.len(), 42);
+        let mut disturbed = blocks(&[long(4)]);
+        disturbed[7] ^= 0x10;
+        let input = [blocks(&[long(3)]), disturbed, blocks(&[long(5)])].concat();
+        let mut receiving = converter(Fake { input, piece: 5, ..Fake::default() });
+        let mut all = Vec::new();
+        for _ in 0..40 {
+            all.extend(received(&mut receiving));
+        }
+        assert_eq!((all, receiving.health().errors), (Vec::from([long(3), long(5)]), 1));
     }
 
     #[test]
