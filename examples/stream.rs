@@ -10,7 +10,7 @@ use std::path::Path;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use takt::{Config, Controller, SessionOptions, StreamHandle};
+use takt::{Config, Controller, SessionOptions};
 
 fn main() -> takt::Result {
     let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
@@ -36,7 +36,7 @@ pub fn run(config: Config) -> takt::Result {
     let (from_s, interval) = (begun.elapsed().as_secs_f64(), Duration::from_millis(20));
     let at = |number: i32| circle(&centre, from_s + f64::from(number) * interval.as_secs_f64());
     let chunk: Vec<Vec<f64>> = (0..25).map(at).collect();
-    stream.push_chunk(StreamHandle::now_ns(), interval, &chunk)?;
+    stream.push_chunk(stream.now_ns(), interval, &chunk)?;
     thread::sleep(Duration::from_secs(1));
 
     // The points have run out, so the arm has come to rest. It would go on with the next ones.

@@ -25,7 +25,7 @@
 //! channels, and nothing else.
 //!
 //! # What is here
-//! The root has what most programs need: [`Config`], [`Controller`] and its [`Handle`]s, [`VirtualRun`], [`Trajectory`], the
+//! The root has what most programs need: [`Config`], [`Controller`] and its [`Handle`]s, [`VirtualController`], [`VirtualRun`], [`Trajectory`], the
 //! [`Snapshot`] and the [`Event`]s that they give, and their errors. The rest is in modules, one for each subject:
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
@@ -150,8 +150,8 @@ pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
     CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, CommandError, Controller,
     Events, GroupHandle, Handle, Interrupt, MotionError, MotionId, MoveOptions, Outcome, PointRefusal,
-    Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualClock, VirtualRun,
-    WaitError,
+    Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualClock,
+    VirtualController, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use takt::VirtualRun;
 use takt::internals::RunInside;
-use takt::{AxisPoint, CommandError, Config, Controller, SessionOptions, StreamHandle, TrajectoryPoint};
+use takt::{AxisPoint, CommandError, Config, Controller, SessionOptions, TrajectoryPoint};
 use takt::{MotionError, Outcome};
 use takt_rt::{ControlLaw, EventKind, OperationMode, Phase, Rule, StopCategory, StreamState};
 
@@ -135,7 +135,7 @@ fn each_group_follows_a_stream_of_its_own() {
     let controller = Controller::start(with_positions(), SessionOptions::default()).unwrap();
     let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
     arm.begin_stream().unwrap();
-    let now_ns = StreamHandle::now_ns();
+    let now_ns = controller.now_ns();
     let at = |number: u64| now_ns + (100 + 10 * number) * MILLISECOND_NS;
     for number in 0..40 {
         let position = 0.002 * number.min(30) as f64;

@@ -10,7 +10,7 @@ use takt::rt::linux::{Policy, Step};
 use takt::{
     AxisPoint, CommandError, Config, Controller, DriveState, Event, EventKind, Events, Handle, MotionError,
     MoveOptions, OperationMode, Outcome, Phase, PointRefusal, Rule, SessionOptions, Snapshot, StartFailure,
-    StopCategory, StreamError, StreamHandle, StreamState, WaitError,
+    StopCategory, StreamError, StreamState, WaitError,
 };
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -522,7 +522,7 @@ fn points_from_two_threads_are_followed_and_the_end_of_them_is_reported() {
     let arm = start("arm6-erob.toml");
     let home: Vec<f64> = arm.state().axes[..6].iter().map(|axis| axis.position_set).collect();
     arm.begin_stream().unwrap();
-    let begun_ns = StreamHandle::now_ns();
+    let begun_ns = arm.now_ns();
     // Each thread has every second point of a slow ramp of 20 ms steps.
     std::thread::scope(|scope| {
         for half in 0..2 {

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use takt::{Config, Controller, Event, EventKind, Phase, SessionOptions, StreamHandle};
+use takt::{Config, Controller, Event, EventKind, Phase, SessionOptions};
 
 /// The joints of the arm.
 const JOINTS: usize = 6;
@@ -42,7 +42,7 @@ fn stream_beside_load(rate_hz: u32, lasting: Duration) -> String {
         let stream = arm.stream();
         arm.begin_stream().unwrap();
         let (begun, period) = (Instant::now(), Duration::from_secs(1) / rate_hz);
-        let begun_ns = StreamHandle::now_ns();
+        let begun_ns = arm.now_ns();
         let mut due = Duration::ZERO;
         while due < lasting {
             let late = begun.elapsed().saturating_sub(due);

@@ -39,7 +39,7 @@ pub use drive_family::{
 };
 pub use error::{ConfigError, Location, Problem};
 pub use interface::InterfaceError;
-pub(crate) use mode_words::{MODES, mode_word};
+pub use mode_words::{MODES, mode_word};
 pub use model::*;
 pub use position_unit::PositionUnit;
 pub use problem_kind::ProblemKind;

@@ -3,7 +3,7 @@
 use takt_rt::OperationMode;
 
 /// The modes, by their words in a configuration.
-pub(crate) const MODES: [(&str, OperationMode); 7] = [
+pub const MODES: [(&str, OperationMode); 7] = [
     ("csp", OperationMode::CyclicSynchronousPosition),
     ("csv", OperationMode::CyclicSynchronousVelocity),
     ("cst", OperationMode::CyclicSynchronousTorque),
@@ -14,6 +14,6 @@ pub(crate) const MODES: [(&str, OperationMode); 7] = [
 ];
 
 /// The word for a mode that an axis may have; the name of the standard for another one.
-pub(crate) fn mode_word(mode: OperationMode) -> &'static str {
+pub fn mode_word(mode: OperationMode) -> &'static str {
     MODES.iter().find(|(_, own)| *own == mode).map_or(mode.name(), |(word, _)| word)
 }

@@ -19,7 +19,7 @@ pub use crate::channels::{CallbackCommand, CallbackState, CallbackTimes};
 pub use handle::{
     CallbackHandle, CallbackOptions, CommandError, Controller, Events, GroupHandle, Handle, MotionError,
     MotionId, MoveOptions, Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress,
-    WaitError,
+    VirtualController, WaitError,
 };
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use point_check::{PointRefusal, check_point};

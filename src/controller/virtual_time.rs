@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, Snapshot, Wake};
+use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, Nanoseconds, Snapshot, Wake};
 
 use super::assemble::{self, AssembleError};
 use super::outcome::{Interrupt, Outcome};
@@ -241,6 +241,11 @@ impl<P: BusPort> VirtualRun<P> {
     /// The host's side of the host interface, to command the group directly.
     pub(crate) fn host(&mut self) -> &mut HostSide {
         &mut self.host
+    }
+
+    /// The present time.
+    pub(crate) const fn now_ns(&self) -> Nanoseconds {
+        self.clock.now_ns
     }
 
     /// The clock, to make it late.

@@ -60,7 +60,7 @@ pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACT
 pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
 
 /// A part of bring-up or shutdown that is under way.
-pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + 'a>>;
+pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + Send + 'a>>;
 
 /// What takt needs to know of a family of drives, beside the facts that a configuration reads.
 pub trait Family: ConfiguredFamily {

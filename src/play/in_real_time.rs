@@ -12,7 +12,7 @@ use super::groups::PlayedGroup;
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::{AxisMaxima, SetPointLog};
 use crate::controller::session::Session;
-use crate::controller::{Controller, GroupHandle, MoveOptions, StartFailure, StreamHandle};
+use crate::controller::{Controller, GroupHandle, MoveOptions, StartFailure};
 
 /// The time from one look at the state to the next.
 const LOOK: Duration = Duration::from_millis(1);
@@ -133,6 +133,6 @@ impl Stage for RealStage<'_> {
     }
 
     fn time_ns(&mut self) -> Nanoseconds {
-        StreamHandle::now_ns()
+        self.controller.now_ns()
     }
 }

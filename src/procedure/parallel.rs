@@ -5,12 +5,15 @@ use std::fmt;
 use takt_rt::Nanoseconds;
 
 use super::client::Client;
-use super::running::Procedure;
+use super::running::{MovableWork, Procedure};
+
+/// A procedure beside others.
+type Member<C, T, E> = Procedure<C, T, E, MovableWork<T, E>>;
 
 /// Procedures that run at the same time. Their events are not kept; each session shows its present step.
 pub struct Parallel<C: Client, T, E> {
     /// Each with the index of its bus.
-    members: Vec<(usize, Procedure<C, T, E>)>,
+    members: Vec<(usize, Member<C, T, E>)>,
 }
 
 impl<C: Client, T: fmt::Debug, E: fmt::Debug> fmt::Debug for Parallel<C, T, E> {
@@ -21,7 +24,7 @@ impl<C: Client, T: fmt::Debug, E: fmt::Debug> fmt::Debug for Parallel<C, T, E> {
 
 impl<C: Client, T, E> Parallel<C, T, E> {
     /// These procedures, each with the index of its bus.
-    pub fn new(members: impl IntoIterator<Item = (usize, Procedure<C, T, E>)>) -> Self {
+    pub fn new(members: impl IntoIterator<Item = (usize, Member<C, T, E>)>) -> Self {
         Self { members: members.into_iter().collect() }
     }
 
@@ -41,7 +44,7 @@ impl<C: Client, T, E> Parallel<C, T, E> {
     }
 
     /// The procedures, in their order.
-    pub fn procedures(&self) -> impl Iterator<Item = &Procedure<C, T, E>> {
+    pub fn procedures(&self) -> impl Iterator<Item = &Member<C, T, E>> {
         self.members.iter().map(|(_, procedure)| procedure)
     }
 }

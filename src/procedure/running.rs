@@ -21,14 +21,19 @@ pub struct ProcedureError<E> {
     pub failure: E,
 }
 
+/// The code of a procedure that stays in its thread.
+pub type Work<T, E> = dyn Future<Output = Result<T, E>>;
+/// The code of a procedure that may move to another thread between two polls.
+pub type MovableWork<T, E> = dyn Future<Output = Result<T, E>> + Send;
+
 /// A running procedure.
-pub struct Procedure<C: Client, T, E> {
+pub struct Procedure<C: Client, T, E, W: ?Sized = Work<T, E>> {
     session: ProcedureSession<C>,
-    work: Pin<Box<dyn Future<Output = Result<T, E>>>>,
+    work: Pin<Box<W>>,
     outcome: Option<Result<T, ProcedureError<E>>>,
 }
 
-impl<C: Client, T: fmt::Debug, E: fmt::Debug> fmt::Debug for Procedure<C, T, E> {
+impl<C: Client, T: fmt::Debug, E: fmt::Debug, W: ?Sized> fmt::Debug for Procedure<C, T, E, W> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Procedure").field("outcome", &self.outcome).finish_non_exhaustive()
     }
@@ -39,7 +44,19 @@ impl<C: Client, T, E> Procedure<C, T, E> {
     pub fn new(session: ProcedureSession<C>, work: impl Future<Output = Result<T, E>> + 'static) -> Self {
         Self { session, work: Box::pin(work), outcome: None }
     }
+}
 
+impl<C: Client, T, E> Procedure<C, T, E, MovableWork<T, E>> {
+    /// As [`Procedure::new`], one that may move to another thread between two polls.
+    pub fn movable(
+        session: ProcedureSession<C>,
+        work: impl Future<Output = Result<T, E>> + Send + 'static,
+    ) -> Self {
+        Self { session, work: Box::pin(work), outcome: None }
+    }
+}
+
+impl<C: Client, T, E, W: Future<Output = Result<T, E>> + ?Sized> Procedure<C, T, E, W> {
     /// Advances the procedure to `now_ns` and sends its messages.
     pub fn poll(&mut self, now_ns: Nanoseconds, send: &mut impl FnMut(C::Message)) {
         self.session.set_time(now_ns);

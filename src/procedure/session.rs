@@ -1,19 +1,20 @@
 //! The session of a procedure: the interface through which its code waits, sends and reports.
 
-use std::cell::{Ref, RefCell, RefMut};
 use std::collections::VecDeque;
 use std::fmt;
 use std::future::poll_fn;
+use std::ops::{Deref, DerefMut};
 use std::pin::pin;
-use std::rc::Rc;
+use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 use std::task::Poll;
 
 use takt_rt::Nanoseconds;
 
 use super::event::{AxisReading, ProcedureEvent};
 
-/// A session with one drive. Clones share the same state.
-pub struct ProcedureSession<C>(Rc<RefCell<SessionState<C>>>);
+/// A session with one drive. Clones share the same state. A procedure may move to another thread between two polls; its clones are
+/// never used by two threads at once, so that no lock is ever waited for.
+pub struct ProcedureSession<C>(Arc<RwLock<SessionState<C>>>);
 
 #[derive(Debug)]
 struct SessionState<C> {
@@ -35,7 +36,7 @@ struct SessionState<C> {
 
 impl<C> Clone for ProcedureSession<C> {
     fn clone(&self) -> Self {
-        Self(Rc::clone(&self.0))
+        Self(Arc::clone(&self.0))
     }
 }
 
@@ -45,10 +46,27 @@ impl<C: fmt::Debug> fmt::Debug for ProcedureSession<C> {
     }
 }
 
+/// The client in the state of a session.
+struct ClientGuard<S>(S);
+
+impl<C, S: Deref<Target = SessionState<C>>> Deref for ClientGuard<S> {
+    type Target = C;
+
+    fn deref(&self) -> &C {
+        &self.0.client
+    }
+}
+
+impl<C, S: DerefMut<Target = SessionState<C>>> DerefMut for ClientGuard<S> {
+    fn deref_mut(&mut self) -> &mut C {
+        &mut self.0.client
+    }
+}
+
 impl<C> ProcedureSession<C> {
     /// A session that has not begun.
     pub fn new(client: C) -> Self {
-        Self(Rc::new(RefCell::new(SessionState {
+        Self(Arc::new(RwLock::new(SessionState {
             client,
             began_ns: None,
             now_ns: 0,
@@ -61,23 +79,23 @@ impl<C> ProcedureSession<C> {
         })))
     }
 
-    // No borrow outlives its statement and none is held across an await, so these cannot panic.
-    fn state(&self) -> Ref<'_, SessionState<C>> {
-        self.0.borrow()
+    // No guard outlives its statement and none is held across an await, so that these find the lock free.
+    fn state(&self) -> RwLockReadGuard<'_, SessionState<C>> {
+        self.0.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn state_mut(&self) -> RefMut<'_, SessionState<C>> {
-        self.0.borrow_mut()
+    fn state_mut(&self) -> RwLockWriteGuard<'_, SessionState<C>> {
+        self.0.write().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The client. The borrow must end before anything is awaited.
-    pub(crate) fn client(&self) -> Ref<'_, C> {
-        Ref::map(self.state(), |state| &state.client)
+    /// The client. It must be given up before anything is awaited.
+    pub(crate) fn client(&self) -> impl Deref<Target = C> {
+        ClientGuard(self.state())
     }
 
     /// As [`ProcedureSession::client`], to change it.
-    pub(crate) fn client_mut(&self) -> RefMut<'_, C> {
-        RefMut::map(self.state_mut(), |state| &mut state.client)
+    pub(crate) fn client_mut(&self) -> impl DerefMut<Target = C> {
+        ClientGuard(self.state_mut())
     }
 
     /// Sets the time. The session's clock begins at the first call.

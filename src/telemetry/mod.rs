@@ -49,4 +49,4 @@ pub use report::{
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
 pub(crate) use thread::LoggerThread;
 pub use wall_clock::WallClock;
-pub use words::event as event_words;
+pub use words::{event as event_words, phase as phase_words};

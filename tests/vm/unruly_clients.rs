@@ -12,9 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use takt::{
-    Config, Controller, Event, EventKind, Handle, RecordingDestination, SessionOptions, StreamHandle,
-};
+use takt::{Config, Controller, Event, EventKind, Handle, RecordingDestination, SessionOptions};
 
 /// From one point to the next.
 const INTERVAL: Duration = Duration::from_millis(10);
@@ -87,7 +85,7 @@ fn lead(handle: &Handle, motion: &Motion) {
 fn flood(handle: &Handle, motion: &Motion) {
     let since = motion.begun.elapsed();
     let chunk: Vec<Vec<f64>> = (0..20).map(|index| motion.after(since + INTERVAL * index)).collect();
-    let _ = handle.stream().push_chunk(StreamHandle::now_ns(), INTERVAL, &chunk);
+    let _ = handle.stream().push_chunk(handle.now_ns(), INTERVAL, &chunk);
 }
 
 fn observe(handle: &Handle, _motion: &Motion) {

@@ -47,6 +47,28 @@ pub struct ThreadReport {
 }
 
 impl ThreadReport {
+    /// The calling thread as it is. No step was asked for.
+    pub fn of_ordinary_thread() -> Self {
+        let steps = [
+            Step::TimerSlack,
+            Step::CpuAffinity,
+            Step::LockMemory,
+            Step::PrefaultStack,
+            Step::DmaLatency,
+            Step::Fifo,
+        ];
+        Self {
+            steps: steps.map(|step| StepResult { step, outcome: Outcome::NotAsked }),
+            scheduling: Scheduling::of_this_thread(),
+            cpu: pinned_cpu(),
+            memory_locked: false,
+            stack_bytes: 0,
+            timer_slack_ns: timer_slack_ns(),
+            dma_latency_held: false,
+            preempt_rt: is_preempt_rt(),
+        }
+    }
+
     /// The outcome of a step.
     pub fn outcome(&self, step: Step) -> Outcome {
         self.steps

@@ -10,7 +10,6 @@ use takt_rt::{
 use super::Handle;
 use super::error::{CommandError, Refused};
 use super::motion::{MotionId, MoveOptions};
-use super::waiting::now_ns;
 use crate::channels::{MotionEnd, WAITING_AT_MOST};
 use crate::config::{Axis, Control};
 
@@ -206,6 +205,11 @@ impl Handle {
         self.request(Request::ResetFaults)
     }
 
+    fn expiry_ns(&self, valid_for: Duration) -> u64 {
+        let valid_ns = u64::try_from(valid_for.as_nanos()).unwrap_or(u64::MAX);
+        self.now_ns().saturating_add(valid_ns)
+    }
+
     fn axis(&self, axis: usize, mode: ControlLaw, needed: &'static str) -> Result<&Axis, CommandError> {
         let own = self.axes().get(axis).ok_or(CommandError::NoSuchAxis { axis, axes: self.axes().len() })?;
         if own.control == mode {
@@ -222,7 +226,7 @@ impl Handle {
         valid_for: Duration,
     ) -> Result<MotionId, CommandError> {
         // The number of an existing axis fits.
-        let wanted = ProfileMove { axis: axis as u8, target, valid_until_ns: expiry_ns(valid_for) };
+        let wanted = ProfileMove { axis: axis as u8, target, valid_until_ns: self.expiry_ns(valid_for) };
         self.begin_motion(self.group_of(axis), Request::SetProfileTarget(wanted))
     }
 
@@ -295,9 +299,4 @@ fn within(axis: &Axis, value: f64, lowest: f64, highest: f64) -> Result<(), Comm
     } else {
         Err(CommandError::OutsideLimits { axis: axis.name.clone(), value, lowest, highest })
     }
-}
-
-pub(super) fn expiry_ns(valid_for: Duration) -> u64 {
-    let valid_ns = u64::try_from(valid_for.as_nanos()).unwrap_or(u64::MAX);
-    now_ns().saturating_add(valid_ns)
 }

@@ -19,6 +19,12 @@ pub enum StartFailure {
     /// The drives could not be brought up or enabled. The session tells why.
     #[error("the drives could not be enabled: {}", .0.outcome.words(&.0.log.machine))]
     NotEnabled(Box<Session>),
+    /// The simulated drives of a [`VirtualController`](super::VirtualController) could not be brought up or enabled.
+    #[error("the simulated drives could not be enabled: {words}")]
+    NotEnabledVirtually {
+        /// Why.
+        words: String,
+    },
     /// The session thread has panicked. That is a defect of takt.
     #[error("the session thread has panicked; this is a defect of takt, please report it")]
     Died,

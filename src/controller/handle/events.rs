@@ -6,7 +6,6 @@ use takt_rt::Event;
 
 use super::Handle;
 use super::error::WaitError;
-use super::waiting::Deadline;
 use crate::channels::EventReader;
 use crate::telemetry::words;
 
@@ -29,7 +28,7 @@ impl Events {
     /// # Errors
     /// [`WaitError::NotInTime`]; [`WaitError::Ended`] if the controller has ended and no event is left.
     pub fn wait(&mut self, at_most: Duration) -> Result<Event, WaitError> {
-        let deadline = Deadline::after(at_most);
+        let deadline = self.handle.deadline_after(at_most);
         loop {
             // This is read before the events, so that the last ones before the end are seen.
             let has_ended = self.handle.has_ended();

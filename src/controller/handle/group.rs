@@ -5,7 +5,7 @@ use std::time::Duration;
 use takt_rt::{CallbackCycle, GroupSnapshot, OperationMode, Phase, Request, RequestTarget, StopCategory};
 
 use super::Handle;
-use super::error::{CommandError, WaitError};
+use super::error::{CommandError, Stopped, WaitError};
 use super::in_loop::{CallbackHandle, CallbackOptions};
 use super::motion::{MotionId, MoveOptions};
 use crate::channels::{CallbackCommand, CallbackState};
@@ -62,6 +62,11 @@ impl GroupHandle {
     pub fn state(&self) -> GroupSnapshot {
         let state = self.handle.state();
         state.groups().get(usize::from(self.number)).copied().unwrap_or_default()
+    }
+
+    /// As [`Handle::fault`], for the group.
+    pub fn fault(&self) -> Option<Stopped> {
+        self.handle.fault_of(&self.handle.state(), |group| group == usize::from(self.number))
     }
 
     /// As [`Handle::move_to`], with a target for each axis of the group, in the order of [`GroupHandle::axes`].

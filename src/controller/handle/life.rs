@@ -28,6 +28,11 @@ impl Life {
         self.0.load(Ordering::Acquire) == OVER
     }
 
+    /// The run is over.
+    pub(super) fn end(&self) {
+        self.0.store(OVER, Ordering::Release);
+    }
+
     /// For the thread of the run: the run is over when this is dropped, even by a panic.
     pub(super) fn over_when_dropped(self: Arc<Self>) -> OverWhenDropped {
         OverWhenDropped(self)
@@ -47,7 +52,7 @@ impl Deref for OverWhenDropped {
 
 impl Drop for OverWhenDropped {
     fn drop(&mut self) {
-        self.0.0.store(OVER, Ordering::Release);
+        self.0.end();
     }
 }
 

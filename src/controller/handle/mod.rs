@@ -30,8 +30,10 @@ mod in_loop;
 mod life;
 mod messages;
 mod motion;
+mod pace;
 mod stream;
 mod trajectory;
+mod virtual_controller;
 mod waiting;
 
 use std::ops::Deref;
@@ -50,6 +52,7 @@ use crate::telemetry::{Machine, Notice};
 use in_loop::Callbacks;
 use life::Life;
 use messages::Messages;
+use pace::{Pace, VirtualPace};
 use trajectory::Trajectories;
 
 pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped, WaitError};
@@ -59,6 +62,7 @@ pub use in_loop::{CallbackHandle, CallbackOptions};
 pub use motion::{MotionId, MoveOptions};
 pub use stream::{StreamError, StreamHandle};
 pub use trajectory::TrajectoryProgress;
+pub use virtual_controller::VirtualController;
 
 /// The drives must be enabled within this time. It covers the power-up time of all drives.
 const ENABLE_TIMEOUT: Duration = Duration::from_secs(60);
@@ -77,6 +81,20 @@ impl Controller {
     /// # Errors
     /// See [`StartFailure`]; nothing has moved then.
     pub fn start(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
+        let controller = Self::begin(config, options)?;
+        match controller.wait_for(Phase::Holding, ENABLE_TIMEOUT) {
+            Ok(()) => Ok(controller),
+            Err(_) => Err(controller.into_failure()),
+        }
+    }
+
+    /// As [`Controller::start`], but returns when the loop runs, while the drives are being brought up: for a program that wants to watch
+    /// or to interrupt that. When [`Handle::wait_for`] of [`Phase::Holding`] has succeeded, the axes hold their position; when it says
+    /// that the run has ended, [`Controller::into_failure`] says why.
+    ///
+    /// # Errors
+    /// See [`StartFailure`]; nothing was sent to the drives then.
+    pub fn begin(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
         let (handles_in, handles_out) = mpsc::sync_channel(1);
         let (life, messages) = (Arc::<Life>::default(), Arc::<Messages>::default());
         let (axes, groups) = (config.axes.clone(), config.groups.clone());
@@ -113,13 +131,15 @@ impl Controller {
             callbacks: Callbacks::new(callbacks, &plan),
             messages,
             life,
+            pace: Pace::Real,
         }));
-        let mut controller = Self { handle, thread: Some(thread) };
-        if controller.wait_for(Phase::Holding, ENABLE_TIMEOUT).is_err() {
-            controller.begin_end();
-            return Err(controller.thread.take().map_or(StartFailure::Died, failed));
-        }
-        Ok(controller)
+        Ok(Self { handle, thread: Some(thread) })
+    }
+
+    /// Ends a run that [`Controller::begin`] has begun and whose drives have not been enabled, and returns why not.
+    pub fn into_failure(mut self) -> StartFailure {
+        self.begin_end();
+        self.thread.take().map_or(StartFailure::Died, failed)
     }
 
     /// A handle for another thread.
@@ -192,6 +212,7 @@ struct Shared {
     callbacks: Callbacks,
     messages: Arc<Messages>,
     life: Arc<Life>,
+    pace: Pace,
 }
 
 impl Handle {
@@ -230,6 +251,14 @@ impl Handle {
     /// The failures to write a recording, a candump log or a black box until now. The motion goes on after them.
     pub fn not_written(&self) -> Vec<String> {
         self.0.messages.all()
+    }
+
+    /// Who runs the cycles in virtual time; `None` in real time.
+    fn virtual_pace(&self) -> Option<&VirtualPace> {
+        match &self.0.pace {
+            Pace::Real => None,
+            Pace::Virtual(pace) => Some(pace),
+        }
     }
 
     /// Whether the run has ended, so that every command returns an error that says `Ended`.

@@ -81,6 +81,18 @@ impl Handle {
         Some(result)
     }
 
+    /// The fault that has stopped a group and has not been reset: the first, of several groups.
+    pub fn fault(&self) -> Option<Stopped> {
+        self.fault_of(&self.state(), |_| true)
+    }
+
+    /// The fault that has stopped one of these groups.
+    pub(super) fn fault_of(&self, state: &Snapshot, is_meant: impl Fn(usize) -> bool) -> Option<Stopped> {
+        let groups = state.groups().iter().enumerate().filter(|(group, _)| is_meant(*group));
+        let faults = groups.filter_map(|(_, group)| group.stop).filter(|stop| !stop.is_requested());
+        faults.min_by_key(|stop| stop.slot).map(|stop| Stopped::new(stop, self.machine()))
+    }
+
     /// Whether a stop has discarded a request that has no answer in this state.
     pub(super) fn is_discarded(&self, target: RequestTarget, request: RequestId, state: &Snapshot) -> bool {
         let stop = self.0.clients.newest_stop(target);

@@ -3,10 +3,9 @@
 use std::cell::OnceCell;
 use std::time::Duration;
 
-use takt_rt::linux::MonotonicClock;
 use takt_rt::{
-    AxisPoint, Clock, GroupSnapshot, MAX_AXES, Nanoseconds, PointRole, Request, Snapshot, StreamPoint,
-    StreamReport, StreamState,
+    AxisPoint, GroupSnapshot, MAX_AXES, Nanoseconds, PointRole, Request, Snapshot, StreamPoint, StreamReport,
+    StreamState,
 };
 
 use super::error::CommandError;
@@ -67,9 +66,9 @@ enum StreamTarget {
 }
 
 impl StreamHandle {
-    /// The present time on the clock of the stamps: `CLOCK_MONOTONIC`.
-    pub fn now_ns() -> Nanoseconds {
-        MonotonicClock::default().now_ns()
+    /// The present time on the clock of the stamps: see [`Handle::now_ns`].
+    pub fn now_ns(&self) -> Nanoseconds {
+        self.handle.now_ns()
     }
 
     /// Takes a point that is meant for a time: for each axis a position, or an [`AxisPoint`] with more than that, or with something
@@ -87,7 +86,7 @@ impl StreamHandle {
     /// # Errors
     /// See [`StreamError`].
     pub fn push_now<P: Copy + Into<AxisPoint>>(&self, axes: &[P]) -> Result<(), StreamError> {
-        self.push(Self::now_ns(), axes)
+        self.push(self.now_ns(), axes)
     }
 
     /// Takes a chunk: points at equal intervals, the first of which is meant for `from_ns`. It takes the place of every earlier

@@ -1,5 +1,5 @@
 //! Waiting for cycles. The real-time thread does nothing for those who wait: it wakes no one and sees no one. They sleep until
-//! the next state is expected, and look.
+//! the next state is expected, and look. In virtual time, whoever waits runs the cycles.
 //!
 //! A cycle shows its state when its set-points have been sent, after about six tenths of the slot. A sleep that ends then does not
 //! disturb the next SYNC; see [`sleep_alignment`](crate::sleep_alignment).
@@ -22,18 +22,18 @@ const LOOK_NS: Nanoseconds = 1_000_000;
 /// When a wait is to end.
 pub(super) struct Deadline(Nanoseconds);
 
-impl Deadline {
-    pub(super) fn after(at_most: Duration) -> Self {
-        let at_most_ns = Nanoseconds::try_from(at_most.as_nanos()).unwrap_or(Nanoseconds::MAX);
-        Self(now_ns().saturating_add(at_most_ns))
-    }
-}
-
-pub(super) fn now_ns() -> Nanoseconds {
-    MonotonicClock::default().now_ns()
-}
-
 impl Handle {
+    /// The present time on the clock of the controller: `CLOCK_MONOTONIC`; of a [`VirtualController`](super::VirtualController), its own.
+    /// The times of states and events, and the stamps of streams, are on it.
+    pub fn now_ns(&self) -> Nanoseconds {
+        self.0.pace.now_ns()
+    }
+
+    pub(super) fn deadline_after(&self, at_most: Duration) -> Deadline {
+        let at_most_ns = Nanoseconds::try_from(at_most.as_nanos()).unwrap_or(Nanoseconds::MAX);
+        Deadline(self.now_ns().saturating_add(at_most_ns))
+    }
+
     /// Waits for the next cycle to be complete, and returns the state after it.
     ///
     /// The thread wakes 20 µs after the time at which the state is expected, plus the wake-up latency that the operating system gives it.
@@ -51,7 +51,7 @@ impl Handle {
     /// # Errors
     /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
     pub fn cycle_after(&self, slot: u64, at_most: Duration) -> Result<Snapshot, WaitError> {
-        let deadline = Deadline::after(at_most);
+        let deadline = self.deadline_after(at_most);
         loop {
             let has_ended = self.has_ended();
             let state = self.state();
@@ -84,7 +84,7 @@ impl Handle {
         at_most: Duration,
         mut find: impl FnMut(&Snapshot) -> Option<T>,
     ) -> Result<T, WaitError> {
-        let deadline = Deadline::after(at_most);
+        let deadline = self.deadline_after(at_most);
         loop {
             // This is read before the state, so that the state includes the last cycle before the end.
             let has_ended = self.has_ended();
@@ -112,9 +112,13 @@ impl Handle {
         later_ns: Nanoseconds,
         deadline: &Deadline,
     ) -> Result<(), WaitError> {
-        let now_ns = now_ns();
+        let now_ns = self.now_ns();
         if now_ns >= deadline.0 {
             return Err(WaitError::NotInTime);
+        }
+        if let Some(pace) = self.virtual_pace() {
+            pace.step(1, &self.0.life);
+            return Ok(());
         }
         let expected_ns = state.at_ns.saturating_add(later_ns).saturating_add(MARGIN_NS);
         let look_ns = expected_ns.max(now_ns.saturating_add(OVERDUE_NS));

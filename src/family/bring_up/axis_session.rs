@@ -6,7 +6,8 @@
 //!
 //! In a dry run there is no drive: each read gives what is expected, and each write is accepted and listed.
 
-use std::cell::{Cell, Ref, RefCell};
+use std::ops::Deref;
+use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
 use takt_rt::{Frame, MappedObject, Nanoseconds};
 
@@ -50,12 +51,12 @@ pub struct AxisSession<'a> {
     pub timing: BringUpTiming,
     pub(super) bus: CanopenSession,
     on_failure: OnFailure,
-    facts: RefCell<AxisFacts>,
+    facts: RwLock<AxisFacts>,
     /// The remedy of the current step.
-    advice: Cell<&'static str>,
-    first_failure: Cell<Option<StepFailure>>,
+    advice: Mutex<&'static str>,
+    first_failure: Mutex<Option<StepFailure>>,
     /// In a dry run: every number that was written, in order.
-    dry_writes: Option<RefCell<Vec<(ObjectAddress, i64)>>>,
+    dry_writes: Option<Mutex<Vec<(ObjectAddress, i64)>>>,
 }
 
 impl<'a> AxisSession<'a> {
@@ -74,16 +75,16 @@ impl<'a> AxisSession<'a> {
             timing,
             bus,
             on_failure,
-            facts: RefCell::new(facts),
-            advice: Cell::new(""),
-            first_failure: Cell::new(None),
+            facts: RwLock::new(facts),
+            advice: Mutex::default(),
+            first_failure: Mutex::default(),
             dry_writes: None,
         }
     }
 
     /// The same procedure without a drive.
     pub(super) fn dry_run(self) -> Self {
-        Self { dry_writes: Some(RefCell::default()), ..self }
+        Self { dry_writes: Some(Mutex::default()), ..self }
     }
 
     pub(super) fn is_dry_run(&self) -> bool {
@@ -92,15 +93,19 @@ impl<'a> AxisSession<'a> {
 
     /// Every number that was written in a dry run, in order.
     pub(super) fn dry_writes(self) -> Vec<(ObjectAddress, i64)> {
-        self.dry_writes.map(RefCell::into_inner).unwrap_or_default()
+        self.dry_writes.map(|writes| std::mem::take(&mut *lock(&writes))).unwrap_or_default()
     }
 
     /// The facts, or the first failure.
     pub(super) fn end(self, result: StepResult) -> Result<AxisFacts, StepFailure> {
-        let failure = result.err().map(|cause| StepFailure { cause, advice: self.advice.get() });
-        match self.first_failure.get().or(failure) {
+        let failure = result.err().map(|cause| StepFailure { cause, advice: *lock(&self.advice) });
+        let first = *lock(&self.first_failure);
+        match first.or(failure) {
             Some(failure) => Err(failure),
-            None => Ok(AxisFacts { emergency: self.bus.emergency(), ..self.facts.into_inner() }),
+            None => Ok(AxisFacts {
+                emergency: self.bus.emergency(),
+                ..self.facts.into_inner().unwrap_or_else(PoisonError::into_inner)
+            }),
         }
     }
 
@@ -136,17 +141,17 @@ impl<'a> AxisSession<'a> {
     /// Begins a step: its name and its remedy, for progress and failures.
     pub fn step(&self, name: &'static str, advice: &'static str) {
         self.bus.step(name);
-        self.advice.set(advice);
+        *lock(&self.advice) = advice;
     }
 
     /// What the drive has reported so far.
-    pub fn facts(&self) -> Ref<'_, AxisFacts> {
-        self.facts.borrow()
+    pub fn facts(&self) -> impl Deref<Target = AxisFacts> {
+        self.facts.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Keeps a fact.
     pub fn keep(&self, keep: impl FnOnce(&mut AxisFacts)) {
-        keep(&mut self.facts.borrow_mut());
+        keep(&mut self.facts.write().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Reads a number, keeps it as a fact, and compares it.
@@ -325,7 +330,7 @@ impl<'a> AxisSession<'a> {
     async fn written(&self, object: Object, value: i64) -> StepResult {
         let data = object.data_type.encode(value).ok_or(FailureCause::DoesNotFit { object, value })?;
         if let Some(writes) = &self.dry_writes {
-            writes.borrow_mut().push((object.address, value));
+            lock(writes).push((object.address, value));
             return Ok(());
         }
         let failed = |error| FailureCause::Transfer { object, access: Access::Write(value), error };
@@ -361,9 +366,10 @@ impl<'a> AxisSession<'a> {
     pub(super) fn settled<T: Default>(&self, result: StepResult<T>) -> StepResult<T> {
         match result {
             Err(cause) if self.on_failure == OnFailure::GoOn && !cause.is_silence() => {
-                if self.first_failure.get().is_none() {
+                let mut first = lock(&self.first_failure);
+                if first.is_none() {
                     self.bus.keep_failing_step();
-                    self.first_failure.set(Some(StepFailure { cause, advice: self.advice.get() }));
+                    *first = Some(StepFailure { cause, advice: *lock(&self.advice) });
                 }
                 self.bus.count_done();
                 Ok(T::default())
@@ -375,6 +381,11 @@ impl<'a> AxisSession<'a> {
             }
         }
     }
+}
+
+/// A procedure may move to another thread between two polls, but runs in one at a time: nobody waits for a lock.
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn compared(object: Object, access: Access, expected: Check, received: i64) -> StepResult {

@@ -1,7 +1,5 @@
 //! The PDO mapping of a drive: written and read back, or taken as the drive reports it.
 
-use std::cell::Cell;
-
 use super::axis_session::{AxisSession, StepResult};
 use super::check::Check;
 use super::failure::FailureCause;
@@ -34,10 +32,10 @@ pub async fn write(c: &AxisSession<'_>, direction: PdoDirection, plans: &[PdoPla
 /// Switches a PDO off that keeps its identifier.
 async fn switch_off(c: &AxisSession<'_>, direction: PdoDirection, number: u16) -> StepResult {
     let parameters = PdoParameters::at(direction, number);
-    let present = Cell::new(0);
-    c.read(parameters.cob_id(), Check::Any, |_, value| present.set(value as u32)).await?;
-    if present.get() & PDO_INVALID == 0 {
-        write_cob_id(c, parameters, present.get() | PDO_INVALID).await?;
+    let mut present = 0;
+    c.read(parameters.cob_id(), Check::Any, |_, value| present = value as u32).await?;
+    if present & PDO_INVALID == 0 {
+        write_cob_id(c, parameters, present | PDO_INVALID).await?;
     }
     Ok(())
 }

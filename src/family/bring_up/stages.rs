@@ -11,7 +11,7 @@
 //! The caller sends it from before the bring-up until [`Shutdown`] is done, also after a failed bring-up.
 
 use std::cell::Cell;
-use std::rc::Rc;
+use std::sync::Arc;
 use std::task::{Context, Waker};
 
 use takt_rt::{Frame, Nanoseconds};
@@ -81,7 +81,7 @@ pub struct BringUpProgress {
 /// Brings up every axis of a configuration.
 #[derive(Debug)]
 pub struct BringUp {
-    config: Rc<Config>,
+    config: Arc<Config>,
     timing: BringUpTiming,
     group: Group,
     stage: Stage,
@@ -116,7 +116,7 @@ impl BringUp {
 
     /// As [`BringUp::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
-        let config = Rc::new(config.clone());
+        let config = Arc::new(config.clone());
         let mut group = Group::new(&config, timing);
         group.begin(Part::Configure, &config, timing, &[]);
         Self { config, timing, group, stage: Stage::Configure }
@@ -180,7 +180,7 @@ impl Shutdown {
     /// As [`Shutdown::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
         let mut group = Group::new(config, timing);
-        group.begin(Part::ShutDown, &Rc::new(config.clone()), timing, &[]);
+        group.begin(Part::ShutDown, &Arc::new(config.clone()), timing, &[]);
         Self { group }
     }
 
@@ -276,7 +276,7 @@ impl Group {
     }
 
     /// Begins a part of every axis. `facts` is what is known of each drive; without it, nothing is known.
-    fn begin(&mut self, part: Part, config: &Rc<Config>, timing: BringUpTiming, facts: &[AxisFacts]) {
+    fn begin(&mut self, part: Part, config: &Arc<Config>, timing: BringUpTiming, facts: &[AxisFacts]) {
         let begun = self.members.iter_mut().map(|member| {
             let axes = member.axes.iter().filter_map(|index| Some((*index, config.axes.get(*index)?)));
             let facts: Vec<AxisFacts> = axes
@@ -291,7 +291,7 @@ impl Group {
             member.told.set(Told::Step(part, ""));
             // The progress shows it before the first poll.
             member.session.resume_step(RESTART_STEP);
-            let (session, config, axes) = (member.session.clone(), Rc::clone(config), member.axes.clone());
+            let (session, config, axes) = (member.session.clone(), Arc::clone(config), member.axes.clone());
             let work = async move {
                 let axes = axes.iter().filter_map(|index| config.axes.get(*index));
                 let of_axis = |(axis, facts)| {
@@ -301,7 +301,7 @@ impl Group {
                 let failed = carry_out(part, &sessions).await;
                 end(sessions, failed)
             };
-            (member.bus, Procedure::new(member.session.clone(), work))
+            (member.bus, Procedure::movable(member.session.clone(), work))
         });
         self.procedures = Parallel::new(begun);
     }

@@ -1,0 +1,100 @@
+//! What passes while a caller waits: real time, in which it sleeps, or virtual time, which it advances itself.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use takt_rt::linux::MonotonicClock;
+use takt_rt::{Clock, Nanoseconds};
+
+use super::life::Life;
+use crate::channels::LogSide;
+use crate::controller::outcome::{Interrupt, Outcome};
+use crate::controller::virtual_time::VirtualRun;
+use crate::sim::SimulatedBus;
+use crate::telemetry::EachCycle;
+
+/// The time of a controller, as its handles see it.
+pub(super) enum Pace {
+    /// That of the computer. The real-time thread runs the cycles.
+    Real,
+    /// Its own. Whoever waits runs the cycles.
+    Virtual(Box<VirtualPace>),
+}
+
+impl Pace {
+    /// The present time.
+    pub(super) fn now_ns(&self) -> Nanoseconds {
+        match self {
+            Self::Real => MonotonicClock::default().now_ns(),
+            Self::Virtual(pace) => pace.now_ns.load(Ordering::Acquire),
+        }
+    }
+}
+
+/// A controller in virtual time, for any number of threads: each cycle is run by the one that waits for it.
+pub(super) struct VirtualPace {
+    parts: Mutex<Parts>,
+    /// The time after the last cycle.
+    now_ns: AtomicU64,
+}
+
+struct Parts {
+    run: VirtualRun<SimulatedBus>,
+    log: LogSide,
+    each_cycle: Option<EachCycle>,
+}
+
+impl VirtualPace {
+    pub(super) fn new(run: VirtualRun<SimulatedBus>, log: LogSide, each_cycle: Option<EachCycle>) -> Self {
+        Self { parts: Mutex::new(Parts { run, log, each_cycle }), now_ns: AtomicU64::new(0) }
+    }
+
+    /// Runs this many cycles, or fewer up to the end of the run. Returns how many.
+    pub(super) fn step(&self, cycles: u64, life: &Life) -> u64 {
+        let mut parts = self.lock();
+        let mut stepped = 0;
+        while stepped < cycles && !life.is_over() {
+            let goes_on = parts.step();
+            self.now_ns.store(parts.run.now_ns(), Ordering::Release);
+            stepped += 1;
+            if !goes_on {
+                life.end();
+            }
+        }
+        stepped
+    }
+
+    /// Asks the run to end in control.
+    pub(super) fn interrupt(&self) {
+        self.lock().run.interrupt(Interrupt::Controlled);
+    }
+
+    /// How the run has ended; `None` while it goes on.
+    pub(super) fn outcome(&self) -> Option<Outcome> {
+        self.lock().run.supervisor().outcome().cloned()
+    }
+
+    /// After a panic in a cycle the run goes on with the next one, as far as it can.
+    fn lock(&self) -> MutexGuard<'_, Parts> {
+        self.parts.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Parts {
+    /// One cycle. Returns `false` once the run has ended.
+    fn step(&mut self) -> bool {
+        let goes_on = self.run.step();
+        while self
+            .log
+            .next_record(|record| {
+                if let Some(each_cycle) = &mut self.each_cycle {
+                    each_cycle(record);
+                }
+            })
+            .is_some()
+        {}
+        // Observers have their own way to the events.
+        while self.log.take_event().is_some() {}
+        goes_on
+    }
+}

@@ -1,0 +1,127 @@
+//! A controller in virtual time, commanded by the same handles as one in real time.
+
+use std::ops::Deref;
+use std::sync::Arc;
+use std::time::Duration;
+
+use takt_rt::linux::ThreadReport;
+use takt_rt::{Phase, StopCategory};
+
+use super::error::StartFailure;
+use super::in_loop::Callbacks;
+use super::life::Life;
+use super::pace::{Pace, VirtualPace};
+use super::trajectory::Trajectories;
+use super::{ENABLE_TIMEOUT, Handle, Shared};
+use crate::channels::MotionEnd;
+use crate::config::Config;
+use crate::controller::assemble;
+use crate::controller::outcome::Outcome;
+use crate::controller::session::SessionError;
+use crate::controller::virtual_time::VirtualRun;
+use crate::sim::SimulatedBus;
+use crate::telemetry::{EachCycle, Machine};
+
+/// A controller of simulated drives in virtual time, with the commands of a [`Controller`](super::Controller).
+///
+/// Its time is not that of the computer: it passes only in [`VirtualController::step`], and in each call of a [`Handle`] that waits, by
+/// as many cycles as the wait takes. So hours of motion take seconds, and the same calls give the same motion bit for bit. With calls
+/// from several threads at once, time passes for all of them.
+///
+/// ```
+/// use std::time::Duration;
+/// use takt::{Config, VirtualController};
+///
+/// fn main() -> takt::Result {
+///     let config = Config::load("configs/first.toml".as_ref())?;
+///     let arm = VirtualController::start(&config, None)?;
+///     let motion = arm.move_to(&[0.5])?;
+///     arm.wait(motion, Duration::from_secs(10))?;
+///     assert!((arm.state().axes()[0].position - 0.5).abs() < 1e-3);
+///     Ok(())
+/// }
+/// ```
+pub struct VirtualController {
+    handle: Handle,
+}
+
+impl VirtualController {
+    /// Brings simulated drives up and enables them, whatever interfaces the buses of the configuration have. `each_cycle` gets the record
+    /// of each cycle, in the thread that runs the cycle.
+    ///
+    /// # Errors
+    /// See [`StartFailure`].
+    pub fn start(config: &Config, each_cycle: Option<EachCycle>) -> Result<Self, StartFailure> {
+        config.validate().map_err(|error| SessionError::Assemble(error.into()))?;
+        let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
+        let (mut run, log) = VirtualRun::serving(config, ports).map_err(SessionError::Assemble)?;
+        let host = run.host();
+        let shared = Shared {
+            axes: config.axes.clone(),
+            groups: config.groups.clone(),
+            machine: Machine::of(config),
+            realtime: ThreadReport::of_ordinary_thread(),
+            clients: host.clients(),
+            observer: host.observer(),
+            events: host.events(),
+            streamer: host.streamer(),
+            trajectories: Trajectories::new(host.trajectories()),
+            callbacks: Callbacks::new(host.callbacks(), &assemble::slot_plan(config)),
+            messages: Arc::default(),
+            life: Arc::<Life>::default(),
+            pace: Pace::Virtual(Box::new(VirtualPace::new(run, log, each_cycle))),
+        };
+        let controller = Self { handle: Handle(Arc::new(shared)) };
+        match controller.wait_for(Phase::Holding, ENABLE_TIMEOUT) {
+            Ok(()) => Ok(controller),
+            Err(_) => {
+                let words = controller.end().words(controller.machine());
+                Err(StartFailure::NotEnabledVirtually { words })
+            }
+        }
+    }
+
+    /// Lets this many cycles pass, or fewer up to the end of the run. Returns how many.
+    pub fn step(&self, cycles: u64) -> u64 {
+        self.handle.virtual_pace().map_or(0, |pace| pace.step(cycles, &self.handle.0.life))
+    }
+
+    /// Lets a time pass, rounded up to whole cycles. Returns the number of cycles.
+    pub fn pass(&self, time: Duration) -> u64 {
+        let period_ns = u128::from(self.handle.machine().cycle_ns.max(1));
+        self.step(u64::try_from(time.as_nanos().div_ceil(period_ns)).unwrap_or(u64::MAX))
+    }
+
+    /// A handle, for another thread too.
+    pub fn handle(&self) -> Handle {
+        self.handle.clone()
+    }
+
+    /// Brings the axes to rest, disables and shuts down the drives, and returns how the run has ended.
+    pub fn finish(self) -> Outcome {
+        match self.end() {
+            // An interrupt is the regular end of this run.
+            Outcome::Interrupted => Outcome::Finished,
+            outcome => outcome,
+        }
+    }
+
+    fn end(&self) -> Outcome {
+        let shared = &self.handle.0;
+        shared.life.begin_end();
+        shared.clients.stop(MotionEnd::Stop(StopCategory::Two));
+        let Some(pace) = self.handle.virtual_pace() else { return Outcome::ThreadDied };
+        pace.interrupt();
+        // Each stage of the end has a time-out, so that it ends.
+        while pace.step(1, &shared.life) > 0 {}
+        pace.outcome().unwrap_or(Outcome::ThreadDied)
+    }
+}
+
+impl Deref for VirtualController {
+    type Target = Handle;
+
+    fn deref(&self) -> &Handle {
+        &self.handle
+    }
+}
