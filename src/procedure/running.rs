@@ -186,6 +186,10 @@ mod tests {
 
     #[test]
     fn procedures_run_side_by_side_each_on_its_own_bus() {
+        let asking = |question| {
+            let session = LineSession::new(Line::default());
+            Procedure::movable(session.clone(), ask(session, question))
+        };
         let mut parallel = crate::procedure::Parallel::new([(0, asking(7)), (1, asking(8))]);
         let mut sent = vec![];
         parallel.poll(0, &mut |bus, bytes| sent.push((bus, bytes)));

@@ -33,6 +33,25 @@ impl Handle {
         self.move_axes(RequestTarget::All, &axes, target, options)
     }
 
+    /// As [`Handle::move_with`], by a distance (rad or m) from the present set-point of each axis: of an axis in motion, from where it is
+    /// to be at this moment.
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn move_by(&self, distance: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
+        let axes: Vec<usize> = (0..self.axes().len()).collect();
+        self.move_axes(RequestTarget::All, &axes, &self.beyond_set_points(&axes, distance), options)
+    }
+
+    /// The set-points of the axes with these numbers, and a distance beyond each.
+    pub(super) fn beyond_set_points(&self, axes: &[usize], distance: &[f64]) -> Vec<f64> {
+        let state = self.state();
+        let set_point = |axis: usize| state.axes().get(axis).map_or(0.0, |axis| axis.position_set);
+        // A distance without an axis stays, so that the count is refused.
+        let from = axes.iter().map(|axis| set_point(*axis)).chain(std::iter::repeat(0.0));
+        distance.iter().zip(from).map(|(distance, from)| from + distance).collect()
+    }
+
     /// Moves the axes with these numbers, which are those of the group that is asked.
     pub(super) fn move_axes(
         &self,

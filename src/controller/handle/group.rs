@@ -53,6 +53,11 @@ impl Handle {
 }
 
 impl GroupHandle {
+    /// Its number among the groups of the controller.
+    pub fn number(&self) -> u8 {
+        self.number
+    }
+
     /// The numbers of its axes, in the order in which the configuration names them in the group.
     pub fn axes(&self) -> &[usize] {
         &self.axes
@@ -83,6 +88,15 @@ impl GroupHandle {
     /// See [`CommandError`]; nothing has changed then.
     pub fn move_with(&self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
         self.handle.move_axes(self.target(), &self.axes, target, options)
+    }
+
+    /// As [`Handle::move_by`], with a distance for each axis of the group, in the order of [`GroupHandle::axes`].
+    ///
+    /// # Errors
+    /// See [`CommandError`]; nothing has changed then.
+    pub fn move_by(&self, distance: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
+        let target = self.handle.beyond_set_points(&self.axes, distance);
+        self.handle.move_axes(self.target(), &self.axes, &target, options)
     }
 
     /// As [`Handle::in_loop`]: the function sees and commands the axes of the group, in the order of [`GroupHandle::axes`].

@@ -7,6 +7,9 @@ use takt_rt::{Answer, MotionState, RequestId, RequestTarget, Snapshot};
 use super::Handle;
 use super::error::{MotionError, Refused, Stopped, WaitError};
 
+/// Bits of the number of a motion for its group: there are fewer than 255 groups, and no run makes 2⁵⁶ requests.
+const TARGET_BITS: u32 = 8;
+
 /// Identifies a motion, or a change of the mode, for [`Handle::wait`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct MotionId {
@@ -19,6 +22,24 @@ impl MotionId {
     /// The request that began it.
     pub const fn request(self) -> RequestId {
         self.request
+    }
+
+    /// It as one number, for programs in other languages.
+    pub fn to_number(self) -> u64 {
+        let target = match self.target {
+            RequestTarget::All => 0,
+            RequestTarget::Group(group) => u64::from(group) + 1,
+        };
+        self.request.0 << TARGET_BITS | target
+    }
+
+    /// The motion of [`MotionId::to_number`].
+    pub fn from_number(number: u64) -> Self {
+        let target = match number & ((1 << TARGET_BITS) - 1) {
+            0 => RequestTarget::All,
+            group => RequestTarget::Group((group - 1) as u8),
+        };
+        Self { request: RequestId(number >> TARGET_BITS), target }
     }
 }
 
@@ -99,5 +120,20 @@ impl Handle {
         // Every request that was taken before the stop has its answer in the first state that has that of the stop.
         let has_stopped = state.answers.of(stop) != Answer::None || state.answers.have_forgotten(stop);
         request < stop && has_stopped
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_comes_back_from_its_number() {
+        for target in [RequestTarget::All, RequestTarget::Group(0), RequestTarget::Group(7)] {
+            for request in [1, 77, (1 << 56) - 1] {
+                let motion = MotionId { request: RequestId(request), target };
+                assert_eq!(MotionId::from_number(motion.to_number()), motion);
+            }
+        }
     }
 }

@@ -34,6 +34,25 @@ impl Handle {
         Deadline(self.now_ns().saturating_add(at_most_ns))
     }
 
+    /// Lets so many cycles pass, and returns the state after them. In real time it waits for them; in virtual time it runs them, as fast
+    /// as this machine can, or fewer up to the end of the run.
+    ///
+    /// # Errors
+    /// [`WaitError::Ended`] if the controller has ended before them.
+    pub fn advance(&self, cycles: u64) -> Result<Snapshot, WaitError> {
+        if self.has_ended() {
+            return Err(WaitError::Ended);
+        }
+        match self.virtual_pace() {
+            Some(pace) => {
+                pace.step(cycles, &self.0.life);
+                Ok(self.state())
+            }
+            None if cycles == 0 => Ok(self.state()),
+            None => self.cycle_after(self.state().slot.saturating_add(cycles - 1), Duration::MAX),
+        }
+    }
+
     /// Waits for the next cycle to be complete, and returns the state after it.
     ///
     /// The thread wakes 20 µs after the time at which the state is expected, plus the wake-up latency that the operating system gives it.
@@ -126,7 +145,8 @@ impl Handle {
         Ok(())
     }
 
-    fn period_ns(&self) -> Nanoseconds {
+    /// The period of the cycle.
+    pub fn period_ns(&self) -> Nanoseconds {
         self.machine().cycle_ns
     }
 }

@@ -1,0 +1,192 @@
+//! A controller in virtual time, commanded by the same calls as one in real time.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use takt::config::Interface;
+use takt::{
+    Config, MotionError, MoveOptions, Outcome, Phase, Snapshot, StartFailure, StopCategory, StreamState,
+    TrajectoryPoint, VirtualController, WaitError,
+};
+
+const PATIENCE: Duration = Duration::from_secs(60);
+
+fn config(name: &str) -> Config {
+    Config::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name)).unwrap()
+}
+
+fn simulated(name: &str) -> VirtualController {
+    VirtualController::start(&config(name), None).unwrap()
+}
+
+fn set_points(state: &Snapshot) -> Vec<f64> {
+    state.axes().iter().map(|axis| axis.position_set).collect()
+}
+
+#[test]
+fn the_same_calls_give_the_same_run() {
+    let run = || {
+        let arm = simulated("arm6-erob.toml");
+        let home = set_points(&arm.state());
+        let near: Vec<f64> = home.iter().map(|home| home + 0.03).collect();
+        let moving = arm.move_to(&near).unwrap();
+        arm.wait(moving, PATIENCE).unwrap();
+        let point = |time_s, offset: f64| TrajectoryPoint {
+            time_s,
+            positions: near.iter().map(|near| near + offset).collect(),
+            ..TrajectoryPoint::default()
+        };
+        let along = arm.execute(&[point(1.0, 0.05), point(2.0, 0.0)]).unwrap();
+        arm.set_speed(along, 0.5).unwrap();
+        arm.wait(along, PATIENCE).unwrap();
+        arm.begin_stream().unwrap();
+        for step in 0..100 {
+            let pose: Vec<f64> = near.iter().map(|near| near + 0.0005 * f64::from(step)).collect();
+            arm.stream().push_now(&pose).unwrap();
+            arm.advance(7).unwrap();
+        }
+        let state = arm.state();
+        assert_eq!(state.groups()[0].stream.state, StreamState::Following);
+        assert_eq!(arm.finish(), Outcome::Finished);
+        state
+    };
+    let first = run();
+    assert_eq!(first, run());
+    assert!(first.axes()[0].position_set > 0.05);
+}
+
+#[test]
+fn time_passes_only_while_somebody_waits() {
+    let arm = simulated("first.toml");
+    let (before, now_ns) = (arm.state(), arm.now_ns());
+    thread::sleep(Duration::from_millis(5));
+    assert_eq!((arm.state(), arm.now_ns()), (before, now_ns));
+    assert_eq!(arm.advance(0).unwrap().slot, before.slot);
+    assert_eq!(arm.advance(1_000).unwrap().slot, before.slot + 1_000);
+    assert_eq!(arm.now_ns(), now_ns + 1_000_000_000);
+    assert_eq!(arm.next_cycle(PATIENCE).unwrap().slot, before.slot + 1_001);
+    assert_eq!(arm.wait_for(Phase::Moving, Duration::from_millis(50)), Err(WaitError::NotInTime));
+    assert_eq!(arm.state().slot, before.slot + 1_051);
+}
+
+#[test]
+fn a_move_by_a_distance_begins_at_the_set_points() {
+    let arm = simulated("arm6-erob.toml");
+    let home = set_points(&arm.state());
+    let distance = [0.1, -0.1, 0.05, 0.0, 0.02, -0.02];
+    for _ in 0..2 {
+        let motion = arm.move_by(&distance, MoveOptions::default()).unwrap();
+        arm.wait(motion, PATIENCE).unwrap();
+    }
+    for ((now, home), distance) in set_points(&arm.state()).iter().zip(&home).zip(distance) {
+        assert!((now - home - 2.0 * distance).abs() < 1e-9);
+    }
+    assert!(arm.move_by(&[0.1], MoveOptions::default()).is_err());
+    assert!(arm.move_by(&[0.0; 7], MoveOptions::default()).is_err());
+}
+
+#[test]
+fn a_group_is_moved_by_a_distance_alone() {
+    let config = config("arm-and-gripper.toml");
+    let controller = VirtualController::start(&config, None).unwrap();
+    let arm = controller.group("arm").unwrap();
+    let before = set_points(&controller.state());
+    let distance: Vec<f64> = arm.axes().iter().map(|_| 0.05).collect();
+    let motion = arm.move_by(&distance, MoveOptions::default()).unwrap();
+    controller.wait(motion, PATIENCE).unwrap();
+    for (axis, (now, before)) in set_points(&controller.state()).iter().zip(&before).enumerate() {
+        let expected = if arm.axes().contains(&axis) { 0.05 } else { 0.0 };
+        assert!((now - before - expected).abs() < 1e-9, "axis {axis}");
+    }
+}
+
+#[test]
+fn clients_of_several_threads_take_turns() {
+    let arm = simulated("arm6-erob.toml");
+    let is_over = Arc::new(AtomicBool::new(false));
+    let watching: Vec<_> = (0..3)
+        .map(|_| {
+            let (handle, is_over) = (arm.handle(), Arc::clone(&is_over));
+            thread::spawn(move || {
+                let mut slot = 0;
+                while !is_over.load(Ordering::Relaxed) {
+                    let state = handle.cycle_after(slot, PATIENCE).unwrap();
+                    assert!(state.slot > slot);
+                    slot = state.slot;
+                }
+                slot
+            })
+        })
+        .collect();
+    let home = set_points(&arm.state());
+    let near: Vec<f64> = home.iter().map(|home| home + 0.08).collect();
+    for target in [&near, &home, &near] {
+        let motion = arm.move_to(target).unwrap();
+        arm.wait(motion, PATIENCE).unwrap();
+    }
+    is_over.store(true, Ordering::Relaxed);
+    assert!(watching.into_iter().all(|thread| thread.join().unwrap() > 100));
+}
+
+#[test]
+fn a_stop_from_another_thread_ends_a_wait() {
+    let arm = simulated("arm6-erob.toml");
+    let far: Vec<f64> = arm.axes().iter().map(|axis| 0.9 * axis.limits.position_max).collect();
+    let motion = arm.move_to(&far).unwrap();
+    arm.wait_for(Phase::Moving, PATIENCE).unwrap();
+    let stopping = arm.handle();
+    thread::spawn(move || stopping.stop(StopCategory::Two)).join().unwrap().unwrap();
+    assert!(matches!(arm.wait(motion, PATIENCE), Err(MotionError::Stopped(_))));
+    arm.wait_for(Phase::Holding, PATIENCE).unwrap();
+    let mut events = arm.events();
+    assert_eq!(events.wait(Duration::from_millis(100)), Err(WaitError::NotInTime));
+}
+
+#[test]
+fn every_bus_is_simulated_whatever_its_interface() {
+    let mut config = config("first.toml");
+    config.buses[0].interface = Interface::SocketCan("no-such-can".into());
+    let arm = VirtualController::start(&config, None).unwrap();
+    arm.wait(arm.move_to(&[0.5]).unwrap(), PATIENCE).unwrap();
+    assert!((arm.state().axes[0].position - 0.5).abs() < 0.01);
+}
+
+#[test]
+fn nobody_can_command_or_wait_after_the_end() {
+    let arm = simulated("first.toml");
+    let handle = arm.handle();
+    assert_eq!(arm.finish(), Outcome::Finished);
+    assert!(handle.has_ended());
+    assert_eq!(handle.next_cycle(PATIENCE).unwrap_err(), WaitError::Ended);
+    assert_eq!(handle.advance(1).unwrap_err(), WaitError::Ended);
+    assert!(handle.move_to(&[0.1]).is_err() && handle.stop(StopCategory::Two).is_err());
+    assert_eq!(handle.state().groups()[0].phase, Phase::Disabled);
+}
+
+#[test]
+fn a_drive_that_cannot_be_enabled_is_told() {
+    let mut config = config("first.toml");
+    config.axes[0].identity.vendor = Some(0xDEAD);
+    let failure = VirtualController::start(&config, None).err();
+    assert!(matches!(failure, Some(StartFailure::NotEnabledVirtually { .. })), "{failure:?}");
+}
+
+#[test]
+fn a_callback_leads_the_axes_of_whoever_waits() {
+    let arm = simulated("first.toml");
+    let mut calls = 0_u32;
+    let leading = arm.in_loop(move |_, _, command| {
+        calls += 1;
+        command.target(0, takt::rt::AxisTarget::Velocity { velocity: 0.2, acceleration: 0.0 });
+        if calls == 500 {
+            command.finish();
+        }
+    });
+    let leading = leading.unwrap();
+    leading.wait(PATIENCE).unwrap();
+    assert_eq!(leading.times().calls, 500);
+    assert!((arm.state().axes[0].position - 0.1).abs() < 0.02);
+}
