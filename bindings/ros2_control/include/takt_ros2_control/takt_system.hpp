@@ -1,0 +1,91 @@
+// takt's drives as a system of ros2_control. SPDX-License-Identifier: MIT OR Apache-2.0
+#ifndef TAKT_ROS2_CONTROL__TAKT_SYSTEM_HPP_
+#define TAKT_ROS2_CONTROL__TAKT_SYSTEM_HPP_
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <hardware_interface/handle.hpp>
+#include <hardware_interface/hardware_info.hpp>
+#include <hardware_interface/system_interface.hpp>
+#include <hardware_interface/types/hardware_interface_return_values.hpp>
+#include <rclcpp/duration.hpp>
+#include <rclcpp/time.hpp>
+#include <rclcpp_lifecycle/state.hpp>
+
+#include <takt.hpp>
+
+namespace takt_ros2_control {
+
+/// The drives of a takt configuration. takt has a real-time thread of its own, which keeps every limit: the controller manager may be late,
+/// and its rate need not be that of the bus. write() stamps its points, read() never waits for a drive.
+///
+/// Parameters of <hardware>: `configuration`, a file; `drives`, "configured" (the default), "simulated", or "virtual": simulated in virtual
+/// time, of which each read() lets its period pass. The joints are named as the axes of the configuration. An axis that is no joint holds.
+class TaktSystem : public hardware_interface::SystemInterface {
+public:
+    using CallbackReturn = rclcpp_lifecycle::node_interfaces::LifecycleNodeInterface::CallbackReturn;
+
+    /// Reads the tag: parameters, joints and their interfaces.
+    CallbackReturn on_init(const hardware_interface::HardwareInfo &info) override;
+    /// Brings the drives up. takt enables them to see that they can be; they are disabled again when this returns.
+    CallbackReturn on_configure(const rclcpp_lifecycle::State &previous) override;
+    /// Enables the drives. The joints hold until a controller claims them.
+    CallbackReturn on_activate(const rclcpp_lifecycle::State &previous) override;
+    /// Brings the joints to rest and disables the drives.
+    CallbackReturn on_deactivate(const rclcpp_lifecycle::State &previous) override;
+    /// Shuts the drives down.
+    CallbackReturn on_cleanup(const rclcpp_lifecycle::State &previous) override;
+    CallbackReturn on_shutdown(const rclcpp_lifecycle::State &previous) override;
+    CallbackReturn on_error(const rclcpp_lifecycle::State &previous) override;
+
+    std::vector<hardware_interface::StateInterface> export_state_interfaces() override;
+    std::vector<hardware_interface::CommandInterface> export_command_interfaces() override;
+
+    /// Refuses two interfaces of one joint at a time, and efforts of a joint that is not in cyclic synchronous torque.
+    hardware_interface::return_type prepare_command_mode_switch(
+        const std::vector<std::string> &start, const std::vector<std::string> &stop) override;
+    /// Waits for nothing: the next write() is of the new kind.
+    hardware_interface::return_type perform_command_mode_switch(
+        const std::vector<std::string> &start, const std::vector<std::string> &stop) override;
+
+    hardware_interface::return_type read(const rclcpp::Time &time, const rclcpp::Duration &period) override;
+    hardware_interface::return_type write(const rclcpp::Time &time, const rclcpp::Duration &period) override;
+
+private:
+    enum class Kind { hold, position, velocity, effort };
+
+    struct Joint {
+        std::string name;
+        /// The axis in the configuration.
+        std::size_t axis = 0;
+        Kind kind = Kind::hold;
+        double position = 0.0, velocity = 0.0, effort = 0.0;
+        double position_command = 0.0, velocity_command = 0.0, effort_command = 0.0;
+        /// Where it stays while nobody has claimed it.
+        double held = 0.0;
+    };
+
+    /// The kinds of the joints after a switch; none if it is not possible, with the reason in the log.
+    std::optional<std::vector<Kind>> switched(const std::vector<std::string> &start, const std::vector<std::string> &stop) const;
+    void take_state();
+    void hold_all();
+    bool come_to_rest_and_disable();
+    CallbackReturn close();
+    void complain(const std::string &words) const;
+
+    std::string configuration_;
+    takt::options options_;
+    std::vector<Joint> joints_;
+    std::optional<takt::controller> arm_;
+    takt::state state_;
+    /// One for each axis of the configuration. It is as long as it will be before the drives are enabled.
+    std::vector<takt::target> targets_;
+    double period_s_ = 0.001;
+    bool is_active_ = false;
+};
+
+} // namespace takt_ros2_control
+
+#endif

@@ -1,0 +1,210 @@
+// A controller manager in small: reads the tag of a URDF, and leads a TaktSystem through its life, in virtual time, with the order of calls
+// of ros2_control: read, update, write; switches between the cycles.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <hardware_interface/system_interface.hpp>
+#include <pluginlib/class_list_macros.hpp>
+
+namespace pluginlib_stand_in {
+template <>
+std::unique_ptr<hardware_interface::SystemInterface> make<hardware_interface::SystemInterface>();
+}
+
+using hardware_interface::CallbackReturn;
+using hardware_interface::return_type;
+
+#define CHECK(what)                                                                  \
+    do {                                                                             \
+        if (!(what)) {                                                               \
+            std::fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #what);          \
+            std::exit(1);                                                            \
+        }                                                                            \
+    } while (0)
+
+namespace {
+
+const rclcpp_lifecycle::State any_state(1, "unconfigured");
+
+/// What component_parser makes of the tag, as far as this tag goes.
+hardware_interface::HardwareInfo parsed(const std::string &path) {
+    std::ifstream file(path);
+    CHECK(file.good());
+    const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+    hardware_interface::HardwareInfo info;
+    info.type = "system";
+    for (std::size_t begin = text.find('<'); begin != std::string::npos; begin = text.find('<', begin + 1)) {
+        const std::size_t end = text.find('>', begin), next = text.find('<', begin + 1);
+        const std::string element = text.substr(begin + 1, end - begin - 1);
+        const std::string tag = element.substr(0, element.find_first_of(" /"));
+        const std::size_t named = element.find("name=\"");
+        const std::string name = named == std::string::npos ? "" : element.substr(named + 6, element.find('"', named + 6) - named - 6);
+        const std::string content = next == std::string::npos ? "" : text.substr(end + 1, next - end - 1);
+        if (tag == "plugin") info.hardware_plugin_name = content;
+        if (tag == "param") info.hardware_parameters[name] = content;
+        if (tag == "joint") {
+            info.joints.emplace_back();
+            info.joints.back().name = name;
+            info.joints.back().type = "joint";
+        }
+        hardware_interface::InterfaceInfo interface;
+        interface.name = name;
+        if (tag == "command_interface") info.joints.back().command_interfaces.push_back(interface);
+        if (tag == "state_interface") info.joints.back().state_interfaces.push_back(interface);
+    }
+    return info;
+}
+
+struct Manager {
+    std::unique_ptr<hardware_interface::SystemInterface> system = pluginlib_stand_in::make<hardware_interface::SystemInterface>();
+    std::vector<hardware_interface::StateInterface> states{};
+    std::vector<hardware_interface::CommandInterface> commands{};
+    std::int64_t now_ns = 0;
+
+    double state(const std::string &name) const {
+        for (const auto &interface : states)
+            if (interface.get_name() == name) return interface.get_value();
+        std::fprintf(stderr, "there is no state %s\n", name.c_str());
+        std::exit(1);
+    }
+    void command(const std::string &name, double value) {
+        for (auto &interface : commands)
+            if (interface.get_name() == name) return interface.set_value(value);
+        std::fprintf(stderr, "there is no command %s\n", name.c_str());
+        std::exit(1);
+    }
+    /// Cycles of 4 ms: the controller manager is four times slower than the bus.
+    template <class F>
+    return_type run(int cycles, F update) {
+        const rclcpp::Duration period(0, 4000000);
+        for (int cycle = 0; cycle < cycles; cycle++) {
+            now_ns += period.nanoseconds();
+            const rclcpp::Time now(now_ns);
+            if (return_type read = system->read(now, period); read != return_type::OK) return read;
+            update(cycle * period.seconds());
+            if (return_type written = system->write(now, period); written != return_type::OK) return written;
+        }
+        return return_type::OK;
+    }
+    return_type run(int cycles) {
+        return run(cycles, [](double) {});
+    }
+    return_type switch_to(const std::vector<std::string> &start, const std::vector<std::string> &stop) {
+        if (system->prepare_command_mode_switch(start, stop) != return_type::OK) return return_type::ERROR;
+        return system->perform_command_mode_switch(start, stop);
+    }
+};
+
+hardware_interface::HardwareInfo with(hardware_interface::HardwareInfo info, const char *name, const std::string &value) {
+    info.hardware_parameters[name] = value;
+    return info;
+}
+
+} // namespace
+
+int main(int count, char **arguments) {
+    CHECK(count == 3);
+    const std::string configuration = arguments[1];
+    const auto tag = parsed(arguments[2]);
+    CHECK(tag.hardware_plugin_name == "takt_ros2_control/TaktSystem" && tag.joints.size() == 2);
+    const auto info = with(with(tag, "configuration", configuration), "drives", "virtual");
+
+    // What is wrong with a tag is said before anything is opened.
+    {
+        Manager manager;
+        CHECK(manager.system->on_init(with(info, "configuration", "")) == CallbackReturn::ERROR);
+        CHECK(manager.system->on_init(with(info, "drives", "imaginary")) == CallbackReturn::ERROR);
+        auto strange = info;
+        strange.joints[0].command_interfaces[0].name = "temper";
+        CHECK(manager.system->on_init(strange) == CallbackReturn::ERROR);
+        CHECK(manager.system->on_init(with(info, "configuration", "no such file")) == CallbackReturn::SUCCESS);
+        CHECK(manager.system->on_configure(any_state) == CallbackReturn::FAILURE);
+        strange = info;
+        strange.joints[0].name = "no_such_joint";
+        CHECK(manager.system->on_init(strange) == CallbackReturn::SUCCESS);
+        CHECK(manager.system->on_configure(any_state) == CallbackReturn::FAILURE);
+    }
+
+    Manager manager;
+    auto &system = *manager.system;
+    CHECK(system.on_init(info) == CallbackReturn::SUCCESS);
+    manager.states = system.export_state_interfaces();
+    manager.commands = system.export_command_interfaces();
+    CHECK(manager.states.size() == 5 && manager.commands.size() == 5);
+
+    // Inactive: states can be read, and nothing is sent.
+    CHECK(system.on_configure(any_state) == CallbackReturn::SUCCESS);
+    CHECK(manager.run(50) == return_type::OK);
+    const double home = manager.state("joint1/position"), home2 = manager.state("joint2/position");
+    CHECK(std::isfinite(home));
+
+    // Active: it holds until somebody claims it.
+    CHECK(system.on_activate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(manager.run(250) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/position") - home) < 0.01);
+
+    // Positions.
+    CHECK(manager.switch_to({"joint1/position", "joint2/position"}, {}) == return_type::OK);
+    CHECK(manager.run(500, [&](double time_s) {
+        manager.command("joint1/position", home + 0.1 * (1.0 - std::cos(1.5 * time_s)));
+        manager.command("joint2/position", home2);
+    }) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/position") - (home + 0.1 * (1.0 - std::cos(3.0)))) < 0.02);
+
+    // Two interfaces of a joint at once are refused, and nothing has changed.
+    CHECK(system.prepare_command_mode_switch({"joint1/velocity"}, {}) == return_type::ERROR);
+    CHECK(manager.run(10) == return_type::OK);
+
+    // A velocity, while joint 2 goes on by positions.
+    CHECK(manager.switch_to({"joint1/velocity"}, {"joint1/position"}) == return_type::OK);
+    CHECK(manager.run(250, [&](double) { manager.command("joint1/velocity", -0.2); }) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/velocity") + 0.2) < 0.03);
+
+    // What is beyond the limits is led to within them: no fault.
+    CHECK(manager.run(25, [&](double) { manager.command("joint1/velocity", -100.0); }) == return_type::OK);
+    CHECK(manager.run(100, [&](double) { manager.command("joint1/velocity", 0.0); }) == return_type::OK);
+
+    // An effort: the joint is in cyclic synchronous torque. It floats, and is held again.
+    CHECK(manager.switch_to({"joint1/effort"}, {"joint1/velocity"}) == return_type::OK);
+    CHECK(manager.run(50, [&](double) { manager.command("joint1/effort", 1.0); }) == return_type::OK);
+    CHECK(manager.switch_to({}, {"joint1/effort", "joint2/position"}) == return_type::OK);
+    CHECK(manager.run(250) == return_type::OK);
+    const double held = manager.state("joint1/position");
+    CHECK(manager.run(250) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/position") - held) < 0.005 && std::abs(manager.state("joint1/velocity")) < 0.01);
+
+    // A controller manager that stalls for half a second of the bus: the joints come to rest, and go on.
+    CHECK(manager.switch_to({"joint1/velocity"}, {}) == return_type::OK);
+    CHECK(manager.run(100, [&](double) { manager.command("joint1/velocity", 0.2); }) == return_type::OK);
+    CHECK(system.read(rclcpp::Time(manager.now_ns), rclcpp::Duration(0, 500000000)) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/velocity")) < 0.02);
+    CHECK(manager.run(100) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/velocity") - 0.2) < 0.05);
+
+    // There and back.
+    CHECK(system.on_deactivate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(manager.run(50) == return_type::OK);
+    CHECK(system.on_activate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(manager.run(50) == return_type::OK);
+
+    // What is no number is a fault of the command, not of the machine: the write fails, and the manager makes an end of it.
+    CHECK(manager.run(5, [&](double) { manager.command("joint1/velocity", std::nan("")); }) == return_type::ERROR);
+    CHECK(system.on_error(any_state) == CallbackReturn::SUCCESS);
+    CHECK(system.read(rclcpp::Time(0), rclcpp::Duration(0, 1000000)) == return_type::ERROR);
+
+    // It can be configured anew.
+    CHECK(system.on_configure(any_state) == CallbackReturn::SUCCESS);
+    CHECK(system.on_activate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(manager.run(50) == return_type::OK);
+    CHECK(system.on_deactivate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(system.on_cleanup(any_state) == CallbackReturn::SUCCESS);
+    CHECK(system.on_shutdown(any_state) == CallbackReturn::SUCCESS);
+    std::puts("the system has lived its life");
+    return 0;
+}
