@@ -1,0 +1,57 @@
+//! Calls of the header, for `benches/instructions`: how many instructions each takes on its way to the real-time thread and back.
+//!
+//! ```text
+//! call_instructions WORK REPETITIONS
+//! ```
+#![allow(clippy::undocumented_unsafe_blocks, reason = "every pointer here is one of a local variable")]
+
+use std::ffi::CString;
+use std::mem::MaybeUninit;
+use std::ptr;
+
+use takt_c::errors::takt_result::{self, TAKT_OK};
+use takt_c::handles::takt_handle;
+use takt_c::life::{takt_now_ns, takt_stop};
+use takt_c::open::{takt_drives, takt_open, takt_options};
+use takt_c::state::{takt_read_state, takt_state};
+use takt_c::stream::{takt_push_at, takt_push_positions_at, takt_target};
+
+const AXES: usize = 6;
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let work = arguments.next().unwrap_or_default();
+    let repetitions: u64 = arguments.next().and_then(|count| count.parse().ok()).unwrap_or(1);
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/arm6-erob.toml");
+    let path = CString::new(path).unwrap_or_default();
+    let options = takt_options { drives: takt_drives::TAKT_VIRTUAL as i32, ..takt_options::default() };
+    let mut arm = takt_handle { number: 0 };
+    assert_eq!(unsafe { takt_open(path.as_ptr(), &raw const options, &raw mut arm) }, TAKT_OK);
+    let mut state = MaybeUninit::<takt_state>::zeroed();
+    unsafe { (&raw mut (*state.as_mut_ptr()).size).write(size_of::<takt_state>() as u32) };
+    let positions = [0.1; AXES];
+    let targets = [takt_target { kind: 1, position: 0.1, ..unsafe { std::mem::zeroed() } }; AXES];
+    let mut result = TAKT_OK;
+    for stamp_ns in 0..repetitions {
+        let called: takt_result = match work.as_str() {
+            "read-state-6" => unsafe { takt_read_state(arm, state.as_mut_ptr()) },
+            // No cycle takes them: there is room for 256.
+            "push-positions-6" => unsafe { takt_push_positions_at(arm, stamp_ns, positions.as_ptr(), AXES) },
+            "push-targets-6" => unsafe { takt_push_at(arm, stamp_ns, targets.as_ptr(), AXES) },
+            "stop" => takt_stop(arm, 2),
+            "now" => {
+                assert!(takt_now_ns(arm) > 0);
+                TAKT_OK
+            }
+            "wrong-handle" => unsafe { takt_read_state(takt_handle { number: 3 }, ptr::null_mut()) },
+            _ => {
+                eprintln!("call_instructions: there is no work {work:?}");
+                std::process::exit(2);
+            }
+        };
+        result = called;
+    }
+    assert!(repetitions > 0 && result != takt_result::TAKT_ERROR_DEFECT);
+    // Without an end: the process is measured, and ends here.
+    std::process::exit(0);
+}
