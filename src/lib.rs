@@ -123,7 +123,7 @@ mod jitter;
 pub mod link;
 #[cfg_attr(
     not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
+    allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
 )]
 mod modbus;
 #[cfg(feature = "cli")]
@@ -149,9 +149,9 @@ pub use controller::realtime_thread::{Begun, Ended};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
     CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, CommandError, Controller,
-    Events, GroupHandle, Handle, Interrupt, MotionError, MotionId, MoveOptions, Outcome, PointRefusal,
-    Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress, VirtualClock,
-    VirtualController, VirtualRun, WaitError,
+    Events, GroupHandle, Handle, Interrupt, LinePort, MotionError, MotionId, MoveOptions, Outcome,
+    PointRefusal, Refused, SharedLine, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress,
+    VirtualClock, VirtualController, VirtualRun, WaitError,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};

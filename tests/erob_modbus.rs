@@ -15,9 +15,9 @@ use takt::internals::modbus::line_timing::LineTiming;
 use takt::internals::modbus::master::{MasterTiming, RequestFailure};
 use takt::internals::procedure::{ModbusClient, ModbusSession, Procedure, ProcedureError, ProcedureEvent};
 use takt::internals::sim::erob_modbus::{
-    Disturbance, ErobModbusDrive, ErobModbusParameters, ModbusDriveFault, SimulatedLine,
+    ErobModbusDrive, ErobModbusParameters, ModbusDriveFault, SimulatedLine,
 };
-use takt::internals::sim::serial_line::DevicesOnLine;
+use takt::internals::sim::serial_line::{DevicesOnLine, LineDisturbance};
 use takt::sim::plant::{Encoder, JointParameters};
 
 const MS: u64 = 1_000_000;
@@ -91,7 +91,7 @@ impl Bench {
 
     fn drive(&mut self) -> &mut ErobModbusDrive {
         self.line.receive(self.now_ns);
-        self.line.drive(0).unwrap()
+        self.line.module(0).unwrap()
     }
 
     /// Runs a procedure to its end. `touch` sees the line at every millisecond since its beginning, and says whether to interrupt it.
@@ -243,7 +243,7 @@ fn a_reciprocating_motion_turns_at_its_ends_and_is_ended_at_one_of_them() {
             .run(
                 async move |drive| motion::carry_out(&drive, motion).await,
                 |line, ms| {
-                    let drive = line.drive(0).unwrap();
+                    let drive = line.module(0).unwrap();
                     (lowest, highest) = (drive.counts().min(lowest), drive.counts().max(highest));
                     let velocity = drive.velocity();
                     turns += usize::from(velocity * last < 0.0);
@@ -358,7 +358,7 @@ fn a_fault_on_the_way_ends_the_motion_with_its_code_and_the_drive_disabled() {
         async |drive| motion::carry_out(&drive, Motion::To(500_000, PROFILE)).await,
         |line, ms| {
             if ms == 2_000 {
-                line.drive(0).unwrap().inject(ModbusDriveFault::Code(0x2310));
+                line.module(0).unwrap().inject(ModbusDriveFault::Code(0x2310));
             }
             false
         },
@@ -388,7 +388,7 @@ fn a_blocked_joint_is_a_fault_a_motor_without_power_is_told_and_a_silent_drive_i
         async |drive| motion::carry_out(&drive, Motion::By(1_000, PROFILE)).await,
         |line, ms| {
             if ms == 400 {
-                line.drive(0).unwrap().inject(ModbusDriveFault::TorqueOff);
+                line.module(0).unwrap().inject(ModbusDriveFault::TorqueOff);
             }
             false
         },
@@ -443,7 +443,7 @@ fn an_emergency_stop_takes_less_than_50_ms() {
                 Ok(())
             },
             |line, ms| {
-                let velocity = line.drive(0).unwrap().velocity().abs();
+                let velocity = line.module(0).unwrap().velocity().abs();
                 if velocity > 29_000.0 {
                     told_ms = Some(ms);
                 } else if velocity < 500.0 && told_ms.is_some() {
@@ -561,9 +561,10 @@ fn on_a_noisy_line_a_motion_arrives_or_fails_with_the_motor_off_and_no_wrong_val
     for seed in 0..20 {
         let mut bench = Bench::ready();
         // One byte of 500: about every tenth exchange is damaged.
-        bench
-            .line
-            .disturb(Disturbance { wrong_per_million: 1_500, lost_per_million: 500, is_cut: false }, seed);
+        bench.line.disturb(
+            LineDisturbance { wrong_per_million: 1_500, lost_per_million: 500, ..LineDisturbance::default() },
+            seed,
+        );
         let outcome = bench.carry_out(Motion::To(60_000, PROFILE));
         repeated += bench.repeated;
         match outcome {
@@ -591,7 +592,7 @@ fn a_cut_wire_ends_the_motion_and_the_communication_time_out_stops_the_joint() {
         async |drive| motion::carry_out(&drive, Motion::Continuous(Direction::Forward, PROFILE)).await,
         |line, ms| {
             if ms == 3_000 {
-                line.disturb(Disturbance { is_cut: true, ..Disturbance::default() }, 0);
+                line.disturb(LineDisturbance { is_cut: true, ..LineDisturbance::default() }, 0);
             }
             false
         },
@@ -627,5 +628,5 @@ fn two_drives_share_a_line() {
     bench.line = SimulatedLine::new(LINE, drives);
     let ended = bench.carry_out(Motion::To(50_000, PROFILE)).unwrap();
     assert!((ended.position - 50_000).abs() < 60, "{ended:?}");
-    assert_eq!(bench.line.drive(1).unwrap().counts(), 83_443);
+    assert_eq!(bench.line.module(1).unwrap().counts(), 83_443);
 }

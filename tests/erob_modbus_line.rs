@@ -1,4 +1,4 @@
-//! Drives on a Modbus line of this machine: the master's threads, and a simulated drive behind a pseudo-terminal, in real time.
+//! Drives on a Modbus line of this machine: procedures, `takt drive`, and a simulated drive behind a pseudo-terminal, in real time.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
@@ -13,13 +13,13 @@ use nix::unistd::Pid;
 use takt::internals::family::erob_modbus::drive::{AccessError, ErobDrive};
 use takt::internals::family::erob_modbus::motion::{self, End, Motion, MotionFailure, Profile};
 use takt::internals::family::erob_modbus::registers;
-use takt::internals::link::modbus_line::{LineThread, ModbusLine};
-use takt::internals::link::serial_line::{SerialLineError, SerialSettings};
+use takt::internals::link::modbus_line::ModbusLine;
+use takt::internals::link::serial_line::{SerialLine, SerialLineError, SerialSettings};
 use takt::internals::modbus::exception::ExceptionCode;
 use takt::internals::modbus::frame::{RegisterRange, RegisterValues, Request, SlaveAddress};
 use takt::internals::modbus::line_timing::LineTiming;
-use takt::internals::modbus::master::{Answer, Repeat, RequestFailure};
-use takt::internals::procedure::{ModbusClient, ModbusSession, Procedure};
+use takt::internals::modbus::master::{Answer, Master, MasterTiming, Repeat, RequestError, RequestFailure};
+use takt::internals::procedure::{ModbusClient, ModbusSession, Procedure, ProcedureError};
 use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::internals::sim::pseudo_terminal::PseudoTerminal;
 use takt::internals::sim::serial_line::host;
@@ -27,6 +27,7 @@ use takt::sim::plant::{Encoder, JointParameters};
 
 const SLAVE: u8 = 2;
 const SETTINGS: SerialSettings = SerialSettings::new(115_200);
+const TIMING: MasterTiming = MasterTiming::new(LineTiming::new(115_200));
 
 fn drive(address: u8) -> ErobModbusDrive {
     let joint = JointParameters {
@@ -81,6 +82,47 @@ fn with_a_line<T>(work: impl FnOnce(&Path) -> T) -> T {
     })
 }
 
+/// Carries out a procedure on a line. `hear` is called for each of its events.
+fn carry_out<T: Clone, E: Clone>(
+    line: &mut ModbusLine,
+    procedure: &mut Procedure<ModbusClient, T, E>,
+    mut hear: impl FnMut(),
+) -> Result<Result<T, ProcedureError<E>>, SerialLineError> {
+    loop {
+        procedure.receive(&line.read()?);
+        let mut frames = vec![];
+        procedure.poll(line.now_ns(), &mut |frame| frames.push(frame));
+        for frame in &frames {
+            line.write(frame)?;
+        }
+        while procedure.take_event().is_some() {
+            hear();
+        }
+        if let Some(outcome) = procedure.outcome() {
+            return Ok(outcome.clone());
+        }
+    }
+}
+
+/// Sends a request to a slave, and waits for its outcome.
+fn ask(
+    line: &mut ModbusLine,
+    master: &mut Master,
+    address: u8,
+    request: Request,
+) -> Result<Answer, RequestError> {
+    master.start(slave(address), request, Repeat::Allowed).unwrap();
+    loop {
+        if let Some(frame) = master.poll(line.now_ns()) {
+            line.write(&frame).unwrap();
+        }
+        if let Some(outcome) = master.take_outcome() {
+            return outcome;
+        }
+        master.receive(&line.read().unwrap());
+    }
+}
+
 fn slave(address: u8) -> SlaveAddress {
     SlaveAddress::new(address).unwrap()
 }
@@ -89,16 +131,13 @@ fn slave(address: u8) -> SlaveAddress {
 fn a_motion_is_carried_out_over_a_line_of_this_machine() {
     let ended = with_a_line(|path| {
         let mut line = ModbusLine::open(&path.display().to_string(), &SETTINGS).unwrap();
-        let session = ModbusSession::new(ModbusClient::new(slave(SLAVE), line.master_timing()));
+        let session = ModbusSession::new(ModbusClient::new(slave(SLAVE), TIMING));
         let drive = ErobDrive::new(session.clone());
         let profile = Profile { velocity: 100_000, acceleration: 1_000_000, deceleration: 1_000_000 };
         let work = async move { motion::carry_out(&drive, Motion::To(30_000, profile)).await };
         let mut procedure = Procedure::<_, _, MotionFailure>::new(session, work);
         let mut readings = 0;
-        let outcome = line.carry_out(&mut procedure, |event| {
-            readings += usize::from(event.is_some());
-            false
-        });
+        let outcome = carry_out(&mut line, &mut procedure, || readings += 1);
         assert!(readings > 5);
         outcome.unwrap().unwrap()
     });
@@ -112,37 +151,12 @@ fn a_line_that_ends_is_told_with_its_device() {
     let path = terminal.path().display().to_string();
     let mut line = ModbusLine::open(&path, &SETTINGS).unwrap();
     drop(terminal);
-    let session = ModbusSession::new(ModbusClient::new(slave(SLAVE), line.master_timing()));
+    let session = ModbusSession::new(ModbusClient::new(slave(SLAVE), TIMING));
     let drive = ErobDrive::new(session.clone());
     let work = async move { drive.read(&registers::FAULT_CODE).await };
     let mut procedure = Procedure::<_, _, AccessError>::new(session, work);
-    let error = line.carry_out(&mut procedure, |_| false).unwrap_err();
+    let error = carry_out(&mut line, &mut procedure, || {}).unwrap_err();
     assert!(matches!(&error, SerialLineError::System { device, .. } if *device == path), "{error}");
-}
-
-#[test]
-fn one_thread_serves_the_requests_of_several_owners_for_several_slaves() {
-    with_a_line(|path| {
-        let line = ModbusLine::open(&path.display().to_string(), &SETTINGS).unwrap();
-        let (thread, handle) = LineThread::spawn(line).unwrap();
-        thread::scope(|scope| {
-            for address in [2, 3, 2, 3] {
-                let handle = handle.clone();
-                scope.spawn(move || {
-                    for _ in 0..10 {
-                        let read = Request::Read(RegisterRange::new(0, 1).unwrap());
-                        let answer = handle.ask(slave(address), read, Repeat::Allowed).unwrap();
-                        let expected = Answer::Values([u16::from(address)].into_iter().collect());
-                        assert_eq!(answer, Ok(expected));
-                    }
-                });
-            }
-        });
-        let absent = handle.ask(slave(9), Request::WriteOne { register: 0xF0, value: 0 }, Repeat::Never);
-        assert_eq!(absent.unwrap().unwrap_err().failure, RequestFailure::NoReply);
-        drop(handle);
-        thread.join().unwrap();
-    });
 }
 
 fn takt(arguments: &[&str]) -> Output {
@@ -190,6 +204,17 @@ fn takt_drive_commissions_a_drive_on_a_serial_line() {
         done(line, &["write", "profile velocity", "30 deg/s"]);
         let read = done(line, &["read", "profile velocity", "0x0060"]);
         assert_eq!((&read["objects"][0]["raw"], &read["objects"][1]["raw"]), (&43_691.into(), &0.into()));
+        assert_eq!(done(line, &["communication-timeout", "750 ms"])["communication_timeout_ms"], 750);
+        assert_eq!(done(line, &["read", "0x0002"])["objects"][0]["raw"], 750);
+        refused(line, &["communication-timeout", "5 s"], "at most 4 s");
+        done(line, &["communication-timeout", "0 ms"]);
+        done(line, &["velocity", "20 deg/s", "--duration", "0.3", "--keep-enabled"]);
+        done(line, &["emergency-stop"]);
+        assert_eq!(
+            done(line, &["info"])["velocity"].as_f64().map(|velocity| velocity.abs() < 0.01),
+            Some(true)
+        );
+        done(line, &["disable"]);
         assert_eq!(done(line, &["clear-fault"])["cleared"], 0);
         refused(line, &["zero"], "WIPES THE COUNT OF TURNS");
         done(line, &["zero", "--yes"]);
@@ -220,29 +245,7 @@ fn a_line_and_a_family_that_do_not_belong_together_are_refused() {
 }
 
 #[test]
-fn a_configuration_cannot_have_such_an_axis_yet_and_says_what_there_is() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/single-erob.toml");
-    let text = std::fs::read_to_string(path).unwrap().replace("erob-canopen", "erob-modbus");
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("turntable.toml");
-    std::fs::write(&file, text).unwrap();
-    let output = takt(&["check", file.to_str().unwrap()]);
-    let errors = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        !output.status.success() && errors.contains("`takt drive --bus serial:/dev/ttyUSB0`"),
-        "{errors}"
-    );
-}
-
-#[test]
 fn takt_sim_puts_drives_on_a_line_that_takt_drive_opens() {
-    struct Hosted(Child);
-    impl Drop for Hosted {
-        fn drop(&mut self) {
-            kill(Pid::from_raw(self.0.id() as i32), Signal::SIGTERM).unwrap();
-            self.0.wait().unwrap();
-        }
-    }
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("rs485");
     let _hosted = Hosted(
@@ -266,6 +269,117 @@ fn takt_sim_puts_drives_on_a_line_that_takt_drive_opens() {
         let errors = String::from_utf8(output.stderr).unwrap();
         assert!(!output.status.success() && errors.contains(words), "{errors}");
     }
+}
+
+/// The simulated turntable on a line, behind a pseudo-terminal.
+struct Hosted(Child);
+
+impl Hosted {
+    fn turntable(link: &Path) -> Self {
+        let mut takt = Command::new(env!("CARGO_BIN_EXE_takt"));
+        takt.args(["sim", "--serial", "erob-modbus:2", "--pty"]).arg(link).stderr(Stdio::null());
+        let hosted = Self(takt.spawn().unwrap());
+        while !link.exists() {
+            thread::sleep(Duration::from_millis(5));
+        }
+        hosted
+    }
+}
+
+impl Drop for Hosted {
+    fn drop(&mut self) {
+        kill(Pid::from_raw(self.0.id() as i32), Signal::SIGTERM).unwrap();
+        self.0.wait().unwrap();
+    }
+}
+
+/// `takt run` with the turntable beside a simulated arm, on this line.
+fn run_command(folder: &Path, link: &Path, options: &[&str]) -> Command {
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/turntable-modbus.toml");
+    let mut takt = Command::new(env!("CARGO_BIN_EXE_takt"));
+    takt.current_dir(folder)
+        .arg("run")
+        .arg(config)
+        .arg("--bus")
+        .arg(format!("table=serial:{}", link.display()));
+    takt.args(options).arg("--json").stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    takt
+}
+
+/// What is known of the drive after a run.
+fn assert_off_and_without_fault(link: &Path) {
+    let info = done(link, &["info"]);
+    assert_eq!((&info["state"], &info["error_code"]), (&"motor off".into(), &0.into()), "{info}");
+}
+
+#[test]
+fn takt_run_moves_the_turntable_on_a_line_of_this_machine_beside_the_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("rs485");
+    let _hosted = Hosted::turntable(&link);
+    let output = run_command(folder.path(), &link, &[]).output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(0), "{errors}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let position = report["axes"][2]["final_position"].as_f64().unwrap();
+    assert!(position.to_degrees().abs() < 0.5, "{report}");
+    let line = &report["buses"][1];
+    assert!(line["tx_frames"].as_u64().unwrap() > 100, "{line}");
+    assert!(line["load_percent"].as_f64().unwrap() > 5.0, "{line}");
+    assert_off_and_without_fault(&link);
+}
+
+#[test]
+fn ctrl_c_stops_the_turntable_on_its_line_in_control() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("rs485");
+    let _hosted = Hosted::turntable(&link);
+    let child = run_command(folder.path(), &link, &["--duration", "600"]).spawn().unwrap();
+    // Until the master of the line is there: nobody else may open it then.
+    let takt_has_it = || SerialLine::open(&link.display().to_string(), &SETTINGS).is_err();
+    while !takt_has_it() {
+        thread::sleep(Duration::from_millis(5));
+    }
+    thread::sleep(Duration::from_secs(4));
+    kill(Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
+    let output = child.wait_with_output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(130), "{errors}");
+    assert_off_and_without_fault(&link);
+}
+
+#[test]
+fn a_line_is_refused_while_another_takt_commands_it_and_is_taken_over_in_control() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("rs485");
+    let _hosted = Hosted::turntable(&link);
+    let first = run_command(folder.path(), &link, &["--duration", "600"]).spawn().unwrap();
+    thread::sleep(Duration::from_secs(4));
+    let refused = run_command(folder.path(), &link, &[]).output().unwrap();
+    let errors = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(2), "{errors}");
+    let second = run_command(folder.path(), &link, &["--take-over"]).output().unwrap();
+    let errors = String::from_utf8_lossy(&second.stderr).into_owned();
+    assert_eq!(second.status.code(), Some(0), "{errors}");
+    let first = first.wait_with_output().unwrap();
+    assert_eq!(first.status.code(), Some(130), "{}", String::from_utf8_lossy(&first.stderr));
+    assert_off_and_without_fault(&link);
+}
+
+#[test]
+fn a_line_that_is_unplugged_stops_the_group_with_one_reason() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = folder.path().join("rs485");
+    let hosted = Hosted::turntable(&link);
+    let child = run_command(folder.path(), &link, &["--duration", "600"]).spawn().unwrap();
+    thread::sleep(Duration::from_secs(4));
+    drop(hosted);
+    let output = child.wait_with_output().unwrap();
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["stop"].to_string().contains("table"), "{}", report["stop"]);
+    assert!(report["unreached"].to_string().contains("table"), "{report}");
 }
 
 fn python(script: &str, line: &Path) -> Command {
@@ -310,9 +424,10 @@ fn the_master_reads_and_writes_a_slave_of_pymodbus() {
         let mut said = String::new();
         BufReader::new(server.stdout.take().unwrap()).read_line(&mut said).unwrap();
         assert_eq!(said, "ready\n");
-        let (thread, handle) =
-            LineThread::spawn(ModbusLine::open(&paths[1].display().to_string(), &SETTINGS).unwrap()).unwrap();
-        let ask = |request: Request| handle.ask(slave(7), request, Repeat::Allowed).unwrap();
+        let mut line = ModbusLine::open(&paths[1].display().to_string(), &SETTINGS).unwrap();
+        let mut master = Master::new(TIMING);
+        let mut ask_it = |address, request| ask(&mut line, &mut master, address, request);
+        let mut ask = |request: Request| ask_it(7, request);
         let read = |start, count| Request::Read(RegisterRange::new(start, count).unwrap());
         for (start, count) in [(0, 1), (5, 125), (100, 100)] {
             let values = (start..start + count).collect();
@@ -326,9 +441,7 @@ fn the_master_reads_and_writes_a_slave_of_pymodbus() {
         assert_eq!(ask(read(10, 3)), Ok(Answer::Values(written)));
         let refusal = ask(read(1_000, 1)).unwrap_err().failure;
         assert_eq!(refusal, RequestFailure::Refused(ExceptionCode::ILLEGAL_ADDRESS));
-        let other = handle.ask(slave(8), read(0, 1), Repeat::Never).unwrap();
-        drop(handle);
-        thread.join().unwrap();
+        let other = ask_it(8, read(0, 1));
         server.kill().unwrap();
         server.wait().unwrap();
         // A server that knows of no such device says so, or is silent.

@@ -144,6 +144,6 @@ fn talk_to_drive(mut input: Input<'_>) {
         let taken = evaluate(&request, slave(), &reply);
         assert!(matches!(taken, Received::Whole(Ok(_))), "{request:?}: {reply:02X?}");
     }
-    let velocity = line.drive(0).expect("the drive is there").velocity();
+    let velocity = line.module(0).expect("the drive is there").velocity();
     assert!(velocity.is_finite());
 }

@@ -69,7 +69,7 @@ struct Rig {
 
 fn axis() -> AxisParameters {
     AxisParameters {
-        exchange: Exchange::OffCycle,
+        exchange: Exchange::OffCycle { report_cycles: 1 },
         feedback_since: FeedbackSince::CommandPhase,
         ..axis_in(ControlLaw::Position, 0, 1)
     }

@@ -1,5 +1,6 @@
 //! `takt check`: everything that can be known before motion.
 
+mod lines;
 mod supervision;
 mod text;
 mod unattended;
@@ -15,6 +16,7 @@ use takt_rt::ModeCondition;
 use super::exit::Exit;
 use super::print;
 use super::usage_error::UsageError;
+use lines::LineCheck;
 use supervision::SupervisionCheck;
 use unattended::Unattended;
 
@@ -56,6 +58,8 @@ struct Check {
     groups: Vec<GroupCheck>,
     axes: Vec<AxisCheck>,
     buses: Vec<BusSchedule>,
+    /// Those of the buses that are serial lines.
+    lines: Vec<LineCheck>,
     /// What is possible and implausible.
     warnings: Vec<String>,
     /// What axes have to do without, because their drives lack it.
@@ -162,6 +166,7 @@ impl Check {
             groups: config.groups.iter().map(|group| GroupCheck::of(config, group)).collect(),
             axes: config.axes.iter().map(|axis| AxisCheck::of(axis, config)).collect(),
             buses,
+            lines: LineCheck::all(config),
             warnings: config.warnings().iter().map(ToString::to_string).collect(),
             losses: config.losses(),
         }

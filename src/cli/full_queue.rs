@@ -45,7 +45,7 @@ pub fn cause(config: &Config, snapshot: &Snapshot) -> Option<String> {
 fn queue_length(bus: &Bus) -> Option<u32> {
     match &bus.interface {
         Interface::SocketCan(interface) => transmit_queue_length(interface),
-        Interface::Simulated | Interface::Slcan(_) | Interface::Converter(_) => None,
+        Interface::Simulated | Interface::Slcan(_) | Interface::Converter(_) | Interface::Serial(_) => None,
     }
 }
 

@@ -10,10 +10,11 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use crate::config::{Config, Interface, Master};
+use crate::config::{Axis, Config, Interface, Master};
 use crate::controller::realtime_thread::StartError;
 use crate::controller::session::{self, Session, SessionError, SessionOptions};
 use crate::controller::{Interrupt, Outcome, Progress};
+use crate::family;
 use crate::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
 use crate::schedule;
 use crate::telemetry::{
@@ -198,10 +199,16 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
         stop: stop_of(session),
     };
     let report = RunReport::new(&session.log, &outcome);
-    let named = session.unreached.iter().filter_map(|axis| config.axes.get(*axis));
-    let unreached: Vec<&str> = named.map(|axis| axis.name.as_str()).collect();
-    if !unreached.is_empty() {
-        say!("takt: {}", unreachable(&unreached, &config.master));
+    let named: Vec<&Axis> = session.unreached.iter().filter_map(|axis| config.axes.get(*axis)).collect();
+    let (on_line, on_bus): (Vec<&Axis>, Vec<&Axis>) =
+        named.iter().partition(|axis| axis.drive.is_on_serial_line);
+    let unreached: Vec<&str> = named.iter().map(|axis| axis.name.as_str()).collect();
+    let on_bus: Vec<&str> = on_bus.iter().map(|axis| axis.name.as_str()).collect();
+    if !on_bus.is_empty() {
+        say!("takt: {}", unreachable(&on_bus, &by_themselves(&config.master)));
+    }
+    for axis in on_line {
+        say!("takt: {}", unreachable(&[axis.name.as_str()], &by_itself(axis, config)));
     }
     let drive_errors = drive_errors(session);
     drive_errors.iter().for_each(|DriveError { axis, error, cure }| {
@@ -250,15 +257,31 @@ fn stop_of(session: &Session) -> Option<StopReason> {
     }
 }
 
-/// The warning about drives that no longer answered.
-fn unreachable(axes: &[&str], master: &Master) -> String {
-    let by_themselves = match master.heartbeat_ns {
+/// What a drive on a serial line does without its master.
+fn by_itself(axis: &Axis, config: &Config) -> String {
+    let watchdog_ns =
+        family::of(&axis.drive).off_cycle_budget(axis, config).and_then(|budget| budget.watchdog_ns);
+    watchdog_ns.map_or("nothing stops it, since its communication time-out is off".to_owned(), |ns| {
+        format!(
+            "its communication time-out is over {} ms after the last request that it has heard",
+            ns / 1_000_000
+        )
+    })
+}
+
+/// What drives on a CAN bus do without their master.
+fn by_themselves(master: &Master) -> String {
+    match master.heartbeat_ns {
         Some(_) => format!(
             "each stops by itself {} ms after the last heartbeat that it has heard",
             master.heartbeat_timeout_ns / 1_000_000
         ),
         None => "nothing stops them, since `heartbeat` is off".to_owned(),
-    };
+    }
+}
+
+/// The warning about drives that no longer answered.
+fn unreachable(axes: &[&str], by_themselves: &str) -> String {
     format!(
         "{}: no answer in the end, so it is not known whether they have stopped; {by_themselves}. Make sure of that before you come near, \
          and switch their power off before you repair the bus",

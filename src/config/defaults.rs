@@ -40,6 +40,8 @@ pub const HEARTBEAT_TIMEOUT_NS: u64 = 500_000_000;
 
 /// `[[bus]] bit_rate`
 pub const BIT_RATE: u32 = 1_000_000;
+/// `[[bus]] bit_rate` of a serial line
+pub const LINE_BIT_RATE: u32 = 115_200;
 /// `[[bus]] restart_ms`
 pub const RESTART_MS: u32 = 100;
 /// `[[bus]] service_frames_per_cycle`

@@ -78,6 +78,8 @@ pub struct DriveFacts {
     pub node_axis: u8,
     /// How the drives are spoken to.
     pub protocol: Protocol,
+    /// Whether the drives are on a serial line, and not on a CAN bus.
+    pub is_on_serial_line: bool,
     /// How the drives show that they live, beside their feedback.
     pub error_control: ErrorControl,
     /// Whether the drives can watch the heartbeat of the controller (object 1016).
@@ -249,6 +251,7 @@ impl DriveFacts {
             may_ignore_sync: false,
             node_axis: 1,
             protocol: Protocol::Canopen,
+            is_on_serial_line: false,
             error_control: ErrorControl::Heartbeat { fixed_ms: None },
             consumes_heartbeat: true,
             sends_emergencies: true,
@@ -346,6 +349,11 @@ pub trait ConfiguredFamily: Sync {
     /// The drive of an axis. A family with keys of its own reads them here; what is wrong with them is reported to `keys`, and
     /// the answer is `None`.
     fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily>;
+
+    /// Whether its drives are on a serial line, and not on a CAN bus.
+    fn is_on_serial_line(&self) -> bool {
+        false
+    }
 }
 
 /// The table of an axis, for the keys that belong to the family of its drive.

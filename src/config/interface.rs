@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use thiserror::Error;
 
-use super::model::{CanLine, Interface};
+use super::model::{CanLine, Interface, SerialDevice};
 use crate::printable::excerpt;
 
 /// The longest name of a network interface of Linux (IFNAMSIZ less the final zero).
@@ -21,8 +21,9 @@ const BAUD_RATES: RangeInclusive<u32> = 9_600..=12_000_000;
 impl FromStr for Interface {
     type Err = InterfaceError;
 
-    /// `sim`, the name of a SocketCAN interface (`can0`, `vcan0`), an SLCAN adapter: `slcan:/dev/ttyACM0`,
-    /// `slcan:/dev/ttyUSB0@2000000`, or a transparent converter: `rs485-canfd:/dev/ttyUSB0`.
+    /// `sim`, the name of a SocketCAN interface (`can0`, `vcan0`), an SLCAN adapter (`slcan:/dev/ttyACM0`,
+    /// `slcan:/dev/ttyUSB0@2000000`), a transparent converter (`rs485-canfd:/dev/ttyUSB0`), or a serial line with drives on it
+    /// (`serial:/dev/ttyUSB0`, `serial:/dev/ttyUSB0@19200`).
     fn from_str(text: &str) -> Result<Self, InterfaceError> {
         if text == "sim" {
             return Ok(Self::Simulated);
@@ -32,6 +33,9 @@ impl FromStr for Interface {
         }
         if let Some(line) = text.strip_prefix("rs485-canfd:") {
             return line.parse().map(Self::Converter);
+        }
+        if let Some(line) = text.strip_prefix("serial:") {
+            return line.parse().map(Self::Serial);
         }
         let is_sound = (1..=LONGEST_NAME).contains(&text.len())
             && !matches!(text, "." | "..")
@@ -58,22 +62,45 @@ impl FromStr for CanLine {
 
     /// `/dev/ttyACM0`, or with a baud rate `/dev/ttyUSB0@2000000`.
     fn from_str(text: &str) -> Result<Self, InterfaceError> {
-        let (device, baud_rate) = match text.rsplit_once('@') {
-            Some((device, rate)) => {
-                let baud_rate = rate.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
-                (device, baud_rate.ok_or_else(|| InterfaceError::BaudRate { given: excerpt(rate) })?)
-            }
-            None => (text, USUAL_BAUD_RATE),
-        };
-        let is_sound = device.starts_with('/')
-            && !device.ends_with('/')
-            && device.len() <= LONGEST_PATH
-            && !device.contains(|c: char| c.is_control() || c == '@');
-        if is_sound {
-            Ok(Self { device: device.to_owned(), baud_rate })
-        } else {
-            Err(InterfaceError::Device { given: excerpt(device) })
+        let (device, baud_rate) = device_and_rate(text)?;
+        Ok(Self { device, baud_rate: baud_rate.unwrap_or(USUAL_BAUD_RATE) })
+    }
+}
+
+impl FromStr for SerialDevice {
+    type Err = InterfaceError;
+
+    /// `/dev/ttyUSB0`, or with a bit rate `/dev/ttyUSB0@19200`.
+    fn from_str(text: &str) -> Result<Self, InterfaceError> {
+        let (device, bit_rate) = device_and_rate(text)?;
+        Ok(Self { device, bit_rate })
+    }
+}
+
+/// The path of a device, and the baud rate behind it.
+fn device_and_rate(text: &str) -> Result<(String, Option<u32>), InterfaceError> {
+    let (device, baud_rate) = match text.rsplit_once('@') {
+        Some((device, rate)) => {
+            let baud_rate = rate.parse().ok().filter(|rate| BAUD_RATES.contains(rate));
+            (device, Some(baud_rate.ok_or_else(|| InterfaceError::BaudRate { given: excerpt(rate) })?))
         }
+        None => (text, None),
+    };
+    let is_sound = device.starts_with('/')
+        && !device.ends_with('/')
+        && device.len() <= LONGEST_PATH
+        && !device.contains(|c: char| c.is_control() || c == '@');
+    if is_sound {
+        Ok((device.to_owned(), baud_rate))
+    } else {
+        Err(InterfaceError::Device { given: excerpt(device) })
+    }
+}
+
+impl fmt::Display for SerialDevice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.device)?;
+        self.bit_rate.map_or(Ok(()), |rate| write!(f, "@{rate}"))
     }
 }
 
@@ -91,6 +118,7 @@ impl fmt::Display for Interface {
             Self::SocketCan(name) => f.write_str(name),
             Self::Slcan(line) => write!(f, "slcan:{line}"),
             Self::Converter(line) => write!(f, "rs485-canfd:{line}"),
+            Self::Serial(line) => write!(f, "serial:{line}"),
         }
     }
 }
@@ -124,19 +152,20 @@ impl InterfaceError {
     pub fn help(&self) -> String {
         match self {
             Self::Device { .. } => {
-                "name the device by its whole path: \"slcan:/dev/ttyACM0\", or \"slcan:/dev/serial/by-id/…\", which stays \
-                 the same when adapters are plugged in another order"
+                "name the device by its whole path: \"slcan:/dev/ttyACM0\", \"serial:/dev/ttyUSB0\", or \
+                 \"serial:/dev/serial/by-id/…\", which stays the same when adapters are plugged in another order"
                     .to_owned()
             }
             Self::BaudRate { .. } => format!(
-                "a whole number of {} to {} behind the path: \"slcan:/dev/ttyUSB0@2000000\"; without it the line has \
-                 {USUAL_BAUD_RATE} baud",
+                "a whole number of {} to {} behind the path: \"slcan:/dev/ttyUSB0@2000000\", \"serial:/dev/ttyUSB0@19200\"; \
+                 without it the line of an SLCAN adapter has {USUAL_BAUD_RATE} baud, and one with drives the `bit_rate` of its bus",
                 BAUD_RATES.start(),
                 BAUD_RATES.end()
             ),
             Self::Name { .. } => {
                 "\"sim\", a name of at most 15 letters, digits and -_. as `ip link` shows it (\"can0\", \"vcan0\"), or \
-                 \"slcan:\" and the path of an adapter on a serial line; \"rs485-canfd:\" and that of a converter between RS-485 and CAN FD"
+                 \"slcan:\" and the path of an adapter on a serial line; \"rs485-canfd:\" and that of a converter between RS-485 and CAN FD; \
+                 \"serial:\" and that of a line with drives on it"
                     .to_owned()
             }
         }
@@ -149,9 +178,15 @@ mod tests {
 
     #[test]
     fn interfaces_are_read_and_shown_alike() {
-        for text in
-            ["sim", "can0", "vcan12", "slcan0", "can-left_1.0", "slcan:/dev/ttyACM0", "slcan:/dev/ttyS1@9600"]
-        {
+        for text in [
+            "sim",
+            "can0",
+            "slcan0",
+            "can-left_1.0",
+            "slcan:/dev/ttyACM0",
+            "slcan:/dev/ttyS1@9600",
+            "serial:/dev/a@19200",
+        ] {
             assert_eq!(text.parse::<Interface>().unwrap().to_string(), text);
         }
         assert_eq!("sim".parse(), Ok(Interface::Simulated));
@@ -163,6 +198,15 @@ mod tests {
             |device: &str, baud_rate| Interface::Slcan(CanLine { device: device.to_owned(), baud_rate });
         assert_eq!("slcan:/dev/ttyACM0".parse(), Ok(line("/dev/ttyACM0", 1_000_000)));
         assert_eq!("slcan:/dev/ttyUSB0@2000000".parse(), Ok(line("/dev/ttyUSB0", 2_000_000)));
+    }
+
+    #[test]
+    fn a_line_with_drives_is_named_by_its_device_and_may_name_its_bit_rate() {
+        let line = |bit_rate| Interface::Serial(SerialDevice { device: "/dev/ttyUSB0".to_owned(), bit_rate });
+        assert_eq!("serial:/dev/ttyUSB0".parse(), Ok(line(None)));
+        assert_eq!("serial:/dev/ttyUSB0@19200".parse(), Ok(line(Some(19_200))));
+        assert!(matches!("serial:ttyUSB0".parse::<Interface>(), Err(InterfaceError::Device { .. })));
+        assert!(matches!("serial:/dev/a@x".parse::<Interface>(), Err(InterfaceError::BaudRate { .. })));
     }
 
     #[test]

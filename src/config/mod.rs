@@ -79,6 +79,9 @@ impl Config {
                     return Err(OverrideError::NotCarried { interface, reason });
                 }
                 if let Some(bus) = self.buses.get_mut(bus) {
+                    if let Interface::Serial(SerialDevice { bit_rate: Some(rate), .. }) = &interface {
+                        bus.bit_rate = *rate;
+                    }
                     bus.interface = interface;
                 }
                 Ok(())

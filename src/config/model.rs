@@ -83,6 +83,22 @@ impl Config {
         self.groups.iter().position(|group| group.axes.contains(&axis)).unwrap_or(0)
     }
 
+    /// Whether a bus is a serial line, and no CAN bus: by its interface, or, where it is simulated, by the drives on it.
+    pub fn is_serial_line(&self, bus: usize) -> bool {
+        match self.buses.get(bus).map(|bus| &bus.interface) {
+            Some(Interface::Serial(_)) => true,
+            Some(Interface::Simulated) => {
+                self.axes.iter().any(|axis| axis.bus == bus && axis.drive.is_on_serial_line)
+            }
+            Some(Interface::SocketCan(_) | Interface::Slcan(_) | Interface::Converter(_)) | None => false,
+        }
+    }
+
+    /// The axes of a bus, in the order of the configuration.
+    pub fn axes_of_bus(&self, bus: usize) -> impl Iterator<Item = &Axis> {
+        self.axes.iter().filter(move |axis| axis.bus == bus)
+    }
+
     /// The cycle of a bus: as the controller's, or a multiple of it. A bus that is not there has the controller's.
     pub fn bus_cycle(&self, bus: usize) -> Cycle {
         let divider = self.buses.get(bus).map_or(1, |bus| bus.divider.max(1));
@@ -143,7 +159,7 @@ pub struct Bus {
     /// Cycles of the controller in one cycle of this bus (SYNC, feedback, set-points). Default 1: a file gives the
     /// period.
     pub divider: u32,
-    /// Bit rate (bit/s) of classic frames and of the arbitration phase. Default 1 Mbit/s.
+    /// Bit rate (bit/s) of classic frames and of the arbitration phase. Default 1 Mbit/s; 115200 bit/s on a serial line.
     pub bit_rate: u32,
     /// Bit rate (bit/s) of the data phase of CAN FD frames; `None`, the default, on a classic bus.
     pub data_bit_rate: Option<u32>,
@@ -183,6 +199,17 @@ pub enum Interface {
     Slcan(CanLine),
     /// A transparent converter between RS-485 and CAN FD on a serial line.
     Converter(CanLine),
+    /// A serial line with drives on it, and no CAN bus.
+    Serial(SerialDevice),
+}
+
+/// A serial line with drives on it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SerialDevice {
+    /// The path of the device: `/dev/ttyUSB0`.
+    pub device: String,
+    /// bit/s, where it is named with the device; then it is that of the bus.
+    pub bit_rate: Option<u32>,
 }
 
 /// The serial line of an adapter or a converter, behind which a bus is.

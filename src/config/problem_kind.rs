@@ -48,6 +48,12 @@ pub enum ProblemKind {
         /// When it means something.
         belongs: &'static str,
     },
+    /// A key of CAN buses on a serial line.
+    #[error("`{key}` means nothing on a serial line")]
+    NotOnALine {
+        /// The key.
+        key: String,
+    },
     /// A key of an earlier version.
     #[error("`{key}` has been replaced")]
     Replaced {
@@ -310,6 +316,7 @@ impl ProblemKind {
                 format!("allowed here: {}", known.join(", "))
             }
             Self::Ignored { belongs, .. } => (*belongs).into(),
+            Self::NotOnALine { .. } => "it belongs to CAN buses: leave it out".into(),
             Self::Replaced { by, .. } => format!("write {by}"),
             Self::MissingKey { says, .. } => says.clone().into_owned(),
             Self::WrongType { expected, .. } => format!("write {expected}"),
@@ -384,7 +391,7 @@ impl ProblemKind {
         match self {
             Self::NotText | Self::Syntax { .. } => "here",
             Self::UnknownKey { .. } => "not known here",
-            Self::Ignored { .. } => "means nothing here",
+            Self::Ignored { .. } | Self::NotOnALine { .. } => "means nothing here",
             Self::Replaced { .. } => "is not a key any more",
             Self::MissingKey { .. } => "missing in here",
             Self::WrongType { .. } => "wrong type",

@@ -23,6 +23,8 @@ pub const SPIN_GUARD_AT_MOST: f64 = 0.5;
 
 /// Node IDs of CANopen (CiA 301, 7.4.1).
 pub const NODE_ID: Range<i64> = 1..128;
+/// The addresses of slaves on a serial line (Modbus over Serial Line 1.02, 2.2).
+pub const LINE_ADDRESS: Range<i64> = 1..248;
 /// The axes of a node (CiA 402-2, multi-axis devices).
 pub const NODE_AXIS: Range<i64> = 1..9;
 /// Periods of heartbeats, in seconds; object 1017 has 16 bits.

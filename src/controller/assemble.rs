@@ -155,10 +155,11 @@ fn axis_parameters(
         Ok(CommandPdo { pdo, transmission: plan.transmission, axes: plan.axes })
     };
     let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&of_first_axis(plan, axis))?));
-    let family = family::of(&axis.drive);
-    let exchange = match family.field_drive(axis) {
+    let exchange = match family::of(&axis.drive).field_drive(axis) {
         Some(fields) => Exchange::BitFields(fields),
-        None if family.off_cycle(axis, config).is_some() => Exchange::OffCycle,
+        None if family::is_off_cycle(axis, config) => {
+            Exchange::OffCycle { report_cycles: family::report_cycles(axis, config) }
+        }
         None => Exchange::Pdos(Pdos {
             commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
             feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,
@@ -169,7 +170,7 @@ fn axis_parameters(
         Exchange::Pdos(_) => feedback_since(&data.feedback),
         Exchange::BitFields(_) if reports_by_itself(axis) => FeedbackSince::CommandPhase,
         Exchange::BitFields(_) => FeedbackSince::SetPoint,
-        Exchange::OffCycle => FeedbackSince::CommandPhase,
+        Exchange::OffCycle { .. } => FeedbackSince::CommandPhase,
     };
     Ok(AxisParameters {
         bus: u8::try_from(axis.bus).unwrap_or(u8::MAX),

@@ -4,6 +4,7 @@ mod arrival;
 pub mod assemble;
 mod buses;
 mod handle;
+mod lines;
 mod off_cycle;
 mod outcome;
 mod point_check;
@@ -21,6 +22,7 @@ pub use handle::{
     MotionId, MoveOptions, Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress,
     VirtualController, WaitError,
 };
+pub use lines::{LinePort, Lines, SharedLine};
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use point_check::{PointRefusal, check_point};
 pub use program::{ProgramRunner, ProgramStep};

@@ -2,6 +2,7 @@
 
 use takt_rt::{Frame, Snapshot};
 
+use super::lines::Lines;
 use crate::channels::HostSide;
 use crate::config::Config;
 use crate::family::{self, OffCycleDrive, OffCycleTarget};
@@ -9,6 +10,7 @@ use crate::family::{self, OffCycleDrive, OffCycleTarget};
 /// Those drives, each with its axis.
 pub(super) struct OffCycleDrives {
     drives: Vec<OfAxis>,
+    lines: Lines,
 }
 
 struct OfAxis {
@@ -20,15 +22,21 @@ struct OfAxis {
 
 impl OffCycleDrives {
     pub(super) fn new(config: &Config) -> Self {
-        let group_of = |axis: usize| {
-            let is_in = |group: &usize| config.axes_of_group(*group).contains(&axis);
-            (0..config.groups.len()).find(is_in).unwrap_or(0)
-        };
         let drives = config.axes.iter().enumerate().filter_map(|(axis, own)| {
             let drive = family::of(&own.drive).off_cycle(own, config)?;
-            Some(OfAxis { axis, group: group_of(axis), bus: own.bus, drive })
+            Some(OfAxis { axis, group: config.group_of_axis(axis), bus: own.bus, drive })
         });
-        Self { drives: drives.collect() }
+        Self { drives: drives.collect(), lines: Lines::simulated(config) }
+    }
+
+    /// With these lines.
+    pub(super) fn set_lines(&mut self, lines: Lines) {
+        self.lines = lines;
+    }
+
+    /// The serial lines.
+    pub(super) const fn lines(&self) -> &Lines {
+        &self.lines
     }
 
     /// Takes a frame that is no process data.
@@ -52,5 +60,6 @@ impl OffCycleDrives {
                 host.report_off_cycle(axis, report);
             }
         }
+        self.lines.poll(now_ns, snapshot, host);
     }
 }

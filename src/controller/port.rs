@@ -6,6 +6,7 @@ use takt_rt::linux::{SlcanPort, SocketCanPort, TransparentPort};
 use takt_rt::{BusHealth, BusPort, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 use super::buses::socket_options;
+use super::lines::LinePort;
 use crate::config::Config;
 use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
 use crate::link::trace::{Trace, TracedPort, traced};
@@ -26,6 +27,8 @@ pub enum Port {
     Slcan(Box<SlcanPort>),
     /// A transparent converter between RS-485 and CAN FD on a serial line of this machine.
     Converter(Box<TransparentPort>),
+    /// A serial line, whose drives are spoken to outside of the cycle.
+    Line(Box<LinePort>),
     /// Any port whose frames are copied to the logger.
     Traced(Box<TracedPort<Port>>),
     /// Any port with injected faults.
@@ -49,7 +52,7 @@ impl Port {
     pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
         match self {
             Self::Simulated(bus) => Some(bus),
-            Self::SocketCan(_) | Self::Slcan(_) | Self::Converter(_) => None,
+            Self::SocketCan(_) | Self::Slcan(_) | Self::Converter(_) | Self::Line(_) => None,
             Self::Traced(port) => port.inner_mut().simulated_mut(),
             Self::Faulty(port) => port.inner_mut().simulated_mut(),
         }
@@ -100,6 +103,7 @@ impl BusPort for Port {
             Self::SocketCan(port) => port.send(now_ns, frames),
             Self::Slcan(port) => port.send(now_ns, frames),
             Self::Converter(port) => port.send(now_ns, frames),
+            Self::Line(port) => port.send(now_ns, frames),
             Self::Traced(port) => port.send(now_ns, frames),
             Self::Faulty(port) => port.send(now_ns, frames),
         }
@@ -115,6 +119,7 @@ impl BusPort for Port {
                 Self::Simulated(port) => **taken = port.send(now_ns, frames),
                 Self::Slcan(port) => **taken = port.send(now_ns, frames),
                 Self::Converter(port) => **taken = port.send(now_ns, frames),
+                Self::Line(port) => **taken = port.send(now_ns, frames),
                 Self::Faulty(port) => **taken = port.send(now_ns, frames),
             }
         }
@@ -132,6 +137,7 @@ impl BusPort for Port {
             Self::SocketCan(port) => port.receive(now_ns, batch),
             Self::Slcan(port) => port.receive(now_ns, batch),
             Self::Converter(port) => port.receive(now_ns, batch),
+            Self::Line(port) => port.receive(now_ns, batch),
             Self::Traced(port) => port.receive(now_ns, batch),
             Self::Faulty(port) => port.receive(now_ns, batch),
         }
@@ -143,6 +149,7 @@ impl BusPort for Port {
             Self::SocketCan(port) => port.unconfirmed(now_ns),
             Self::Slcan(port) => port.unconfirmed(now_ns),
             Self::Converter(port) => port.unconfirmed(now_ns),
+            Self::Line(port) => port.unconfirmed(now_ns),
             Self::Traced(port) => port.unconfirmed(now_ns),
             Self::Faulty(port) => port.unconfirmed(now_ns),
         }
@@ -154,6 +161,7 @@ impl BusPort for Port {
             Self::SocketCan(port) => port.health(),
             Self::Slcan(port) => port.health(),
             Self::Converter(port) => port.health(),
+            Self::Line(port) => port.health(),
             Self::Traced(port) => port.health(),
             Self::Faulty(port) => port.health(),
         }
@@ -176,6 +184,7 @@ impl Injectable for Port {
                 port.send(now_ns, &[*frame]);
                 Delivery::ToOthers
             }
+            Self::Line(port) => port.send_foreign(now_ns, frame),
             Self::Traced(port) => port.send_foreign(now_ns, frame),
             Self::Faulty(port) => port.send_foreign(now_ns, frame),
         }
@@ -185,6 +194,7 @@ impl Injectable for Port {
         match self {
             Self::Simulated(port) => port.inject(node, effect, is_present),
             Self::SocketCan(_) | Self::Slcan(_) | Self::Converter(_) => Err(InjectError::NotSimulated),
+            Self::Line(port) => port.inject(node, effect, is_present),
             Self::Traced(port) => port.inject(node, effect, is_present),
             Self::Faulty(port) => port.inject(node, effect, is_present),
         }

@@ -11,6 +11,7 @@ use takt_rt::{Clock, Request, SlotPlan, Snapshot, StopCategory};
 use tracing::{info, warn};
 
 use super::assemble::{self, AssembleError};
+use super::lines::Lines;
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::port::Port;
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
@@ -185,12 +186,14 @@ fn lead_as_owner(
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = assemble::engine(config)?;
-    let (ports, traces) = open_ports(config, options.fault_injector.as_deref())?;
+    let lines = Lines::open(config)?;
+    let (ports, traces) = open_ports(config, &lines, options.fault_injector.as_deref())?;
     let (rt, mut host, log) = channels(&ChannelSizes::of(config));
     let mut supervisor = match remote {
         Some(_) => Supervisor::serving(config),
         None => Supervisor::new(config, options.duration_ns),
-    };
+    }
+    .with_lines(lines);
 
     let directory = |is_wanted: bool| {
         is_wanted.then(|| RecordingDestination::Directory(config.telemetry.directory.clone()))
@@ -278,6 +281,7 @@ fn lead_as_owner(
         sleep_alignment::sleep(PAUSE, config.cycle.period_ns);
     }
     let ended = running.join();
+    supervisor.close_lines();
     // The ports are closed with the thread. What is left to be done here does not concern the buses.
     drop(ownership);
     if ended.is_none() {
@@ -313,13 +317,17 @@ fn lead_as_owner(
 
 fn open_ports(
     config: &Config,
+    lines: &Lines,
     fault_injector: Option<&FaultInjector>,
 ) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
     let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
-        let port = Port::open(config, index)?;
+        let port = match lines.port(index) {
+            Some(line) => Port::Line(Box::new(line)),
+            None => Port::open(config, index)?,
+        };
         let (name, interface, bit_rate) = (bus.name.as_str(), bus.interface.to_string(), bus.bit_rate);
         info!(target: "takt::bus", bus = name, interface, bit_rate, "{name}: opened on {interface}");
         let port = match fault_injector {

@@ -18,6 +18,7 @@ use takt_rt::{
 use tracing::{info, warn};
 
 use super::arrival::{ARRIVAL_NS, Arrival};
+use super::lines::Lines;
 use super::off_cycle::OffCycleDrives;
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::program::{ProgramProgress, ProgramRunner, ProgramStep};
@@ -29,6 +30,8 @@ use crate::telemetry::BusReport;
 
 /// A stage must be completed within this time. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
+/// The drives of serial lines have this time for the last requests, of which a silent one gets one every 500 ms.
+const LINES_NS: u64 = 1_000_000_000;
 /// The drives settle on their last set-point for this time, before they are disabled and the brakes engage.
 const SETTLE_NS: u64 = 300_000_000;
 
@@ -128,6 +131,23 @@ impl Supervisor {
             is_serving: false,
             buses: config.buses.iter().map(|bus| (bus.name.clone(), BusState::default())).collect(),
         }
+    }
+
+    /// The same run on these serial lines. Without them, the drives of lines are simulated.
+    #[must_use]
+    pub fn with_lines(mut self, lines: Lines) -> Self {
+        self.off_cycle.set_lines(lines);
+        self
+    }
+
+    /// The serial lines.
+    pub fn lines(&self) -> &Lines {
+        self.off_cycle.lines()
+    }
+
+    /// Ends the serial lines: their drives are disabled, if they are not yet.
+    pub(super) fn close_lines(&mut self) {
+        self.off_cycle.set_lines(Lines::default());
     }
 
     /// A run without a program: the group is brought up and enabled, and then executes the requests of clients until it is
@@ -430,7 +450,9 @@ impl Supervisor {
     fn shut_down(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
         self.shutdown.poll(now_ns, &mut service_sender(host));
         let outcome = self.shutdown.outcome();
-        if outcome.is_some() || elapsed_ns > STAGE_TIMEOUT_NS {
+        let unsettled = self.off_cycle.lines().unsettled();
+        let is_awaited = !unsettled.is_empty() && elapsed_ns <= LINES_NS;
+        if (outcome.is_some() && !is_awaited) || elapsed_ns > STAGE_TIMEOUT_NS {
             match outcome {
                 Some(Err(error)) if !self.facts.is_empty() => {
                     let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
@@ -442,6 +464,7 @@ impl Supervisor {
                 }
                 _ => {}
             }
+            self.unreached.extend(unsettled);
             self.request(Request::Sync(false));
             self.request(Request::Shutdown);
             self.enter(Stage::Done, now_ns);

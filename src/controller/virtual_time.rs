@@ -6,6 +6,7 @@ use std::sync::Arc;
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, Nanoseconds, Snapshot, Wake};
 
 use super::assemble::{self, AssembleError};
+use super::lines::{Lines, SharedLine};
 use super::outcome::{Interrupt, Outcome};
 use super::port::Port;
 use super::supervisor::Supervisor;
@@ -125,9 +126,14 @@ impl VirtualRun<Port> {
         fault_injector: Arc<FaultInjector>,
     ) -> Result<(Self, LogSide), AssembleError> {
         config.validate()?;
-        let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
+        let lines = Lines::simulated(config);
+        let simulated = |bus| match lines.port(bus) {
+            Some(line) => Port::Line(Box::new(line)),
+            None => Port::Simulated(Box::new(SimulatedBus::new(config, bus))),
+        };
         let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
-        let (run, log) = Self::new(config, ports)?;
+        let supervisor = Supervisor::new(config, None).with_lines(lines);
+        let (run, log) = Self::with_supervisor(supervisor, config, ports)?;
         Ok((Self { fault_injector: Some(fault_injector), ..run }, log))
     }
 }
@@ -246,6 +252,11 @@ impl<P: BusPort> VirtualRun<P> {
     /// The present time.
     pub(crate) const fn now_ns(&self) -> Nanoseconds {
         self.clock.now_ns
+    }
+
+    /// The simulated devices of a serial line, to observe its drives or to disturb them; `None` if the bus is none.
+    pub fn line(&self, bus: usize) -> Option<SharedLine> {
+        self.supervisor.lines().devices(bus)
     }
 
     /// The clock, to make it late.

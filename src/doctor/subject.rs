@@ -44,7 +44,9 @@ impl Subject {
                 data_bit_rate: bus.data_bit_rate,
                 restart_ms: bus.restart_ms,
             }),
-            Interface::Simulated | Interface::Slcan(_) | Interface::Converter(_) => None,
+            Interface::Simulated | Interface::Slcan(_) | Interface::Converter(_) | Interface::Serial(_) => {
+                None
+            }
         };
         Self {
             period_ns: config.map_or(usual.period_ns, |config| config.cycle.period_ns),

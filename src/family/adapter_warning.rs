@@ -1,9 +1,10 @@
-//! What is to be known about a bus behind an SLCAN adapter or a converter on a serial line.
+//! What is to be known about a bus behind an SLCAN adapter or a converter on a serial line, and about the adapter of a serial line.
 
 use crate::config::bit_fields::FieldDevice;
 use crate::config::{Config, Interface};
 use crate::family::WarningKind;
 use crate::family::bring_up::ProcessData;
+use crate::link::{adapter_latency_ns, shortest_latency_command};
 
 /// A line has these characters beside two for each byte of its frame: letter, identifier, length code and CR.
 const LINE_CHARACTERS: u64 = 6;
@@ -21,7 +22,7 @@ pub fn of_bus(config: &Config, bus: usize) -> Vec<WarningKind> {
         Interface::Converter(_) => {
             return vec![WarningKind::Adapter { interface: settings.interface.to_string() }];
         }
-        Interface::Simulated | Interface::SocketCan(_) => return vec![],
+        Interface::Simulated | Interface::SocketCan(_) | Interface::Serial(_) => return vec![],
     };
     let mut kinds = vec![WarningKind::Adapter { interface: settings.interface.to_string() }];
     let characters = longest_direction(config, bus);
@@ -33,6 +34,16 @@ pub fn of_bus(config: &Config, bus: usize) -> Vec<WarningKind> {
         kinds.push(WarningKind::SlowLine { device, baud_rate: line.baud_rate, line_ns, period_ns, needed });
     }
     kinds
+}
+
+/// The adapter of a serial line is as fast as USB if it holds bytes back no longer than this.
+const USB_NS: u64 = 1_000_000;
+
+/// The warning about a serial line, if its adapter holds bytes back.
+pub fn of_line(config: &Config, bus: usize) -> Option<WarningKind> {
+    let Interface::Serial(line) = &config.buses.get(bus)?.interface else { return None };
+    let latency_ns = adapter_latency_ns(&line.device).filter(|latency_ns| *latency_ns > USB_NS)?;
+    Some(WarningKind::AdapterLatency { latency_ns, mend: shortest_latency_command(&line.device) })
 }
 
 /// The characters of a cycle in the direction that has more of them. A serial line carries both directions at once.

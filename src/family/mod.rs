@@ -22,6 +22,7 @@ pub(crate) mod hollow;
 mod off_cycle;
 mod registry;
 mod simulated_bus;
+mod simulated_joint;
 mod warning;
 pub(crate) mod yz_aim;
 
@@ -36,7 +37,7 @@ pub use crate::procedure::{
 pub use data_sheet::DataSheet;
 pub(crate) use error_words::{drive_error_words, own_error_words, own_errors};
 pub use error_words::{error_cure, error_words};
-pub use off_cycle::{OffCycleBudget, OffCycleDrive, OffCycleTarget, OffCycleWish};
+pub use off_cycle::{LineCounts, OffCycleBudget, OffCycleDrive, OffCycleLine, OffCycleTarget, OffCycleWish};
 pub use registry::{NameTaken, all, register};
 pub(crate) use registry::{named, of};
 pub(crate) use simulated_bus::simulated_drives;
@@ -100,7 +101,13 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
-    /// What [`off_cycle`](Self::off_cycle) asks of the bus of an axis.
+    /// Who speaks to the drives of the axes of a serial line, all of which are of this family; `None` where the drives of the family are
+    /// on a CAN bus.
+    fn off_cycle_line(&self, _config: &Config, _bus: usize) -> Option<Box<dyn OffCycleLine>> {
+        None
+    }
+
+    /// What [`off_cycle`](Self::off_cycle) or [`off_cycle_line`](Self::off_cycle_line) asks of the bus of an axis.
     fn off_cycle_budget(&self, _axis: &Axis, _config: &Config) -> Option<OffCycleBudget> {
         None
     }
@@ -208,6 +215,11 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
+    /// The drives that stand in for the axes of a simulated serial line; `None` where the drives of the family are on a CAN bus.
+    fn simulated_axes_on_line(&self, _config: &Config, _bus: usize) -> Option<Box<dyn DevicesOnLine>> {
+        None
+    }
+
     /// Drives with these addresses on a simulated serial line; `None` where the drives of the family are on a CAN bus.
     ///
     /// # Errors
@@ -233,7 +245,32 @@ pub enum MappingMatch {
 /// Whether the drive of an axis has PDOs.
 pub(crate) fn has_pdos(axis: &Axis, config: &Config) -> bool {
     let family = of(&axis.drive);
-    family.field_drive(axis).is_none() && family.off_cycle(axis, config).is_none()
+    family.field_drive(axis).is_none() && !is_off_cycle(axis, config)
+}
+
+/// Whether the drive of an axis is spoken to outside of the cycle.
+pub(crate) fn is_off_cycle(axis: &Axis, config: &Config) -> bool {
+    axis.drive.is_on_serial_line || of(&axis.drive).off_cycle(axis, config).is_some()
+}
+
+/// Cycles of its bus within which a report of a drive is expected that is spoken to outside of the cycle. On a CAN bus that is one; on a
+/// serial line it is what a round takes.
+pub(crate) fn report_cycles(axis: &Axis, config: &Config) -> u16 {
+    let report_ns = line_report_ns(config, axis.bus).unwrap_or(0);
+    let cycles = report_ns.div_ceil(config.bus_cycle(axis.bus).period_ns.max(1));
+    u16::try_from(cycles).unwrap_or(u16::MAX).max(1)
+}
+
+/// The family of the drives of a serial line; `None` if the bus is none, or has no axes.
+pub(crate) fn of_line(config: &Config, bus: usize) -> Option<&'static dyn Family> {
+    let first = config.axes_of_bus(bus).next().filter(|_| config.is_serial_line(bus))?;
+    Some(of(&first.drive))
+}
+
+/// From one report of each drive of a serial line to the next, at the longest.
+pub(crate) fn line_report_ns(config: &Config, bus: usize) -> Option<u64> {
+    let budgets = config.axes_of_bus(bus).filter_map(|axis| of(&axis.drive).off_cycle_budget(axis, config));
+    budgets.map(|budget| budget.report_ns).max().filter(|_| config.is_serial_line(bus))
 }
 
 /// A protocol of the vendor that a drive may speak instead of CANopen.

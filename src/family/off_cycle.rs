@@ -78,6 +78,42 @@ pub trait OffCycleDrive: Send {
     ) -> Option<OffCycleReport>;
 }
 
+/// Speaks to the drives of one serial line outside of the cycle, without waiting: it is called about once in a millisecond, and as soon as
+/// bytes have come. The drives are numbered by the order of their axes in the configuration.
+///
+/// As with [`OffCycleDrive`], whoever implements this stops a drive whose target is stale.
+pub trait OffCycleLine: Send {
+    /// Takes bytes that have come over the line.
+    fn receive(&mut self, bytes: &[u8]);
+
+    /// Goes on, with what is wanted of each drive, and tells what drives have said. Returns the bytes that are to be sent now.
+    fn poll(
+        &mut self,
+        now_ns: u64,
+        targets: &[OffCycleTarget],
+        report: &mut dyn FnMut(usize, OffCycleReport),
+    ) -> Option<Vec<u8>>;
+
+    /// Whether a drive has no torque, and does not watch for its master, as far as this side knows.
+    fn is_settled(&self, place: usize) -> bool;
+
+    /// What has been sent and received since the beginning.
+    fn counts(&self) -> LineCounts;
+}
+
+/// The traffic of a serial line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LineCounts {
+    /// Requests that were sent.
+    pub requests: u64,
+    /// Requests that were carried out.
+    pub replies: u64,
+    /// Requests without a sound reply, or that were refused.
+    pub failures: u64,
+    /// How long bytes were on the line, in both directions.
+    pub busy_ns: u64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,10 +9,12 @@ use crate::config::bit_fields::FieldDevice;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Short;
 use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Quantity, Travel};
-use crate::family::{adapter_warning, bring_up, registry};
+use crate::family::{adapter_warning, bring_up, registry, report_cycles};
 
 /// A rotary axis that goes round more often than this is unusual.
 const USUAL_TURNS: f64 = 2.0;
+/// A lost reply costs a serial line about three rounds, and a drive must not miss its master for it.
+const LOST_ROUNDS: u64 = 4;
 /// A drive that rounds a velocity by less than this share runs as commanded.
 const ROUNDING: f64 = 0.01;
 
@@ -81,6 +83,20 @@ pub enum WarningKind {
         report_ns: u64,
         /// For so long feedback may be missing.
         allowed_ns: u64,
+    },
+    /// The adapter of a serial line holds received bytes back.
+    AdapterLatency {
+        /// For so long at most.
+        latency_ns: u64,
+        /// The command that makes it shorter.
+        mend: String,
+    },
+    /// A drive on a serial line would miss its master although that speaks to it in time.
+    ShortTimeout {
+        /// How long the drive waits.
+        timeout_ns: u64,
+        /// From one request to it to the next, at the longest, if one round is lost.
+        needed_ns: u64,
     },
     /// A value of the configuration file that bring-up overwrites, because the controller needs another one.
     Overwritten {
@@ -181,6 +197,19 @@ impl fmt::Display for WarningKind {
                     show(*allowed_ns)
                 )
             }
+            Self::AdapterLatency { latency_ns, mend } => write!(
+                f,
+                "its adapter holds every reply back for up to {}, so that each drive is spoken to less often: {mend} \
+                 (`takt doctor` has the rule that lasts)",
+                Quantity::DURATION.show(*latency_ns as f64 / 1e9)
+            ),
+            Self::ShortTimeout { timeout_ns, needed_ns } => write!(
+                f,
+                "`communication_timeout` is {}, and on this line two requests to the drive may be {} apart when replies are lost: \
+                 give it at least that, a faster line, or fewer drives on it",
+                Quantity::DURATION.show(*timeout_ns as f64 / 1e9),
+                Quantity::DURATION.show(*needed_ns as f64 / 1e9)
+            ),
             Self::RoundedVelocity { commanded, rounded } => write!(
                 f,
                 "its drive takes whole numbers of r/min only: the program's velocity of {commanded} becomes {rounded}"
@@ -211,6 +240,7 @@ impl Config {
             let mut kinds = of_axis(axis);
             kinds.extend(self.rounded_velocities(index, axis));
             kinds.extend(self.slow_reports(axis));
+            kinds.extend(self.short_timeout(axis));
             let overwritten = bring_up::overwritten(self, axis);
             kinds.extend(overwritten.into_iter().map(|object| WarningKind::Overwritten { object }));
             let subject = WarningSubject::Axis(axis.name.clone());
@@ -218,7 +248,8 @@ impl Config {
         }
         for (index, bus) in self.buses.iter().enumerate() {
             let subject = WarningSubject::Bus(bus.name.clone());
-            let kinds = adapter_warning::of_bus(self, index).into_iter();
+            let kinds =
+                adapter_warning::of_bus(self, index).into_iter().chain(adapter_warning::of_line(self, index));
             warnings.extend(kinds.map(|kind| Warning { subject: subject.clone(), kind }));
         }
         warnings
@@ -247,8 +278,17 @@ impl Config {
     /// A lost frame costs a drive that is spoken to beside the cycle about as much time as a report.
     fn slow_reports(&self, axis: &Axis) -> Option<WarningKind> {
         let report_ns = registry::of(&axis.drive).off_cycle_budget(axis, self)?.report_ns;
-        let allowed_ns = self.bus_cycle(axis.bus).period_ns * u64::from(axis.missed_feedback_cycles);
+        let expected_ns = self.bus_cycle(axis.bus).period_ns * u64::from(report_cycles(axis, self));
+        let allowed_ns = expected_ns * u64::from(axis.missed_feedback_cycles);
         (allowed_ns < 2 * report_ns).then_some(WarningKind::SlowReports { report_ns, allowed_ns })
+    }
+
+    /// A drive on a serial line waits for its master longer than some lost rounds take.
+    fn short_timeout(&self, axis: &Axis) -> Option<WarningKind> {
+        let budget = registry::of(&axis.drive).off_cycle_budget(axis, self)?;
+        let timeout_ns = budget.watchdog_ns.filter(|_| axis.drive.is_on_serial_line)?;
+        let needed_ns = LOST_ROUNDS * budget.report_ns;
+        (timeout_ns < needed_ns).then_some(WarningKind::ShortTimeout { timeout_ns, needed_ns })
     }
 
     /// The velocities of the program that the drive of an axis cannot have, each once.

@@ -3,7 +3,7 @@
 use takt_rt::{BusPort, Frame, Nanoseconds};
 
 use crate::link::trace::TracedPort;
-use crate::sim::{Defect, DriveFault, InjectDefectError, SimulatedBus, UnknownNode};
+use crate::sim::{Defect, DriveFault, InjectDefectError, SimulatedBus, SimulatedLineDevices, UnknownNode};
 
 /// An effect on a simulated drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,6 +82,28 @@ impl Injectable for SimulatedBus {
     }
 
     fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
+        match effect {
+            DriveEffect::Silent => self.silence(node, is_present)?,
+            DriveEffect::LoadTorque(torque) => {
+                self.set_load_torque(node, if is_present { torque } else { 0.0 })?;
+            }
+            DriveEffect::Reboot if is_present => self.power_cycle(node)?,
+            DriveEffect::Cause(fault) if is_present => self.inject_fault(node, fault)?,
+            DriveEffect::Reboot | DriveEffect::Cause(_) => {}
+            DriveEffect::Defect(defect) => self.inject_defect(node, defect, is_present)?,
+        }
+        Ok(())
+    }
+}
+
+/// As [`Injectable::inject`], on a serial line.
+impl SimulatedLineDevices {
+    pub(crate) fn inject(
+        &mut self,
+        node: u8,
+        effect: DriveEffect,
+        is_present: bool,
+    ) -> Result<(), InjectError> {
         match effect {
             DriveEffect::Silent => self.silence(node, is_present)?,
             DriveEffect::LoadTorque(torque) => {

@@ -202,6 +202,7 @@ fn config(options: &JitterOptions) -> Result<Config, ConfigError> {
         bus.name = match interface {
             Interface::Slcan(_) => "slcan".to_owned(),
             Interface::Converter(_) => "converter".to_owned(),
+            Interface::Serial(_) => "line".to_owned(),
             interface => interface.to_string(),
         };
         // SYNC is the same at any bit rate: a bus that is up is taken as it is.

@@ -1,11 +1,9 @@
 //! The buses: what they are connected to, and who commands them.
 
+mod adapter_latency;
 mod converter;
 pub(crate) mod interface;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
-)]
+#[cfg(feature = "cli")]
 pub(crate) mod modbus_line;
 mod open;
 pub(crate) mod ownership;
@@ -15,15 +13,12 @@ pub(crate) mod ownership;
 )]
 mod port;
 pub(crate) mod real_interface;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
-)]
 pub(crate) mod serial_line;
 mod slcan;
 pub(crate) mod socketcan;
 pub(crate) mod trace;
 
+pub(crate) use adapter_latency::{adapter_latency_ns, shortest_latency_command};
 pub use converter::ConverterError;
 pub use interface::InterfaceError;
 pub(crate) use interface::{

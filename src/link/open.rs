@@ -4,6 +4,7 @@ use super::converter::ConverterError;
 use super::interface::{InterfaceError, InterfaceSettings};
 use super::port::LinkPort;
 use super::real_interface::RealInterface;
+use super::serial_line::SerialLineError;
 use super::slcan::SlcanError;
 use super::socketcan::{SocketCanError, SocketCanOptions};
 
@@ -37,6 +38,23 @@ pub enum OpenError {
         /// The reason.
         #[source]
         error: ConverterError,
+    },
+    /// The serial line cannot be used.
+    #[error("bus `{bus}`: {error}")]
+    Line {
+        /// The name of the bus.
+        bus: String,
+        /// The reason.
+        #[source]
+        error: SerialLineError,
+    },
+    /// A serial line where a CAN bus is needed.
+    #[error("bus `{bus}`: {interface} is a serial line, and no CAN bus")]
+    NotCan {
+        /// The name of the bus.
+        bus: String,
+        /// The interface.
+        interface: String,
     },
     /// The adapter on the serial line cannot be used.
     #[error("bus `{bus}`: {error}")]

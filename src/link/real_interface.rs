@@ -9,7 +9,7 @@ use super::port::LinkPort;
 use super::serial_line::device_number;
 use super::slcan::open_slcan;
 use super::socketcan::{SocketCanOptions, open_socketcan};
-use crate::config::{CanLine, Interface};
+use crate::config::{CanLine, Interface, SerialDevice};
 
 /// An interface of this machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -20,6 +20,8 @@ pub enum RealInterface {
     Slcan(CanLine),
     /// A transparent converter between RS-485 and CAN FD on a serial line.
     Converter(CanLine),
+    /// A serial line with drives on it, and no CAN bus.
+    Serial(SerialDevice),
 }
 
 impl RealInterface {
@@ -30,6 +32,7 @@ impl RealInterface {
             Interface::SocketCan(name) => Some(Self::SocketCan(name.clone())),
             Interface::Slcan(line) => Some(Self::Slcan(line.clone())),
             Interface::Converter(line) => Some(Self::Converter(line.clone())),
+            Interface::Serial(line) => Some(Self::Serial(line.clone())),
         }
     }
 
@@ -48,17 +51,22 @@ impl RealInterface {
                 Ok(number) => Ok(format!("line-{number}")),
                 Err(error) => Err(OpenError::Converter { bus: bus.to_owned(), error: error.into() }),
             },
+            Self::Serial(line) => match device_number(&line.device) {
+                Ok(number) => Ok(format!("line-{number}")),
+                Err(error) => Err(OpenError::Line { bus: bus.to_owned(), error }),
+            },
         }
     }
 
-    /// Brings it up with these settings, or checks that it has them. The channel of an adapter gets them when it is opened.
+    /// Brings it up with these settings, or checks that it has them. The channel of an adapter and a
+    /// serial line get them when they are opened.
     pub(super) fn prepare(&self, bus: &str, settings: &InterfaceSettings) -> Result<(), OpenError> {
         match self {
             Self::SocketCan(name) => match prepare_interface(name, settings) {
                 Ok(_) => Ok(()),
                 Err(error) => Err(OpenError::Interface { bus: bus.to_owned(), error }),
             },
-            Self::Slcan(_) | Self::Converter(_) => Ok(()),
+            Self::Slcan(_) | Self::Converter(_) | Self::Serial(_) => Ok(()),
         }
     }
 
@@ -82,7 +90,13 @@ impl RealInterface {
                 Ok(port) => Ok(LinkPort::Converter(Box::new(port))),
                 Err(error) => Err(OpenError::Converter { bus: bus.to_owned(), error }),
             },
+            Self::Serial(_) => Err(OpenError::NotCan { bus: bus.to_owned(), interface: self.to_string() }),
         }
+    }
+
+    /// Whether it carries CAN frames, by which another master can be recognised.
+    pub(super) const fn is_can(&self) -> bool {
+        !matches!(self, Self::Serial(_))
     }
 }
 
@@ -92,6 +106,7 @@ impl fmt::Display for RealInterface {
             Self::SocketCan(name) => f.write_str(name),
             Self::Slcan(line) => write!(f, "slcan:{line}"),
             Self::Converter(line) => write!(f, "rs485-canfd:{line}"),
+            Self::Serial(line) => write!(f, "serial:{line}"),
         }
     }
 }

@@ -26,7 +26,7 @@ mod client;
 mod event;
 #[cfg_attr(
     not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
+    allow(unnameable_types, reason = "the procedures of one family alone name it")
 )]
 mod modbus_session;
 mod parallel;

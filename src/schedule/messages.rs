@@ -127,7 +127,10 @@ const LAST_SYNCHRONOUS_TYPE: u8 = 240;
 
 /// The messages of a bus by priority, highest first.
 pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
-    let Some(bus) = config.buses.get(bus_index) else { return vec![] };
+    // A serial line has none.
+    let Some(bus) = config.buses.get(bus_index).filter(|_| !config.is_serial_line(bus_index)) else {
+        return vec![];
+    };
     let period_ns = config.bus_cycle(bus_index).period_ns;
     let axes = || config.axes.iter().enumerate().filter(|(_, axis)| axis.bus == bus_index);
     // What CANopen sends to all nodes is sent where there are nodes.

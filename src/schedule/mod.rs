@@ -28,6 +28,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use crate::config::{Axis, Config, Cycle, Protocol};
+use crate::family;
 use bound::Traffic;
 use messages::BusMessage;
 
@@ -259,7 +260,7 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
         bit_rate,
         period_ns: cycle.period_ns,
         command_phase_ns: cycle.command_phase_ns,
-        load_percent: load_percent(&messages),
+        load_percent: load_percent(&messages) + line_load_percent(config, index),
         shortfalls: shortfalls(&messages, &slot, cycle),
         messages,
         slot,
@@ -299,6 +300,13 @@ fn load_percent(messages: &[MessageSchedule]) -> f64 {
         .filter(|message| message.is_sent_while_enabled && message.kind != MessageKind::Emergency)
         .map(|message| 100.0 * message.transmission_ns as f64 / message.period_ns as f64)
         .sum()
+}
+
+/// The share of the time that bytes are on a serial line; 0 for a CAN bus.
+fn line_load_percent(config: &Config, bus: usize) -> f64 {
+    let on_line = config.axes_of_bus(bus).filter(|axis| axis.drive.is_on_serial_line);
+    let budgets = on_line.filter_map(|axis| family::of(&axis.drive).off_cycle_budget(axis, config));
+    100.0 * budgets.map(|budget| budget.bus_share).sum::<f64>()
 }
 
 fn shortfalls(messages: &[MessageSchedule], slot: &Slot, cycle: Cycle) -> Vec<Shortfall> {

@@ -53,10 +53,6 @@ pub(crate) mod erob;
     allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
 )]
 pub(crate) mod erob_can;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "`takt drive` uses a part of it, and no axis yet")
-)]
 pub(crate) mod erob_modbus;
 mod errors;
 mod feedback_defects;
@@ -85,7 +81,6 @@ mod sdo_reply;
 mod sdo_server;
 #[cfg(feature = "cli")]
 pub(crate) mod serial_device;
-#[cfg_attr(not(feature = "cli"), allow(dead_code, reason = "`takt sim` hosts them"))]
 pub(crate) mod serial_line;
 mod servo;
 mod silent_drive;
@@ -102,5 +97,5 @@ pub use mailbox::{Mailbox, QueueOrder};
 pub use medium::WireBitRates;
 pub use plant::Gravity;
 pub use port::{InjectDefectError, SimulatedBus, UnknownNode};
-pub use serial_line::DevicesOnLine;
+pub use serial_line::{DevicesOnLine, LineDisturbance, SimulatedLineDevices};
 pub(crate) use silent_drive::SilentDrive;

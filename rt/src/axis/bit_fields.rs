@@ -90,7 +90,7 @@ impl Axis {
     pub fn temperature(&self) -> Option<f32> {
         match &self.parameters.exchange {
             Exchange::BitFields(by) => self.temperature_of_reply(by),
-            Exchange::Pdos(_) | Exchange::OffCycle => None,
+            Exchange::Pdos(_) | Exchange::OffCycle { .. } => None,
         }
     }
 

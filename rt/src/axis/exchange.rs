@@ -21,9 +21,12 @@ pub enum Exchange {
     /// A command and a reply of bit fields.
     BitFields(FieldDriveParameters),
     /// Nothing in the cycle. Somebody else speaks to the drive, as often as it can answer: it takes what is wanted of the drive from
-    /// [`AxisSnapshot`](crate::AxisSnapshot), and brings [`OffCycleReport`](crate::OffCycleReport)s. The cycle of the bus is the time
-    /// within which one is expected.
-    OffCycle,
+    /// [`AxisSnapshot`](crate::AxisSnapshot), and brings [`OffCycleReport`](crate::OffCycleReport)s.
+    OffCycle {
+        /// Cycles of the bus within which a report is expected; 0 counts as 1. What is counted in cycles of feedback elsewhere is counted in
+        /// such times.
+        report_cycles: u16,
+    },
 }
 
 /// The PDOs of a drive.
@@ -42,7 +45,15 @@ impl Exchange {
     pub fn commands(&self) -> &[CommandPdo] {
         match self {
             Self::Pdos(pdos) => &pdos.commands,
-            Self::BitFields(_) | Self::OffCycle => &[],
+            Self::BitFields(_) | Self::OffCycle { .. } => &[],
+        }
+    }
+
+    /// Cycles of the bus within which a report is expected, where that is not each of them.
+    pub(super) const fn report_cycles(&self) -> u16 {
+        match self {
+            Self::Pdos(_) | Self::BitFields(_) => 1,
+            Self::OffCycle { report_cycles } => *report_cycles,
         }
     }
 
@@ -50,7 +61,7 @@ impl Exchange {
     pub const fn pdos_mut(&mut self) -> Option<&mut Pdos> {
         match self {
             Self::Pdos(pdos) => Some(pdos),
-            Self::BitFields(_) | Self::OffCycle => None,
+            Self::BitFields(_) | Self::OffCycle { .. } => None,
         }
     }
 
@@ -59,7 +70,7 @@ impl Exchange {
         let fields = match self {
             Self::Pdos(pdos) => return pdos.commands.iter().any(|command| command.pdo.mapping.sends(slot)),
             Self::BitFields(fields) => fields,
-            Self::OffCycle => return false,
+            Self::OffCycle { .. } => return false,
         };
         match slot {
             CommandSlot::Controlword => true,
@@ -76,7 +87,7 @@ impl Exchange {
         let fields = match self {
             Self::Pdos(pdos) => return FeedbackSlots::of(pdos.feedback.iter().map(|pdo| &pdo.mapping)),
             Self::BitFields(fields) => fields,
-            Self::OffCycle => return FeedbackSlots::with(OffCycleReport::SLOTS),
+            Self::OffCycle { .. } => return FeedbackSlots::with(OffCycleReport::SLOTS),
         };
         let of_reply = [
             (ReplyValue::Velocity, FeedbackSlot::Velocity),
@@ -93,7 +104,7 @@ impl Exchange {
         match self {
             Self::Pdos(pdos) => pdos.commands.len(),
             Self::BitFields(_) => 1,
-            Self::OffCycle => 0,
+            Self::OffCycle { .. } => 0,
         }
     }
 
@@ -101,7 +112,7 @@ impl Exchange {
     pub fn reports(&self) -> usize {
         match self {
             Self::Pdos(pdos) => pdos.feedback.len(),
-            Self::BitFields(_) | Self::OffCycle => 1,
+            Self::BitFields(_) | Self::OffCycle { .. } => 1,
         }
     }
 }

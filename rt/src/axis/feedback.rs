@@ -84,7 +84,7 @@ impl Axis {
                 unpacked.map_err(|_| NoFeedback)?;
             }
             Exchange::BitFields(_) => self.receive_fields(frame)?,
-            Exchange::OffCycle => return Err(NoFeedback),
+            Exchange::OffCycle { .. } => return Err(NoFeedback),
         }
         if self.reception.note_arrival(pdo) {
             self.duplicate_node.note_repetition();

@@ -174,7 +174,7 @@ impl Axis {
 
     /// Takes over the period of the axis' bus.
     pub fn set_cycle(&mut self, cycle_s: f64) {
-        self.reception.set_cycle(cycle_s);
+        self.reception.set_cycle(cycle_s, self.parameters.exchange.report_cycles());
     }
 
     /// Uses the rated torque that the drive has reported (N·m, or N). Nonsense changes nothing.
@@ -195,7 +195,7 @@ impl Axis {
 
     /// Whether the drive is spoken to outside of the cycle.
     pub const fn is_off_cycle(&self) -> bool {
-        matches!(self.parameters.exchange, Exchange::OffCycle)
+        matches!(self.parameters.exchange, Exchange::OffCycle { .. })
     }
 
     /// Changes the process data that are exchanged; before the first feedback.

@@ -197,11 +197,13 @@ pub struct AxisParameters {
 
 /// The node IDs of CANopen (CiA 301, 7.3.2): 0 is for all nodes, and more than 7 bits do not fit into an identifier.
 const NODE_IDS: core::ops::RangeInclusive<u8> = 1..=127;
+/// The addresses of drives that are spoken to outside of the cycle, and may be on another line than CAN.
+const ADDRESSES: core::ops::RangeInclusive<u8> = 1..=247;
 
 /// Why an axis cannot be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AxisParametersError {
-    /// The node ID is not one from 1 to 127.
+    /// The node ID is not one from 1 to 127; for a drive that is spoken to outside of the cycle, 1 to 247.
     NodeId {
         /// What it is.
         node: u8,
@@ -271,7 +273,8 @@ impl core::fmt::Display for AxisParametersError {
 impl AxisParameters {
     /// Checks everything that an axis relies on. A [`Scale`] and a [`Mapping`](crate::Mapping) are checked when they are made.
     pub fn validate(&self) -> Result<(), AxisParametersError> {
-        if !NODE_IDS.contains(&self.node) {
+        let node_ids = if matches!(self.exchange, Exchange::OffCycle { .. }) { ADDRESSES } else { NODE_IDS };
+        if !node_ids.contains(&self.node) {
             return Err(AxisParametersError::NodeId { node: self.node });
         }
         if !(1..=MAX_NODE_AXES).contains(&self.node_axis) {

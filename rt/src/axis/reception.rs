@@ -15,10 +15,14 @@ pub(super) struct Reception {
     last_expected_since_ns: Nanoseconds,
     /// Which feedback PDOs have arrived since then, a bit each.
     arrived: u8,
-    /// Cycles of the bus since the last complete feedback.
+    /// Times within which feedback is expected that have passed since the last complete feedback: cycles of the bus, for most drives.
     age_cycles: u16,
+    /// Cycles of the bus that have passed of the present one.
+    waited_cycles: u16,
     /// The period of the bus.
     cycle_s: f64,
+    /// Cycles of the bus within which feedback is expected; 0 counts as 1.
+    report_cycles: u16,
     /// Time since the last complete feedback.
     span_s: f64,
     /// Time between the last complete feedback and the one before it: missed slots make it longer than a cycle.
@@ -30,16 +34,21 @@ pub(super) struct Reception {
 pub(super) struct ReportSpan {
     /// Seconds in which the joint may have moved since the report before.
     pub(super) longest_s: f64,
-    /// The period of the bus.
+    /// The time within which a report is expected: the period of the bus, for most drives.
     pub(super) cycle_s: f64,
     /// Whether no slot was missed, so that the time is known.
     pub(super) is_known: bool,
 }
 
 impl Reception {
-    /// Takes over the period of the bus.
-    pub(super) fn set_cycle(&mut self, cycle_s: f64) {
-        self.cycle_s = cycle_s;
+    /// Takes over the period of the bus, and in how many of its cycles feedback is expected.
+    pub(super) fn set_cycle(&mut self, cycle_s: f64, report_cycles: u16) {
+        (self.cycle_s, self.report_cycles) = (cycle_s, report_cycles);
+    }
+
+    /// The time within which feedback is expected.
+    fn report_s(&self) -> f64 {
+        self.cycle_s * f64::from(self.report_cycles.max(1))
     }
 
     /// The period of the bus.
@@ -86,13 +95,18 @@ impl Reception {
     pub(super) fn complete(&mut self, pdos: usize, since: FeedbackSince) -> Option<ReportSpan> {
         let expected = (1u8 << pdos.min(7)) - 1;
         if self.arrived & expected != expected {
-            self.age_cycles = self.age_cycles.saturating_add(1);
+            self.waited_cycles = self.waited_cycles.saturating_add(1);
+            if self.waited_cycles >= self.report_cycles {
+                self.waited_cycles = 0;
+                self.age_cycles = self.age_cycles.saturating_add(1);
+            }
             return None;
         }
         let longest_s = self.take_span_s(since);
         self.arrived = 0;
-        self.age_cycles = 0;
-        Some(ReportSpan { longest_s, cycle_s: self.cycle_s, is_known: longest_s < USUAL_SPAN * self.cycle_s })
+        (self.age_cycles, self.waited_cycles) = (0, 0);
+        let cycle_s = self.report_s();
+        Some(ReportSpan { longest_s, cycle_s, is_known: longest_s < USUAL_SPAN * cycle_s })
     }
 
     /// Seconds in which the joint may have moved since the last complete feedback.
@@ -120,7 +134,7 @@ impl Reception {
     pub(super) fn cycles_since_report(&self) -> u16 {
         // The sum of many periods may be a little less than their multiple.
         const ROUNDING: f64 = 1e-6;
-        (self.span_s / self.cycle_s + ROUNDING) as u16
+        (self.span_s / self.report_s() + ROUNDING) as u16
     }
 
     /// Cycles of the bus since the last complete feedback, in which it was asked for.
@@ -133,9 +147,27 @@ impl Reception {
 mod tests {
     use super::*;
 
+    #[test]
+    fn a_drive_that_reports_every_few_cycles_is_not_missed_in_between() {
+        let mut reception = Reception::default();
+        reception.set_cycle(1e-3, 3);
+        let mut ages = [0; 9];
+        for (cycle, age) in ages.iter_mut().enumerate() {
+            reception.begin_request(1);
+            reception.pass(1e-3);
+            if cycle == 0 {
+                reception.note_arrival(0);
+            }
+            reception.complete(1, FeedbackSince::CommandPhase);
+            *age = reception.age_cycles();
+        }
+        assert_eq!(ages, [0, 0, 0, 1, 1, 1, 2, 2, 2]);
+        assert_eq!(reception.cycles_since_report(), 2);
+    }
+
     fn reception() -> Reception {
         let mut reception = Reception::default();
-        reception.set_cycle(1e-3);
+        reception.set_cycle(1e-3, 1);
         reception
     }
 

@@ -170,7 +170,7 @@ impl Axis {
                 Some(self.field_drive.step(by, LifeWish::Stop, &FieldTargets::default()))
             }
             // Whoever speaks to it sees the controlword.
-            Exchange::OffCycle => None,
+            Exchange::OffCycle { .. } => None,
         }
     }
 

@@ -17,7 +17,8 @@ use crate::frame::Frame;
 use crate::host::HostInterface;
 use crate::time::Nanoseconds;
 
-/// How long controlword bit 7 is held low before, and high in, a fault reset, and how long the drives have to answer it.
+/// How long controlword bit 7 is held low before, and high in, a fault reset, and how long the drives have to answer it; longer where the
+/// cycle of a bus is, so that its drives see each part.
 pub(super) const FAULT_RESET_CYCLES: u32 = 10;
 
 /// What a frame is for.
@@ -222,7 +223,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// The controlword of a fault reset, for the drives that are at fault. Bit 7 is low first, so that what follows is an edge
     /// whatever was sent before; in the end the drives have time to answer.
     fn fault_reset_word(&self) -> Option<u16> {
-        match self.fault_reset_cycles.div_ceil(FAULT_RESET_CYCLES) {
+        match self.fault_reset_cycles.div_ceil(self.fault_reset_part.max(1)) {
             0 | 1 => None,
             2 => Some(controlword::FAULT_RESET),
             _ => Some(controlword::DISABLE_VOLTAGE),

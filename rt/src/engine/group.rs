@@ -43,6 +43,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) stop: Option<StopReason>,
     /// Cycles of a fault reset that are still to come.
     pub(super) fault_reset_cycles: u32,
+    /// Cycles of each of its three parts.
+    pub(super) fault_reset_part: u32,
     pub(super) commands: Commands,
     pub(super) unsent: UnsentSteps<BUSES>,
     /// Cycles in which its set-points went on.
@@ -76,6 +78,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             state_cycles: 0,
             stop: None,
             fault_reset_cycles: 0,
+            fault_reset_part: 1,
             commands: Commands::None,
             unsent: UnsentSteps::default(),
             steps: 0,

@@ -242,7 +242,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
     fn reset_faults(&mut self) {
         if matches!(self.group.state, GroupState::Disabled) {
-            self.group.fault_reset_cycles = 3 * FAULT_RESET_CYCLES;
+            let slowest = self.axes.iter().map(|axis| self.shared.divider_of(axis)).max().unwrap_or(1);
+            self.group.fault_reset_part = slowest.max(FAULT_RESET_CYCLES);
+            self.group.fault_reset_cycles = self.group.fault_reset_part.saturating_mul(3);
             self.axes.iter_mut().for_each(Axis::begin_fault_reset);
         }
         self.group.stop = None;

@@ -484,7 +484,7 @@ fn enter_process_data(table: &mut Dispatch, place: u8, own: &AxisParameters) -> 
             table.foreign(command.id(), command.format());
             Ok(())
         }
-        Exchange::OffCycle => Ok(()),
+        Exchange::OffCycle { .. } => Ok(()),
     }
 }
 

@@ -99,7 +99,8 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             }
         }
         let guards = NodeGuards::new(&parameters);
-        let has_off_cycle = parameters.axes.iter().any(|axis| axis.exchange == Exchange::OffCycle);
+        let has_off_cycle =
+            parameters.axes.iter().any(|axis| matches!(axis.exchange, Exchange::OffCycle { .. }));
         Self {
             period_ns: parameters.period_ns,
             period_s: parameters.period_ns as f64 / NANOSECONDS_PER_SECOND as f64,

@@ -7,6 +7,7 @@ use crate::printable::printable_path;
 use crate::schedule::text::{message_name, microseconds, narrow, remedy, reserve, shortfall, sums};
 use crate::schedule::{BusSchedule, MessageSchedule};
 
+use super::lines;
 use super::{AxisCheck, Check, ComplianceCheck, GroupCheck};
 use crate::cli::columns::paragraph;
 use crate::cli::table::{Table, UNBROKEN};
@@ -54,16 +55,22 @@ pub fn whole(check: &Check, config: &Config) -> String {
     );
 
     text.push_str(&configuration_files(config));
-    let both: Vec<_> = check.buses.iter().zip(&config.buses).collect();
-    let groups = groups(&both);
-    let _ = write!(
-        text,
-        "\nBuses in the worst slot (times in µs after its SYNC is due)\n{}",
-        buses_table(&groups)
-    );
+    let both = check.buses.iter().zip(&config.buses).enumerate();
+    let can: Vec<_> = both.filter(|(bus, _)| !config.is_serial_line(*bus)).map(|(_, both)| both).collect();
+    let groups = groups(&can);
+    if !groups.is_empty() {
+        let _ = write!(
+            text,
+            "\nBuses in the worst slot (times in µs after its SYNC is due)\n{}",
+            buses_table(&groups)
+        );
+    }
     for group in &groups {
         text.push('\n');
         text.push_str(&bus_text(group));
+    }
+    if let Some(table) = lines::table(&check.lines) {
+        let _ = write!(text, "\nSerial lines, beside the cycle\n{table}");
     }
     for explained in [
         "response: from being queued until received, whatever else is queued when (Davis, Burns, Bril, Lukkien 2007)",

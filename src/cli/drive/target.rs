@@ -7,7 +7,7 @@ use std::str::FromStr;
 use clap::Args;
 
 use crate::commission::TargetDrive;
-use crate::config::{Config, DriveFamily, Interface, Quantity};
+use crate::config::{Config, DriveFamily, Interface, Quantity, SerialDevice};
 use crate::family::cia402::{self, Device};
 use crate::family::{self, Family};
 use crate::link::RealInterface;
@@ -90,17 +90,14 @@ impl FromStr for Line {
 
     /// `/dev/ttyUSB0`, or with a bit rate `/dev/ttyUSB0@19200`.
     fn from_str(text: &str) -> Result<Self, String> {
-        let (device, bit_rate) = match text.rsplit_once('@') {
-            Some((device, rate)) => (device, rate.parse().ok().filter(|rate| *rate > 0)),
-            None => (text, Some(USUAL_LINE_RATE)),
-        };
-        match bit_rate {
-            Some(bit_rate) if device.starts_with('/') => Ok(Self { device: device.to_owned(), bit_rate }),
-            _ => Err(format!(
-                "--bus {SERIAL}{text}: write the path of the device, and behind it a bit rate other than {USUAL_LINE_RATE}: \
-                 {SERIAL}/dev/ttyUSB0@19200"
-            )),
-        }
+        let line = text.parse::<SerialDevice>();
+        line.map(Self::from).map_err(|error| format!("--bus {SERIAL}{text}: {error}: {}", error.help()))
+    }
+}
+
+impl From<SerialDevice> for Line {
+    fn from(line: SerialDevice) -> Self {
+        Self { device: line.device, bit_rate: line.bit_rate.unwrap_or(USUAL_LINE_RATE) }
     }
 }
 
@@ -200,14 +197,12 @@ impl Target {
             TargetDrive::unconfigured(node, family.clone())
                 .map_err(|error| format!("the units cannot be converted ({error:?})"))
         };
-        if let Some(line) = bus.strip_prefix(SERIAL) {
-            return Ok((unconfigured()?, Place::Line(line.parse()?)));
-        }
         let interface = bus.parse::<Interface>();
         if let Some(reason) = interface.as_ref().ok().and_then(Interface::lacks_canopen) {
             return Err(format!("--bus {bus}: {reason}").into());
         }
         match interface.map(|interface| RealInterface::of(&interface)) {
+            Ok(Some(RealInterface::Serial(line))) => Ok((unconfigured()?, Place::Line(line.into()))),
             Ok(Some(interface)) => {
                 Ok((unconfigured()?, Place::Bus(Bus::Interface { interface, bit_rate: self.bit_rate })))
             }
@@ -304,6 +299,22 @@ impl Target {
         }
         // A drive that still has the factory's node ID is addressed by that ID.
         target.node = self.node.unwrap_or(target.node);
+        if let Some((Interface::Serial(line), bit_rate)) =
+            config.buses.get(axis.bus).map(|bus| (&bus.interface, bus.bit_rate))
+        {
+            return Ok((target, Place::Line(Line { device: line.device.clone(), bit_rate })));
+        }
+        if config.is_serial_line(axis.bus) {
+            return Err(format!(
+                "the axis {} is on a simulated line, inside one process alone: name a real one, --bus {}=serial:/dev/ttyUSB0, or \
+                 have it simulated behind a pseudo-terminal: takt sim --serial {}:{} --pty /tmp/line",
+                axis.name,
+                config.buses.get(axis.bus).map_or("line", |bus| &bus.name),
+                axis.drive.word,
+                axis.node
+            )
+            .into());
+        }
         Ok((target, Place::Bus(Bus::Configured { config: Box::new(config), bus: axis.bus })))
     }
 }

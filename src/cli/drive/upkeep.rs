@@ -1,4 +1,4 @@
-//! `takt drive … zero | save | restore | set-id | set-bitrate | release-brake | clear-fault | gains | mode | gear | auto-home | interpolation`
+//! `takt drive … zero | save | restore | set-id | set-bitrate | release-brake | emergency-stop | communication-timeout | clear-fault | gains | mode | gear | auto-home | interpolation`
 
 use clap::{Args, Subcommand, ValueEnum};
 
@@ -30,6 +30,13 @@ pub enum Action {
     },
     /// Release the brake without torque, until Ctrl-C: nothing holds the joint meanwhile (some drives)
     ReleaseBrake(Agreement),
+    /// Stop the joint in less than 50 ms, with a shock for its gear (eRob with Modbus-RTU)
+    EmergencyStop,
+    /// Set how long the drive waits for its master before it shows a fault, and read it back (eRob with Modbus-RTU)
+    CommunicationTimeout {
+        /// "500 ms"; "0 ms": for ever
+        time: String,
+    },
     /// Clear the fault or alarm that the drive is in
     ClearFault(Agreement),
     /// Read the gains of the loops, or change some (some drives)
@@ -147,6 +154,20 @@ fn bit_rate(text: &str, is_raw: bool) -> Result<u32, Failure> {
     if is_possible { Ok(rate as u32) } else { Err(unsuitable()) }
 }
 
+/// A time of whole milliseconds.
+fn milliseconds(text: &str, is_raw: bool) -> Result<u16, Failure> {
+    let unsuitable = || {
+        Failure::Unsuitable(format!("`{text}` is no such time: write for example \"500 ms\", at most 4 s"))
+    };
+    let seconds = if is_raw {
+        text.parse::<f64>().map_err(|_| unsuitable())? * 1e-3
+    } else {
+        Quantity::DURATION.parse(text).map_err(|_| unsuitable())?
+    };
+    let milliseconds = (seconds * 1e3).round();
+    if (0.0..=4_000.0).contains(&milliseconds) { Ok(milliseconds as u16) } else { Err(unsuitable()) }
+}
+
 fn ratio(text: &str) -> Result<(u16, u16), String> {
     let wrong = || "write it as NUMERATOR:DENOMINATOR, both 1 to 65535, for example 4:1".to_owned();
     let (numerator, denominator) = text.split_once(':').ok_or_else(wrong)?;
@@ -164,6 +185,8 @@ impl Action {
             Self::SetId { .. } => "set-id",
             Self::SetBitRate { .. } => "set-bitrate",
             Self::ReleaseBrake(_) => "release-brake",
+            Self::EmergencyStop => "emergency-stop",
+            Self::CommunicationTimeout { .. } => "communication-timeout",
             Self::ClearFault(_) => "clear-fault",
             Self::Gains(_) => "gains",
             Self::Mode { .. } => "mode",
@@ -182,6 +205,10 @@ impl Action {
             Self::SetId { id } => Task::SetId { node: *id },
             Self::SetBitRate { rate } => Task::SetBitRate { bit_rate: bit_rate(rate, is_raw)? },
             Self::ReleaseBrake(agreement) => Task::ReleaseBrake { is_confirmed: agreement.yes },
+            Self::EmergencyStop => Task::EmergencyStop,
+            Self::CommunicationTimeout { time } => {
+                Task::CommunicationTimeout { milliseconds: milliseconds(time, is_raw)? }
+            }
             Self::ClearFault(agreement) => Task::ClearFault { is_confirmed: agreement.yes },
             Self::Gains(gains) => gains.task(),
             Self::Mode { mode } => Task::Mode(match mode {

@@ -43,7 +43,9 @@ pub fn open(config: &Config, wishes: &[AdapterLink]) -> Result<Vec<(String, Live
     if wishes.is_empty() {
         return Ok(vec![]);
     }
-    let is_simulated = |(_, bus): &(usize, &Bus)| bus.interface == Interface::Simulated;
+    let is_simulated = |(index, bus): &(usize, &Bus)| {
+        bus.interface == Interface::Simulated && !config.is_serial_line(*index)
+    };
     let simulated: Vec<(usize, &Bus)> = config.buses.iter().enumerate().filter(is_simulated).collect();
     check(wishes, &simulated)?;
     let mut all = vec![];

@@ -102,7 +102,6 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let bus =
         section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, machine.buses));
     let node_entry = section.require_own("node", "its node ID, 1 to 127");
-    let node = node_entry.as_ref().and_then(node);
     let families: Vec<_> = machine.families.iter().map(|family| (family.word(), *family)).collect();
     let example = families.first().map_or("", |(word, _)| word);
     let family = section
@@ -112,6 +111,21 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let family_drive =
         family.and_then(|family| family.read(&mut FamilyKeys::of(&mut section, &mut simulated_section)));
     let drive = family_drive.as_deref();
+    let node = node_entry.as_ref().and_then(|entry| match drive {
+        Some(drive) if drive.is_on_serial_line => {
+            entry.integer(ranges::LINE_ADDRESS).and_then(|address| u8::try_from(address).ok())
+        }
+        _ => node(entry),
+    });
+    if let Some((drive, read)) = drive.zip(machine.bus(bus).filter(|read| read.bus.is_some())) {
+        let name = read.name.as_deref().unwrap_or_default();
+        rules::line::place(&section.spot("drive"), &section.spot("bus"), drive, name, read.is_line);
+        let mut on_line = earlier.iter().filter(|other| other.place.map(|(bus, _)| bus) == bus);
+        let first = on_line.find_map(|other| other.drive.as_deref().filter(|first| first.is_on_serial_line));
+        if let Some(first) = first {
+            rules::line::one_protocol(&section.spot("drive"), drive, first);
+        }
+    }
     if let Some((entry, node)) = node_entry.as_ref().zip(node) {
         check_node(entry, node, drive, bus, machine, earlier);
     }
@@ -271,7 +285,7 @@ fn check_node(
     };
     if let Some(first) = earlier.iter().filter(|axis| axis.place == Some((bus, node))).find(is_other) {
         entry.spot.report_against(kind, &first.header);
-    } else if node == machine.master_node {
+    } else if node == machine.master_node && !drive.is_some_and(|drive| drive.is_on_serial_line) {
         entry.report(kind);
     }
 }

@@ -5,10 +5,11 @@ use std::ops::Range;
 use takt_rt::MAX_BUSES;
 
 use super::entry::Entry;
+use super::line;
 use super::machine::boolean;
 use super::section::Section;
 use crate::config::defaults;
-use crate::config::model::{Bus, CommandFrames, Interface};
+use crate::config::model::{Bus, CommandFrames, Interface, SerialDevice};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
 use crate::config::ranges;
@@ -21,6 +22,8 @@ pub struct ReadBus<'a> {
     pub bit_rate: u32,
     /// Cycles of the controller in one of this bus; `None` when its period is wrong.
     pub divider: Option<u32>,
+    /// Whether it is a serial line, and no CAN bus.
+    pub is_line: bool,
     /// Where the bit rate is, if it is given.
     pub bit_rate_spot: Option<Spot<'a>>,
     /// Whether the schedule decides if axes share command frames.
@@ -32,13 +35,14 @@ pub struct ReadBus<'a> {
     header: Range<usize>,
 }
 
-/// The buses, but no more than one beyond those that a controller can have: the rest are only counted.
-pub fn buses(sections: Vec<Section<'_>>, cycle_ns: u64) -> Vec<ReadBus<'_>> {
+/// The buses, but no more than one beyond those that a controller can have: the rest are only counted. `lines`: the names of those
+/// that have drives of serial lines.
+pub fn buses<'a>(sections: Vec<Section<'a>>, cycle_ns: u64, lines: &[&str]) -> Vec<ReadBus<'a>> {
     let count = sections.len();
     let mut buses = Vec::with_capacity(MAX_BUSES + 1);
     for section in sections.into_iter().take(MAX_BUSES + 1) {
         let spot = section.header_spot();
-        let read = bus(section, cycle_ns, &buses);
+        let read = bus(section, cycle_ns, &buses, lines);
         buses.push(read);
         if buses.len() > MAX_BUSES {
             spot.report(rules::bus::too_many(count));
@@ -47,7 +51,7 @@ pub fn buses(sections: Vec<Section<'_>>, cycle_ns: u64) -> Vec<ReadBus<'_>> {
     buses
 }
 
-fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> ReadBus<'a> {
+fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>], lines: &[&str]) -> ReadBus<'a> {
     let header = section.header();
     let spot = section.header_spot();
     let name = section.require_own("name", "the name of the bus: name = \"left\"").and_then(|entry| {
@@ -57,16 +61,33 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> 
         }
         Some(name)
     });
-    let interface = match section.get("interface") {
+    let interface_entry = section.get("interface");
+    let interface = match &interface_entry {
         None => Some(Interface::Simulated),
-        Some(entry) => interface(&entry, earlier),
+        Some(entry) => interface(entry, earlier),
+    };
+    let is_line = match &interface {
+        Some(Interface::Serial(_)) => true,
+        Some(Interface::Simulated) => name.is_some_and(|name| lines.contains(&name)),
+        Some(Interface::SocketCan(_) | Interface::Slcan(_) | Interface::Converter(_)) | None => false,
     };
     let bit_rate_entry = section.get("bit_rate");
-    let bit_rate = bit_rate_entry
-        .as_ref()
-        .and_then(|entry| rules::bus::bit_rate(&entry.spot, entry.unbounded(Quantity::BIT_RATE)?));
-    let bit_rate = bit_rate.unwrap_or(defaults::BIT_RATE);
-    let data_bit_rate = section.get("data_bit_rate").and_then(|entry| {
+    let bit_rate = bit_rate_entry.as_ref().and_then(|entry| {
+        let rate = entry.unbounded(Quantity::BIT_RATE)?;
+        // Those of a line are those of its drives, which `rules::axis` knows.
+        if is_line { Some(rate.round() as u32) } else { rules::bus::bit_rate(&entry.spot, rate) }
+    });
+    let bit_rate = match &interface {
+        Some(Interface::Serial(device)) => line_bit_rate(device, bit_rate_entry.as_ref(), bit_rate),
+        _ if is_line => bit_rate.unwrap_or(defaults::LINE_BIT_RATE),
+        _ => bit_rate.unwrap_or(defaults::BIT_RATE),
+    };
+    for key in rules::line::CAN_KEYS.into_iter().filter(|_| is_line) {
+        if let Some(entry) = section.get(key) {
+            entry.report(rules::line::can_key(&entry.spot.key));
+        }
+    }
+    let data_bit_rate = section.get("data_bit_rate").filter(|_| !is_line).and_then(|entry| {
         let rate = entry.unbounded(Quantity::BIT_RATE)?;
         rules::bus::data_bit_rate(
             &entry.spot,
@@ -75,7 +96,10 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> 
             interface.as_ref().unwrap_or(&Interface::Simulated),
         )
     });
-    let divider = section.get("period").map_or(Some(1), |entry| divider(&entry, cycle_ns));
+    let divider = match section.get("period") {
+        Some(entry) => divider(&entry, cycle_ns),
+        None => Some(if is_line { line::divider(cycle_ns) } else { 1 }),
+    };
     let restart_ms = section.get("restart_ms").and_then(|entry| entry.integer(ranges::RESTART_MS));
     let service_frames =
         section.get("service_frames_per_cycle").and_then(|entry| entry.integer(ranges::SERVICE_FRAMES));
@@ -104,12 +128,23 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>]) -> 
         name: name.map(str::to_owned),
         bit_rate,
         divider,
-        bit_rate_spot: bit_rate_entry.map(|entry| entry.spot),
-        has_automatic_frames: command_frames.is_none(),
+        is_line,
+        bit_rate_spot: bit_rate_entry.or(interface_entry.filter(|_| is_line)).map(|entry| entry.spot),
+        has_automatic_frames: command_frames.is_none() && !is_line,
         bus,
         spot,
         header,
     }
+}
+
+/// The bit rate of a line is said once: with the device, or by `bit_rate`.
+fn line_bit_rate(device: &SerialDevice, entry: Option<&Entry<'_>>, of_bus: Option<u32>) -> u32 {
+    if let (Some(entry), Some(of_bus), Some(of_device)) = (entry, of_bus, device.bit_rate)
+        && of_bus != of_device
+    {
+        rules::line::two_bit_rates(&entry.spot, of_bus, of_device);
+    }
+    device.bit_rate.or(of_bus).unwrap_or(defaults::LINE_BIT_RATE)
 }
 
 fn interface(entry: &Entry<'_>, earlier: &[ReadBus<'_>]) -> Option<Interface> {

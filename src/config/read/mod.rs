@@ -9,6 +9,7 @@ mod control;
 pub(crate) mod entry;
 mod group;
 mod limits;
+mod line;
 mod machine;
 mod program;
 pub(crate) mod section;
@@ -92,7 +93,8 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowl
     let simulation = machine::simulation(root.section("simulation"), cycle.period_ns);
 
     root.require("bus", "at least one [[bus]]");
-    let buses = bus::buses(root.sections("bus"), cycle.period_ns);
+    let lines = line::names(document, knowledge.families);
+    let buses = bus::buses(root.sections("bus"), cycle.period_ns, &lines);
 
     let mut defaults = root.section("defaults");
     let axis_defaults = defaults.get("axis").and_then(|entry| entry.table());

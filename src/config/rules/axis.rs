@@ -3,7 +3,7 @@
 use takt_rt::{MAX_AXES, OperationMode};
 
 use super::loops::Surroundings;
-use super::{Fields, bit_fields, converter, identifiers, limits, loops, master, name, simulation};
+use super::{Fields, bit_fields, converter, identifiers, limits, line, loops, master, name, simulation};
 use crate::config::drive_family::{DriveFacts, ModeChangeRule, Protocol};
 use crate::config::mode_words::{MODES, mode_word};
 use crate::config::model::{
@@ -35,6 +35,7 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
             fields.at("name").report(duplicate_name(&axis.name));
         }
         validate_place(axis, earlier, config, &fields);
+        line::validate_place(config, index, &fields);
         validate_motion(axis, config, &fields);
         validate_process_data(axis, &fields);
         let at = |key: &str| fields.at(key);
@@ -60,8 +61,10 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
         return;
     };
     let spot = fields.at("node");
-    if spot.integer(axis.node, &ranges::NODE_ID).is_some() {
-        if axis.node == config.master.node {
+    let is_on_line = axis.drive.is_on_serial_line;
+    let nodes = if is_on_line { ranges::LINE_ADDRESS } else { ranges::NODE_ID };
+    if spot.integer(axis.node, &nodes).is_some() {
+        if axis.node == config.master.node && !is_on_line {
             spot.report(duplicate_node(&bus.name, axis.node));
         }
         for other in earlier.iter().filter(|other| (other.bus, other.node) == (axis.bus, axis.node)) {

@@ -33,6 +33,10 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
             fields.at("interface").report(duplicate_interface(&bus.interface));
         }
         divider(&fields.at("period"), bus.divider, config.cycle.period_ns);
+        if config.is_serial_line(index) {
+            super::line::validate(bus, &fields);
+            continue;
+        }
         bit_rate(&fields.at("bit_rate"), f64::from(bus.bit_rate));
         if let Some(rate) = bus.data_bit_rate {
             data_bit_rate(&fields.at("data_bit_rate"), f64::from(rate), bus.bit_rate, &bus.interface);
@@ -62,6 +66,11 @@ pub fn is_same_device(one: &Interface, other: &Interface) -> bool {
             Interface::Slcan(one) | Interface::Converter(one),
             Interface::Slcan(other) | Interface::Converter(other),
         ) => one.device == other.device,
+        (Interface::Serial(one), Interface::Serial(other)) => one.device == other.device,
+        (Interface::Slcan(one) | Interface::Converter(one), Interface::Serial(other))
+        | (Interface::Serial(other), Interface::Slcan(one) | Interface::Converter(one)) => {
+            one.device == other.device
+        }
         _ => one == other && *one != Interface::Simulated,
     }
 }
@@ -71,7 +80,7 @@ fn interface(spot: &Spot<'_>, interface: &Interface) {
     let given = match interface {
         Interface::Simulated => return,
         Interface::SocketCan(name) => name.clone(),
-        Interface::Slcan(_) | Interface::Converter(_) => interface.to_string(),
+        Interface::Slcan(_) | Interface::Converter(_) | Interface::Serial(_) => interface.to_string(),
     };
     match given.parse::<Interface>() {
         Ok(parsed) if parsed == *interface => {}

@@ -9,6 +9,7 @@ pub mod cycle;
 pub mod group;
 pub mod identifiers;
 pub mod limits;
+pub mod line;
 mod loop_stability;
 pub mod loops;
 pub mod master;

@@ -40,6 +40,13 @@ fn unsupported(task: &Task) -> Failure {
         Task::Gains { .. } | Task::GainFactors(_) => {
             ("the gains are the vendor's own objects", "`read` and `write` them by index:subindex")
         }
+        Task::EmergencyStop => {
+            ("the drive has no command of its own for an emergency stop", "`disable` takes its torque")
+        }
+        Task::CommunicationTimeout { .. } => (
+            "a communication time-out is a register of an eRob with Modbus-RTU",
+            "the watchdog of a CANopen drive is its consumer heartbeat (1016): `heartbeat` in the configuration sets it",
+        ),
         Task::ReleaseBrake { .. } => {
             ("how a brake is released is not part of the drive profile", "`enable` releases it, with torque")
         }

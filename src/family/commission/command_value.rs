@@ -84,6 +84,16 @@ pub fn parse(text: &str, quantity: Quantity, is_raw: bool) -> Result<CommandValu
     Err(CommandValueError::NoNumber { text: text_owned(), quantity: name, example })
 }
 
+/// A number with a unit that its drive has on the wire, by a table of such units: the symbol, the unit on the wire, and how many of it
+/// that are. `None` if the text has none of them.
+pub fn in_units_of_drive<U: Copy + PartialEq>(units: &[(&str, U, f64)], unit: U, text: &str) -> Option<i64> {
+    let is_of_unit = |letter: char| !letter.is_ascii_digit() && !".+-−_ ".contains(letter);
+    let (digits, symbol) = text.split_at(text.find(is_of_unit)?);
+    let factor = units.iter().find(|(known, of, _)| *known == symbol.trim() && *of == unit)?.2;
+    let number: f64 = digits.trim().replace('−', "-").parse().ok()?;
+    Some((number * factor).round() as i64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

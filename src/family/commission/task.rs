@@ -104,6 +104,13 @@ pub enum Task {
         /// Whether the user confirmed that nothing holds the joint.
         is_confirmed: bool,
     },
+    /// Stop the joint as fast as the drive can, whatever that does to its gear, by a command of its own.
+    EmergencyStop,
+    /// Set how long the drive waits for its master.
+    CommunicationTimeout {
+        /// 0 for ever.
+        milliseconds: u16,
+    },
     /// Clear the drive's fault.
     ClearFault {
         /// Whether the user confirmed the loss of the turn count, where clearing causes it.

@@ -1,9 +1,9 @@
 //! The drive that stands in for an axis on a simulated bus, or on an interface by `takt sim`.
 
 use crate::config::{Axis, FamilyKeys};
+use crate::family::simulated_joint::{encoder, mechanics};
 use crate::sim::Drive;
 use crate::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
-use crate::sim::plant::{Encoder, JointParameters};
 
 /// From a request to its reply: up to 1 ms in the captures of the manual.
 const REPLY_NS: u64 = 500_000;
@@ -31,19 +31,11 @@ impl Firmware {
 /// The drive that simulates an axis. It has been switched on for as long as it needs to be enabled.
 pub fn drive(axis: &Axis) -> Box<dyn Drive> {
     let firmware = axis.drive.description::<Firmware>().copied().unwrap_or_default();
-    let direction = if axis.reversed { -1.0 } else { 1.0 };
-    let counts_per_unit = direction * axis.counts_per_turn * axis.gear_ratio / axis.travel.per_turn();
     let joint = &axis.simulated;
     Box::new(ErobCanDrive::new(ErobCanParameters {
         node: axis.node,
-        joint: JointParameters {
-            inertia: axis.joint.inertia(),
-            viscous_friction: axis.joint.viscous_friction(),
-            coulomb_friction: axis.joint.coulomb_friction(),
-            friction_shape: axis.simulated.friction,
-            brake_torque: 2.0 * joint.peak_torque,
-        },
-        encoder: Encoder { counts_per_unit, zero_counts: axis.zero_counts.into() },
+        joint: mechanics(axis),
+        encoder: encoder(axis),
         counts_per_turn: axis.counts_per_turn,
         initial_position: joint.initial_position,
         peak_torque: joint.peak_torque,

@@ -75,7 +75,9 @@ impl Work {
 }
 
 async fn carry_out(drive: &ErobDrive, s: &TargetDrive, work: Work) -> Result<Report, Failure> {
-    connect(drive).await?;
+    if !matches!(work, Work::Task(Task::EmergencyStop)) {
+        connect(drive).await?;
+    }
     let task = match work {
         Work::Read(registers) => return selection::read(drive, s, &registers).await,
         Work::Write(register, value) => return selection::write(drive, s, &register, value).await,
@@ -117,6 +119,20 @@ async fn carry_out(drive: &ErobDrive, s: &TargetDrive, work: Work) -> Result<Rep
         }
         Task::SetId { node } => set_address(drive, node).await,
         Task::Zero { is_confirmed } => clear_turns(drive, s, is_confirmed).await,
+        Task::EmergencyStop => {
+            commands::stop_in_an_emergency(drive).await?;
+            summary(drive, s).await
+        }
+        Task::CommunicationTimeout { milliseconds } => {
+            commands::set_communication_timeout(drive, milliseconds).await.map_err(of_command)?;
+            drive.session().note(
+                "`save` keeps it without power; an axis of a configuration sets its own before it is enabled",
+            );
+            let mut report = Report::new();
+            let shown = if milliseconds == 0 { "none".to_owned() } else { format!("{milliseconds} ms") };
+            report.add("communication_timeout_ms", "communication time-out", milliseconds, shown);
+            Ok(report)
+        }
         Task::ClearFault { .. } => {
             let before = commands::clear_fault(drive).await.map_err(of_command)?;
             let code = before.map_or(0, |code| code.0);
@@ -453,6 +469,9 @@ fn of_motion(s: &TargetDrive, failure: MotionFailure) -> Failure {
             what,
             cure: Some("check whether something blocks the joint, and the profile in the drive"),
         },
-        MotionFailure::NotStopped { .. } => Failure::Request { what, cure: Some("use the emergency stop") },
+        MotionFailure::NotStopped { .. } => Failure::Request {
+            what,
+            cure: Some("`takt drive … emergency-stop` stops it in less than 50 ms"),
+        },
     }
 }

@@ -11,9 +11,11 @@ pub static FACTS: DriveFacts = DriveFacts {
     // 19 bits on the output side (the vendor's other manuals; that of Modbus does not say).
     counts_per_turn: Some(524_288.0),
     velocity_unit: VelocityUnit::Counts(1.0),
-    // An axis would follow positions. How it is commanded for that is no matter of a configuration.
+    // The axis follows positions. How it is commanded for that is no matter of a configuration.
     modes: ModeSet::of(&[OperationMode::CyclicSynchronousPosition]),
     mode_changes: ModeChangeRule::Never { because: "the axis follows positions at its own rate" },
+    is_on_serial_line: true,
+    bit_rates: &[9_600, 19_200, 38_400, 115_200],
     has_fixed_process_data: true,
     reports_mode: false,
     error_control: ErrorControl::None,

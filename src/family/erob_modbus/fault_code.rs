@@ -21,11 +21,18 @@ impl FaultCode {
     /// The battery of a multi-turn encoder is empty, or was disconnected.
     pub const MULTI_TURN_BATTERY: Self = Self(0x730F);
 
+    /// No code of the drive: it has refused a setting before it was enabled, or to be enabled, and shows no fault.
+    pub const REFUSED: Self = Self(0xFFFF);
+    /// No code of the drive: register 0x0002 shows another communication time-out than was written, so that it was not enabled.
+    pub const TIMEOUT_NOT_KEPT: Self = Self(0xFFFE);
+
     /// What the code means.
     pub fn words(self) -> &'static str {
         match self {
             Self::COMMUNICATION_TIMEOUT => "RS-485 communication time-out",
             Self::MULTI_TURN_BATTERY => "battery voltage of the multi-turn encoder low",
+            Self::REFUSED => "the drive has refused to be prepared or enabled",
+            Self::TIMEOUT_NOT_KEPT => "the drive has not kept its communication time-out",
             Self(code) => emcy::ErrorCode(code).words(),
         }
     }
@@ -39,6 +46,13 @@ impl FaultCode {
             Self::MULTI_TURN_BATTERY => {
                 "replace the battery, then reset the encoder; this also wipes the count of turns, so the joint's zero must \
                  be set again"
+            }
+            Self::REFUSED => {
+                "see its state with `takt drive … info`, and whether another master commands it; then switch it off and on"
+            }
+            Self::TIMEOUT_NOT_KEPT => {
+                "write another `communication_timeout`, or \"0 ms\" if its firmware has none; without it nothing stops the drive when the \
+                 line is cut"
             }
             Self(code) => error_cure(SAME_MODULE, code),
         }

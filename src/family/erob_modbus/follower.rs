@@ -1,22 +1,25 @@
-//! Leads one drive by velocity control along set-points that come from outside, without input and output.
+//! Leads one drive by velocity control along set-points that come from outside: which request is next, and what follows from its
+//! outcome. The line of the drive carries the requests, see [`line`](super::line).
 //!
 //! ```text
-//! wish to follow ──▶ Preparing ──▶ Enabled (500 ms) ──▶ Following ──┐ stale targets
+//! wish to follow ──▶ Preparing ──▶ Enabled (500 ms) ──▶ Following ──┐ stale set-points, a drive that was silent
 //!        ▲                                                          ▼
-//!      Off ◀── Disabling ◀──────────────────────────────────── Stopping
+//!      Off ◀── Disarming ◀── Disabling ◀──────────────────────── Stopping
 //! ```
 //!
-//! One request is under way at a time, and writes and reads take turns: a velocity, what the drive does, the next velocity. The
-//! velocity is that of the set-point and a correction of the position. When the set-points are stale, the joint is stopped and disabled;
-//! it follows again when that was unwished in between.
+//! A round has three requests: the set-point of the velocity, a read of the position, and another read. The velocity is that of the
+//! reference and a correction of the position. When the set-points are stale, the joint is stopped and disabled; it follows again when that
+//! was unwished in between. The drive watches its master (register 0x0002) from before it is enabled until it is disabled.
 
 use takt_rt::{DriveState, Nanoseconds, OffCycleReport};
 
 use super::drive::ReachedStatus;
+use super::fault_code::FaultCode;
 use super::registers::{self, Register};
 use crate::family::{OffCycleTarget, OffCycleWish};
-use crate::modbus::frame::{RegisterRange, RegisterValues, Request, SlaveAddress, Values};
-use crate::modbus::master::{Answer, Master, MasterTiming, Repeat};
+use crate::modbus::exception::ExceptionCode;
+use crate::modbus::frame::{RegisterRange, RegisterValues, Request, Values};
+use crate::modbus::master::{Answer, RequestError, RequestFailure};
 
 /// From enabling to the first velocity.
 const ENABLED_NS: Nanoseconds = 500_000_000;
@@ -26,29 +29,33 @@ const AGAIN_NS: Nanoseconds = 500_000_000;
 const STOPPING_NS: Nanoseconds = 2_000_000_000;
 /// A joint slower than this stands: counts/s. The readings of a joint at rest are not quite 0.
 const STANDING: f64 = 300.0;
+/// The set-points of a controller that is alive are never so old.
+pub const STALE_NS: Nanoseconds = 100_000_000;
+/// A drive that has not replied for so long is stopped as soon as it replies again.
+const LOST_NS: Nanoseconds = 200_000_000;
+/// A drive that did not reply so often in a row is asked less often, so that the other ones of its line have their turns.
+const SILENT_AFTER: u32 = 3;
+/// From one request to a silent drive to the next.
+const SILENT_NS: Nanoseconds = 500_000_000;
 
 /// What a follower is made with.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FollowerParameters {
-    /// The address of the drive.
-    pub slave: SlaveAddress,
-    /// The line. Retries are of no use here: the next turn brings what is new.
-    pub timing: MasterTiming,
     /// Counts of the drive for one radian (metre) of the joint; negative when the counts go down.
     pub counts_per_unit: f64,
     /// The counts at the joint's zero.
     pub zero_counts: f64,
     /// The highest velocity that is commanded: rad/s (m/s).
     pub velocity_limit: f64,
-    /// How fast the drive changes its velocity: rad/s² (m/s²).
+    /// How fast the drive becomes faster: rad/s² (m/s²).
     pub acceleration: f64,
-    /// The velocity for a position error of one unit: 1/s. With a turn of 20 ms, 5 to 10 is steady.
+    /// How fast the drive becomes slower: rad/s² (m/s²).
+    pub deceleration: f64,
+    /// The velocity for a position error of one unit: 1/s. With a round of 20 ms, 5 to 10 is steady.
     pub position_gain: f64,
-    /// The torque of the joint for one ampere: N·m/A (N/A); 0 where it is not known.
-    pub torque_per_ampere: f64,
-    /// Targets that are older than this are stale.
-    pub stale_ns: Nanoseconds,
-    /// What is written into register 0x0002: how long (ms) the drive waits for its master; 0 for ever.
+    /// The torque of the joint at the continuous current of the drive: N·m (N); `None` where it is not known.
+    pub rated_torque: Option<f64>,
+    /// What is written into register 0x0002 before enabling: how long (ms) the drive waits for its master; 0 for ever.
     pub communication_timeout_ms: u16,
 }
 
@@ -57,7 +64,7 @@ pub struct FollowerParameters {
 enum Life {
     /// Without torque, and told nothing.
     Off,
-    /// The writes before enabling are under way: this one is next, not before a time.
+    /// The requests before enabling are under way: this one is next, not before a time.
     Preparing { step: usize, from_ns: Nanoseconds },
     /// It was enabled at this time.
     Enabled { since_ns: Nanoseconds },
@@ -67,15 +74,20 @@ enum Life {
     Stopping { since_ns: Nanoseconds },
     /// It is told to disable until it has confirmed.
     Disabling,
+    /// It is told that it need not watch its master any more.
+    Disarming,
 }
 
 /// What a request is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
     Prepare,
+    /// Whether the drive has kept the communication time-out.
+    ReadBack,
     Enable,
     Command,
     Disable,
+    Disarm,
     ClearFault,
     Read(Reading),
 }
@@ -89,41 +101,73 @@ enum Reading {
     Speed,
     /// Fault and motion: 0x0060 and 0x0061.
     Fault,
+    /// The continuous current, for which the torque is known: 0x00B0 and 0x00B1.
+    Rating,
 }
 
-/// The position in every second read: it is what the correction needs.
-const READINGS: [Reading; 4] = [Reading::Fault, Reading::Place, Reading::Speed, Reading::Place];
+impl Reading {
+    fn range(self) -> Option<RegisterRange> {
+        let (first, count) = match self {
+            Self::Fault => (registers::FAULT_CODE, 2),
+            Self::Place => (registers::REACHED_STATUS, 7),
+            Self::Speed => (registers::DEMANDED_VELOCITY, 10),
+            Self::Rating => (registers::CONTINUOUS_CURRENT, 2),
+        };
+        RegisterRange::new(first.address, count)
+    }
+}
+
+/// The requests of a round, in their order.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Turn {
+    /// A set-point or a command, if there is one.
+    #[default]
+    Write,
+    Place,
+    /// Another reading than the position.
+    Other,
+}
 
 /// What the drive has said.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Seen {
     /// counts
     position: f64,
     at_ns: Nanoseconds,
     /// counts/s
     velocity: f64,
+    speed_at_ns: Nanoseconds,
     milliamperes: f64,
+    continuous_milliamperes: Option<f64>,
     fault: u16,
     is_motor_off: bool,
 }
 
 /// Leads one drive.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Follower {
     parameters: FollowerParameters,
-    master: Master,
     life: Life,
     /// It follows only after it was unwished: targets were stale, or the drive has lost its torque.
     must_be_unwished: bool,
+    /// What the drive has refused before it was enabled. It is shown as a fault until it is cleared.
+    refusal: Option<FaultCode>,
     under_way: Option<Purpose>,
-    /// The next request is a read.
-    is_turn_of_reading: bool,
-    reading: usize,
+    turn: Turn,
+    /// Counts the readings other than that of the position.
+    others: usize,
     seen: Seen,
-    /// The readings that have come since the beginning, or since the drive did not reply: all four before anything is reported.
-    known: usize,
+    /// What has been read since the beginning: the fault and the velocity must be, before anything is reported.
+    is_fault_known: bool,
+    is_speed_known: bool,
+    /// The drive has lost its torque, and has not said why: that is read before it is reported.
+    asks_why: bool,
+    is_clearing_wished: bool,
     clear_from_ns: Nanoseconds,
-    lost: u64,
+    answered_ns: Option<Nanoseconds>,
+    /// Requests without a reply in a row, and when the drive is asked again.
+    silent: u32,
+    ask_from_ns: Nanoseconds,
 }
 
 impl Follower {
@@ -131,60 +175,98 @@ impl Follower {
     pub const fn new(parameters: FollowerParameters) -> Self {
         Self {
             parameters,
-            master: Master::new(parameters.timing),
             life: Life::Off,
             must_be_unwished: false,
+            refusal: None,
             under_way: None,
-            is_turn_of_reading: true,
-            reading: 0,
+            turn: Turn::Write,
+            others: 0,
             seen: Seen {
                 position: 0.0,
                 at_ns: 0,
                 velocity: 0.0,
+                speed_at_ns: 0,
                 milliamperes: 0.0,
+                continuous_milliamperes: None,
                 fault: 0,
                 is_motor_off: true,
             },
-            known: 0,
+            is_fault_known: false,
+            is_speed_known: false,
+            asks_why: false,
+            is_clearing_wished: false,
             clear_from_ns: 0,
-            lost: 0,
+            answered_ns: None,
+            silent: 0,
+            ask_from_ns: 0,
         }
     }
 
-    /// Requests that have failed.
-    pub const fn lost_requests(&self) -> u64 {
-        self.lost
+    /// Whether the drive has no torque, and does not watch for its master, as far as this side knows.
+    pub const fn is_settled(&self) -> bool {
+        matches!(self.life, Life::Off)
     }
 
-    /// Takes bytes that have come over the line.
-    pub fn receive(&mut self, bytes: &[u8]) {
-        self.master.receive(bytes);
-    }
-
-    /// Goes on: returns the bytes to send, and what the drive has said. `now_ns` and the time of the target are of one clock.
-    pub fn poll(
-        &mut self,
-        now_ns: Nanoseconds,
-        target: &OffCycleTarget,
-    ) -> (Option<Vec<u8>>, Option<OffCycleReport>) {
-        let bytes = self.master.poll(now_ns);
-        let report = self.take_outcome(now_ns);
+    /// The next request, whose outcome is to be given to [`Follower::take`]; `None` if the drive is not to be asked now.
+    pub fn next(&mut self, now_ns: Nanoseconds, target: &OffCycleTarget) -> Option<Request> {
         self.go_on(now_ns, target);
-        if bytes.is_some() || self.under_way.is_some() {
-            return (bytes, report);
+        if now_ns < self.ask_from_ns {
+            return None;
         }
-        self.begin_next(now_ns, target);
-        (self.master.poll(now_ns), report)
+        let turn = self.turn;
+        self.turn = match turn {
+            Turn::Write => Turn::Place,
+            Turn::Place => Turn::Other,
+            Turn::Other => Turn::Write,
+        };
+        let (purpose, request) = match turn {
+            Turn::Write => match self.write(now_ns, target) {
+                Some(write) => write,
+                None => return self.next(now_ns, target),
+            },
+            Turn::Place => read(Reading::Place)?,
+            Turn::Other => {
+                let other = self.other_reading();
+                read(other)?
+            }
+        };
+        self.under_way = Some(purpose);
+        Some(request)
+    }
+
+    fn other_reading(&mut self) -> Reading {
+        let needs_rating =
+            self.parameters.rated_torque.is_some() && self.seen.continuous_milliamperes.is_none();
+        self.others = self.others.wrapping_add(1);
+        if self.asks_why || !self.is_fault_known {
+            Reading::Fault
+        } else if !self.is_speed_known {
+            Reading::Speed
+        } else if needs_rating && self.others.is_multiple_of(8) {
+            Reading::Rating
+        } else if self.others.is_multiple_of(2) {
+            Reading::Fault
+        } else {
+            Reading::Speed
+        }
     }
 
     /// What follows from the wish, from the age of the target, and from what the drive shows.
     fn go_on(&mut self, now_ns: Nanoseconds, target: &OffCycleTarget) {
         let wants_to_follow = target.wish == OffCycleWish::Follow;
-        let is_stale = now_ns.saturating_sub(target.at_ns) > self.parameters.stale_ns;
+        let is_stale = now_ns.saturating_sub(target.at_ns) > STALE_NS;
+        let is_lost =
+            self.silent > 0 && self.answered_ns.is_some_and(|at_ns| now_ns.saturating_sub(at_ns) > LOST_NS);
+        let before = self.life;
         if !wants_to_follow {
             self.must_be_unwished = false;
         }
-        let is_told = !matches!(self.life, Life::Off | Life::Disabling);
+        if target.wish == OffCycleWish::ClearFaults {
+            // It may not be wished any more when there is room for the request.
+            self.is_clearing_wished = self.seen.fault != 0;
+            self.refusal = None;
+        }
+        let is_told = !matches!(self.life, Life::Off | Life::Disabling | Life::Disarming);
         if is_told && !wants_to_follow && !is_stale {
             self.life = Life::Disabling;
         }
@@ -193,12 +275,15 @@ impl Follower {
                 if wants_to_follow
                     && !is_stale
                     && !self.must_be_unwished
-                    && self.known == READINGS.len()
-                    && self.seen.fault == 0 =>
+                    && self.is_known()
+                    && self.seen.fault == 0
+                    && self.refusal.is_none() =>
             {
                 self.life = Life::Preparing { step: 0, from_ns: now_ns };
             }
-            Life::Preparing { .. } | Life::Enabled { .. } if is_stale => {
+            Life::Preparing { .. } | Life::Enabled { .. }
+                if is_stale || is_lost || self.seen.fault != 0 || self.refusal.is_some() =>
+            {
                 self.must_be_unwished = true;
                 self.life = Life::Disabling;
             }
@@ -209,87 +294,84 @@ impl Follower {
                 self.must_be_unwished = true;
                 self.life = Life::Disabling;
             }
-            Life::Following if is_stale => {
+            Life::Following if is_stale || is_lost => {
                 self.must_be_unwished = true;
                 self.life = Life::Stopping { since_ns: now_ns };
             }
             Life::Stopping { since_ns } => {
                 let has_taken_long = now_ns.saturating_sub(since_ns) > STOPPING_NS;
-                if has_taken_long || self.seen.at_ns > since_ns && self.seen.velocity.abs() < STANDING {
+                let stands = self.seen.speed_at_ns > since_ns && self.seen.velocity.abs() < STANDING;
+                if has_taken_long || stands {
                     self.life = Life::Disabling;
                 }
             }
-            Life::Off | Life::Preparing { .. } | Life::Enabled { .. } | Life::Following | Life::Disabling => {
-            }
+            Life::Off
+            | Life::Preparing { .. }
+            | Life::Enabled { .. }
+            | Life::Following
+            | Life::Disabling
+            | Life::Disarming => {}
+        }
+        if self.life != before && matches!(self.life, Life::Stopping { .. } | Life::Disabling) {
+            // It does not wait for the rest of the round.
+            self.turn = Turn::Write;
         }
     }
 
-    /// The writes before enabling.
+    fn is_known(&self) -> bool {
+        self.is_fault_known && self.is_speed_known && self.seen.at_ns > 0
+    }
+
+    /// The writes before enabling. The one that the drive watches its master by is the last.
     fn preparation(&self) -> [(Register, i64); 6] {
-        let rate = self.counts(self.parameters.acceleration).abs().clamp(1.0, f64::from(u32::MAX)) as i64;
+        let rate = |rate: f64| self.counts(rate).abs().clamp(1.0, f64::from(u32::MAX)) as i64;
         [
             (registers::OPERATION_MODE, 2),
             (registers::CONTROL_SOURCE, 0),
-            (registers::PROFILE_ACCELERATION, rate),
-            (registers::PROFILE_DECELERATION, rate),
+            (registers::PROFILE_ACCELERATION, rate(self.parameters.acceleration)),
+            (registers::PROFILE_DECELERATION, rate(self.parameters.deceleration)),
             // It acts as soon as the motor is enabled.
             (registers::TARGET_VELOCITY, 0),
             (registers::COMMUNICATION_TIMEOUT, self.parameters.communication_timeout_ms.into()),
         ]
     }
 
-    fn begin_next(&mut self, now_ns: Nanoseconds, target: &OffCycleTarget) {
-        let write = if self.is_turn_of_reading { None } else { self.next_write(now_ns, target) };
-        self.is_turn_of_reading = !self.is_turn_of_reading;
-        let (purpose, request) = match write {
-            Some((purpose, register, value)) => match written(&register, value) {
-                Some(request) => (purpose, request),
-                None => return,
-            },
-            None => {
-                let reading = READINGS[self.reading % READINGS.len()];
-                self.reading = (self.reading + 1) % READINGS.len();
-                self.is_turn_of_reading = false;
-                let Some(range) = range_of(reading) else { return };
-                (Purpose::Read(reading), Request::Read(range))
-            }
-        };
-        if self.master.start(self.parameters.slave, request, Repeat::Allowed).is_ok() {
-            self.under_way = Some(purpose);
-        }
-    }
-
-    fn next_write(
-        &mut self,
-        now_ns: Nanoseconds,
-        target: &OffCycleTarget,
-    ) -> Option<(Purpose, Register, i64)> {
-        match self.life {
+    fn write(&mut self, now_ns: Nanoseconds, target: &OffCycleTarget) -> Option<(Purpose, Request)> {
+        let (purpose, register, value) = match self.life {
             Life::Preparing { step, from_ns } if now_ns >= from_ns => {
-                let next = self.preparation().get(step).copied();
-                let (register, value) = next.unwrap_or((registers::MOTOR_ENABLE, 1));
-                Some((if next.is_some() { Purpose::Prepare } else { Purpose::Enable }, register, value))
+                let preparation = self.preparation();
+                match preparation.get(step) {
+                    Some((register, value)) => (Purpose::Prepare, *register, *value),
+                    None if step == preparation.len() => {
+                        let timeout = RegisterRange::new(registers::COMMUNICATION_TIMEOUT.address, 1)?;
+                        return Some((Purpose::ReadBack, Request::Read(timeout)));
+                    }
+                    None => (Purpose::Enable, registers::MOTOR_ENABLE, 1),
+                }
             }
-            Life::Following => {
-                Some((Purpose::Command, registers::TARGET_VELOCITY, self.velocity(now_ns, target)))
-            }
-            Life::Stopping { .. } => Some((Purpose::Command, registers::TARGET_VELOCITY, 0)),
-            Life::Disabling => Some((Purpose::Disable, registers::MOTOR_ENABLE, 0)),
-            Life::Off
-                if target.wish == OffCycleWish::ClearFaults
-                    && self.seen.fault != 0
-                    && now_ns >= self.clear_from_ns =>
-            {
+            Life::Following => (Purpose::Command, registers::TARGET_VELOCITY, self.velocity(now_ns, target)),
+            Life::Stopping { .. } => (Purpose::Command, registers::TARGET_VELOCITY, 0),
+            Life::Disabling => (Purpose::Disable, registers::MOTOR_ENABLE, 0),
+            Life::Disarming => (Purpose::Disarm, registers::COMMUNICATION_TIMEOUT, 0),
+            Life::Off if self.is_clearing_wished && self.seen.fault != 0 && now_ns >= self.clear_from_ns => {
+                self.is_clearing_wished = false;
                 self.clear_from_ns = now_ns.saturating_add(AGAIN_NS);
-                Some((Purpose::ClearFault, registers::CLEAR_FAULT, 1))
+                (Purpose::ClearFault, registers::CLEAR_FAULT, 1)
             }
-            Life::Off | Life::Preparing { .. } | Life::Enabled { .. } => None,
-        }
+            Life::Off | Life::Preparing { .. } | Life::Enabled { .. } => return None,
+        };
+        let words = register.encode(value).ok()?;
+        let request = match words.as_slice() {
+            [word] => Request::WriteOne { register: register.address, value: *word },
+            words => Request::WriteSeveral(RegisterValues::new(register.address, words)?),
+        };
+        Some((purpose, request))
     }
 
     /// The velocity for the drive: counts/s.
     fn velocity(&self, now_ns: Nanoseconds, target: &OffCycleTarget) -> i64 {
-        let seconds = |since_ns: Nanoseconds| now_ns.saturating_sub(since_ns) as f64 * 1e-9;
+        // What is older stops the joint, so that nothing is foretold for longer.
+        let seconds = |since_ns: Nanoseconds| now_ns.saturating_sub(since_ns).min(LOST_NS) as f64 * 1e-9;
         let wanted = target.position + target.velocity * seconds(target.at_ns);
         let here =
             self.position() + self.seen.velocity / self.parameters.counts_per_unit * seconds(self.seen.at_ns);
@@ -309,28 +391,40 @@ impl Follower {
         (self.seen.position - self.parameters.zero_counts) / self.parameters.counts_per_unit
     }
 
-    fn take_outcome(&mut self, now_ns: Nanoseconds) -> Option<OffCycleReport> {
-        let outcome = self.master.take_outcome()?;
+    /// Takes the outcome of the last request. Returns what the drive has said, if that is news.
+    pub fn take(
+        &mut self,
+        now_ns: Nanoseconds,
+        outcome: Result<Answer, RequestError>,
+    ) -> Option<OffCycleReport> {
         let purpose = self.under_way.take()?;
-        match (purpose, outcome) {
-            (Purpose::Read(reading), Ok(Answer::Values(values))) => {
-                self.known = (self.known + 1).min(READINGS.len());
-                return self.take_reading(now_ns, reading, &values);
-            }
-            (purpose, Ok(_)) => self.confirm(now_ns, purpose),
-            (purpose, Err(_)) => {
-                self.lost = self.lost.saturating_add(1);
-                // A drive that was switched on just now is busy.
-                if let (Purpose::Enable, Life::Preparing { step, .. }) = (purpose, self.life) {
-                    self.life = Life::Preparing { step, from_ns: now_ns.saturating_add(AGAIN_NS) };
+        match outcome {
+            Ok(answer) => {
+                self.note_answer(now_ns);
+                match (purpose, answer) {
+                    (Purpose::Read(reading), Answer::Values(values)) => {
+                        return self.take_reading(now_ns, reading, &values);
+                    }
+                    (Purpose::ReadBack, Answer::Values(values)) => self.take_timeout(&values),
+                    (purpose, _) => self.confirm(now_ns, purpose),
                 }
-                // What is known of the drive is old.
-                if matches!(purpose, Purpose::Read(_)) {
-                    self.known = 0;
+            }
+            Err(RequestError { failure: RequestFailure::Refused(code), .. }) => {
+                self.note_answer(now_ns);
+                self.take_refusal(now_ns, purpose, code);
+            }
+            Err(_) => {
+                self.silent = self.silent.saturating_add(1);
+                if self.silent >= SILENT_AFTER {
+                    self.ask_from_ns = now_ns.saturating_add(SILENT_NS);
                 }
             }
         }
         None
+    }
+
+    fn note_answer(&mut self, now_ns: Nanoseconds) {
+        (self.answered_ns, self.silent) = (Some(now_ns), 0);
     }
 
     fn confirm(&mut self, now_ns: Nanoseconds, purpose: Purpose) {
@@ -345,9 +439,39 @@ impl Follower {
             }
             // The wish has changed while the request was under way.
             (Purpose::Enable, _) => Life::Disabling,
-            (Purpose::Disable, Life::Disabling) => Life::Off,
+            (Purpose::Disable, Life::Disabling) => Life::Disarming,
+            (Purpose::Disarm, Life::Disarming) => Life::Off,
             (_, life) => life,
         };
+    }
+
+    /// Whether the drive has kept the communication time-out decides whether it is enabled.
+    fn take_timeout(&mut self, values: &Values) {
+        let Life::Preparing { step, from_ns } = self.life else { return };
+        if values.as_slice() == [self.parameters.communication_timeout_ms] {
+            self.life = Life::Preparing { step: step + 1, from_ns };
+        } else {
+            self.refusal = Some(FaultCode::TIMEOUT_NOT_KEPT);
+        }
+    }
+
+    fn take_refusal(&mut self, now_ns: Nanoseconds, purpose: Purpose, code: ExceptionCode) {
+        match (purpose, self.life) {
+            // A drive that was switched on just now is busy.
+            (Purpose::Enable | Purpose::Prepare, Life::Preparing { step, .. })
+                if code == ExceptionCode::BUSY =>
+            {
+                self.life = Life::Preparing { step, from_ns: now_ns.saturating_add(AGAIN_NS) };
+            }
+            (Purpose::Enable | Purpose::Prepare | Purpose::ReadBack, Life::Preparing { .. }) => {
+                // If it shows a fault, that is the reason.
+                self.refusal = Some(FaultCode::REFUSED).filter(|_| self.seen.fault == 0);
+                self.asks_why = true;
+            }
+            // A drive without this register cannot be disarmed, and was never armed.
+            (Purpose::Disarm, Life::Disarming) => self.life = Life::Off,
+            _ => {}
+        }
     }
 
     fn take_reading(
@@ -356,329 +480,165 @@ impl Follower {
         reading: Reading,
         values: &Values,
     ) -> Option<OffCycleReport> {
-        let first = range_of(reading)?.start();
+        let first = reading.range()?.start();
         let number = |register: &Register| {
             let at = usize::from(register.address - first);
             let words = values.get(at..at + usize::from(register.number.words()))?;
             register.decode(words).map(|value| value as f64)
         };
         match reading {
-            Reading::Fault => self.seen.fault = values.first().copied()?,
+            Reading::Fault => {
+                self.seen.fault = values.first().copied()?;
+                self.is_fault_known = true;
+                return std::mem::take(&mut self.asks_why).then(|| self.report());
+            }
             Reading::Speed => {
                 self.seen.velocity = number(&registers::ACTUAL_VELOCITY)?;
                 self.seen.milliamperes = number(&registers::MOTOR_CURRENT)?;
+                self.seen.speed_at_ns = now_ns;
+                self.is_speed_known = true;
+            }
+            Reading::Rating => {
+                self.seen.continuous_milliamperes = Some(number(&registers::CONTINUOUS_CURRENT)?);
             }
             Reading::Place => {
                 let reached = ReachedStatus::from(values.first().copied()?);
                 self.seen.is_motor_off = reached == ReachedStatus::MotorOff;
                 self.seen.position = number(&registers::ACTUAL_POSITION)?;
                 self.seen.at_ns = now_ns;
-                return (self.known == READINGS.len()).then(|| self.report());
+                let has_torque = matches!(self.life, Life::Following | Life::Stopping { .. });
+                self.asks_why |= has_torque && self.seen.is_motor_off && self.seen.fault == 0;
+                return (self.is_known() && !self.asks_why).then(|| self.report());
             }
         }
         None
     }
 
     fn report(&self) -> OffCycleReport {
-        let Seen { velocity, milliamperes, fault, is_motor_off, .. } = self.seen;
+        let Seen { velocity, milliamperes, continuous_milliamperes, fault, is_motor_off, .. } = self.seen;
+        let shown = if fault == 0 { self.refusal.map_or(0, |refusal| refusal.0) } else { fault };
         let state = match self.life {
-            _ if fault != 0 => DriveState::Fault,
-            Life::Following | Life::Stopping { .. } if !is_motor_off => DriveState::OperationEnabled,
+            _ if shown != 0 => DriveState::Fault,
+            Life::Following if !is_motor_off => DriveState::OperationEnabled,
+            Life::Stopping { .. } if !is_motor_off => DriveState::QuickStopActive,
             _ => DriveState::ReadyToSwitchOn,
         };
         let direction = 1f64.copysign(self.parameters.counts_per_unit);
+        let per_milliampere = match (self.parameters.rated_torque, continuous_milliamperes) {
+            (Some(rated), Some(continuous)) if continuous > 0.0 => rated / continuous,
+            _ => 0.0,
+        };
         OffCycleReport {
             state,
             position: self.position(),
             velocity: velocity / self.parameters.counts_per_unit,
-            torque: direction * 1e-3 * milliamperes * self.parameters.torque_per_ampere,
-            error_code: fault,
+            torque: direction * milliamperes * per_milliampere,
+            error_code: shown,
         }
     }
 }
 
-fn range_of(reading: Reading) -> Option<RegisterRange> {
-    let (first, count) = match reading {
-        Reading::Fault => (registers::FAULT_CODE, 2),
-        Reading::Place => (registers::REACHED_STATUS, 7),
-        Reading::Speed => (registers::DEMANDED_VELOCITY, 10),
-    };
-    RegisterRange::new(first.address, count)
-}
-
-fn written(register: &Register, value: i64) -> Option<Request> {
-    let words = register.encode(value).ok()?;
-    match words.as_slice() {
-        [word] => Some(Request::WriteOne { register: register.address, value: *word }),
-        words => RegisterValues::new(register.address, words).map(Request::WriteSeveral),
-    }
+fn read(reading: Reading) -> Option<(Purpose, Request)> {
+    Some((Purpose::Read(reading), Request::Read(reading.range()?)))
 }
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::TAU;
-
     use super::*;
-    use crate::modbus::frame::ReceivedRequest;
-    use crate::modbus::line_timing::LineTiming;
-    use crate::sim::erob_modbus::{
-        Disturbance, ErobModbusDrive, ErobModbusParameters, ModbusDriveFault, SimulatedLine,
-    };
-    use crate::sim::plant::{Encoder, JointParameters};
-    use crate::sim::serial_line::DevicesOnLine;
+    use crate::modbus::frame::SlaveAddress;
 
     const MS: Nanoseconds = 1_000_000;
-    const LINE: LineTiming = LineTiming::new(115_200);
-    const COUNTS_PER_UNIT: f64 = 524_288.0 / TAU;
-    const STALE_NS: Nanoseconds = 100 * MS;
+    const PARAMETERS: FollowerParameters = FollowerParameters {
+        counts_per_unit: 1_000.0,
+        zero_counts: 0.0,
+        velocity_limit: 1.0,
+        acceleration: 1.0,
+        deceleration: 1.0,
+        position_gain: 8.0,
+        rated_torque: None,
+        communication_timeout_ms: 500,
+    };
 
-    /// A drive that is led, and what has come of it.
-    struct Bench {
-        line: SimulatedLine,
+    /// A drive that replies to every request at once, without a fault. `refuses` and `kept_ms` are what is wrong with it.
+    struct Drive {
         follower: Follower,
         now_ns: Nanoseconds,
-        target: OffCycleTarget,
-        reports: Vec<(Nanoseconds, OffCycleReport)>,
+        wish: OffCycleWish,
+        kept_ms: u16,
+        refuses: Option<(u16, ExceptionCode)>,
         written: Vec<u16>,
+        was_enabled: bool,
+        last: Option<OffCycleReport>,
     }
 
-    impl Bench {
-        fn new(ready_ns: Nanoseconds) -> Self {
-            let joint = JointParameters {
-                inertia: 0.3,
-                viscous_friction: 2.0,
-                coulomb_friction: 4.0,
-                friction_shape: crate::config::FrictionShape::Constant,
-                brake_torque: 60.0,
-            };
-            let drive = ErobModbusDrive::new(ErobModbusParameters {
-                address: 2,
-                bit_rate_code: 4,
-                joint,
-                encoder: Encoder { counts_per_unit: -COUNTS_PER_UNIT, zero_counts: 1_000.0 },
-                counts_per_turn: 524_288.0,
-                initial_position: 0.25,
-                peak_torque: 60.0,
-                torque_per_ampere: 5.0,
-                highest_velocity: 3.0,
-                ready_ns,
-                reply_ns: 2 * MS,
-                has_battery: true,
-                has_torque_sensor: false,
-            });
-            let parameters = FollowerParameters {
-                slave: SlaveAddress::new(2).unwrap(),
-                timing: MasterTiming { retries: 0, reply_timeout_ns: 30 * MS, ..MasterTiming::new(LINE) },
-                counts_per_unit: -COUNTS_PER_UNIT,
-                zero_counts: 1_000.0,
-                velocity_limit: 1.0,
-                acceleration: 10.0,
-                position_gain: 8.0,
-                torque_per_ampere: 5.0,
-                stale_ns: STALE_NS,
-                communication_timeout_ms: 500,
-            };
-            let target = OffCycleTarget {
-                wish: OffCycleWish::Observe,
-                position: 0.25,
-                velocity: 0.0,
-                torque: 0.0,
-                at_ns: 0,
-            };
-            let line = SimulatedLine::new(LINE, vec![drive]);
-            let (reports, written) = (vec![], vec![]);
-            Self { line, follower: Follower::new(parameters), now_ns: 0, target, reports, written }
+    impl Drive {
+        fn new() -> Self {
+            let follower = Follower::new(PARAMETERS);
+            let (written, last) = (vec![], None);
+            let (now_ns, wish) = (MS, OffCycleWish::Follow);
+            Self { follower, now_ns, wish, kept_ms: 500, refuses: None, written, was_enabled: false, last }
         }
 
-        /// A drive that follows at 0.25 rad.
-        fn following() -> Self {
-            let mut bench = Self::new(0);
-            bench.run(200, |_| (OffCycleWish::Stop, 0.25, 0.0));
-            bench.run(1_500, |_| (OffCycleWish::Follow, 0.25, 0.0));
-            assert_eq!(bench.state(), DriveState::OperationEnabled);
-            bench
-        }
-
-        /// One turn of whoever calls the follower, 1 ms after the last one.
-        fn turn(&mut self) {
-            self.now_ns += MS;
-            let bytes = self.line.receive(self.now_ns);
-            self.follower.receive(&bytes);
-            let (sent, report) = self.follower.poll(self.now_ns, &self.target);
-            if let Some(frame) = sent {
-                match ReceivedRequest::decode(&frame).unwrap().request.unwrap() {
-                    Request::Read(_) => {}
-                    Request::WriteOne { register, .. } => self.written.push(register),
-                    Request::WriteSeveral(write) => self.written.push(write.start()),
+        fn reply(&mut self, request: Request) -> Result<Answer, RequestError> {
+            let register = match &request {
+                Request::Read(range) if range.start() == registers::COMMUNICATION_TIMEOUT.address => {
+                    return Ok(Answer::Values(vec![self.kept_ms]));
                 }
-                self.line.send(self.now_ns, &frame);
+                Request::Read(range) => return Ok(Answer::Values(vec![0; range.count().into()])),
+                Request::WriteOne { register, .. } => *register,
+                Request::WriteSeveral(write) => write.start(),
+            };
+            self.was_enabled |= request == Request::WriteOne { register: 0x00F0, value: 1 };
+            self.written.push(register);
+            match self.refuses.filter(|(refused, _)| *refused == register) {
+                Some((_, code)) => {
+                    let slave = SlaveAddress::new(1).unwrap();
+                    Err(RequestError { slave, request, failure: RequestFailure::Refused(code) })
+                }
+                None => Ok(Answer::Written),
             }
-            self.reports.extend(report.map(|report| (self.now_ns, report)));
         }
 
-        /// Goes on for some milliseconds, with new targets in each of them: by the time since the beginning in seconds.
-        fn run(&mut self, milliseconds: u64, target: impl Fn(f64) -> (OffCycleWish, f64, f64)) {
-            let began_ns = self.now_ns;
-            for _ in 0..milliseconds {
-                let (wish, position, velocity) = target((self.now_ns - began_ns) as f64 * 1e-9);
-                self.target = OffCycleTarget { wish, position, velocity, torque: 0.0, at_ns: self.now_ns };
-                self.turn();
+        /// So many requests, one every 5 ms.
+        fn run(&mut self, requests: usize) -> OffCycleReport {
+            for _ in 0..requests {
+                self.now_ns += 5 * MS;
+                let target =
+                    OffCycleTarget { wish: self.wish, at_ns: self.now_ns, ..OffCycleTarget::default() };
+                let Some(request) = self.follower.next(self.now_ns, &target) else { continue };
+                let outcome = self.reply(request);
+                self.last = self.follower.take(self.now_ns, outcome).or(self.last);
             }
-        }
-
-        fn drive(&mut self) -> &mut ErobModbusDrive {
-            self.line.drive(0).unwrap()
-        }
-
-        fn position(&mut self) -> f64 {
-            (f64::from(self.drive().counts()) - 1_000.0) / -COUNTS_PER_UNIT
-        }
-
-        fn state(&self) -> DriveState {
-            self.reports.last().unwrap().1.state
+            self.last.unwrap()
         }
     }
 
     #[test]
-    fn what_is_only_observed_is_told_nothing_and_reported() {
-        let mut bench = Bench::new(0);
-        bench.run(1_000, |_| (OffCycleWish::Observe, 0.0, 0.0));
-        assert!(bench.written.is_empty());
-        assert!(bench.reports.len() > 30, "{}", bench.reports.len());
-        let (_, report) = *bench.reports.last().unwrap();
-        assert_eq!(report.state, DriveState::ReadyToSwitchOn);
-        assert!((report.position - 0.25).abs() < 1e-4, "{report:?}");
+    fn a_drive_that_does_not_keep_its_communication_time_out_is_not_enabled_and_says_so_until_that_is_cleared()
+     {
+        let mut drive = Drive { kept_ms: 0, ..Drive::new() };
+        let report = drive.run(100);
+        assert_eq!((report.state, report.error_code), (DriveState::Fault, FaultCode::TIMEOUT_NOT_KEPT.0));
+        assert!(!drive.was_enabled, "{:?}", drive.written);
+        (drive.wish, drive.kept_ms) = (OffCycleWish::ClearFaults, 500);
+        assert_eq!(drive.run(20).state, DriveState::ReadyToSwitchOn);
+        drive.wish = OffCycleWish::Follow;
+        drive.run(60);
+        assert!(drive.written.ends_with(&[0x0051, 0x0002, 0x00F0]), "{:?}", drive.written);
     }
 
     #[test]
-    fn a_sine_is_followed_at_the_rate_of_the_line() {
-        let mut bench = Bench::following();
-        let sine = |time_s: f64| {
-            let phase = TAU * 0.2 * time_s;
-            (OffCycleWish::Follow, 0.25 + 0.3 * (1.0 - phase.cos()), 0.3 * TAU * 0.2 * phase.sin())
-        };
-        let began_ns = bench.now_ns;
-        let mut worst: f64 = 0.0;
-        for _ in 0..10_000 {
-            bench.target.at_ns = bench.now_ns;
-            let time_s = (bench.now_ns - began_ns) as f64 * 1e-9;
-            let (wish, position, velocity) = sine(time_s);
-            bench.target = OffCycleTarget { wish, position, velocity, torque: 0.0, at_ns: bench.now_ns };
-            bench.turn();
-            worst = worst.max((bench.position() - position).abs());
-        }
-        assert!(worst < 0.02, "{worst} rad");
-        assert_eq!((bench.state(), bench.follower.lost_requests()), (DriveState::OperationEnabled, 0));
-        let within = bench.reports.iter().filter(|(at_ns, _)| *at_ns > began_ns).count();
-        assert!(within > 250, "{within} reports in 10 s");
-    }
-
-    #[test]
-    fn the_manuals_writes_and_its_wait_come_before_the_first_velocity() {
-        let mut bench = Bench::new(0);
-        bench.run(200, |_| (OffCycleWish::Stop, 0.25, 0.0));
-        assert!(bench.written.is_empty());
-        bench.run(400, |_| (OffCycleWish::Follow, 0.25, 0.0));
-        assert_eq!(bench.written, [0x0040, 0x0042, 0x0049, 0x004B, 0x0051, 0x0002, 0x00F0]);
-        assert!(bench.drive().is_enabled());
-        assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
-        bench.run(700, |_| (OffCycleWish::Follow, 0.25, 0.0));
-        assert_eq!((bench.written[7], bench.state()), (0x0051, DriveState::OperationEnabled));
-        bench.run(100, |_| (OffCycleWish::Stop, 0.25, 0.0));
-        assert!(!bench.drive().is_enabled());
-        assert_eq!(bench.written.last(), Some(&0x00F0));
-    }
-
-    #[test]
-    fn a_drive_that_was_just_switched_on_is_enabled_as_soon_as_it_can_be() {
-        let mut bench = Bench::new(3_000 * MS);
-        bench.run(5_000, |_| (OffCycleWish::Follow, 0.25, 0.0));
-        assert_eq!(bench.state(), DriveState::OperationEnabled);
-    }
-
-    #[test]
-    fn stale_targets_stop_the_joint_and_disable_it_until_following_was_unwished() {
-        let mut bench = Bench::following();
-        bench.run(1_000, |time_s| (OffCycleWish::Follow, 0.25 + 0.5 * time_s, 0.5));
-        assert!(bench.drive().velocity().abs() > 30_000.0);
-        let stale_ns = bench.now_ns;
-        let mut stood_ns = None;
-        while bench.drive().is_enabled() {
-            bench.turn();
-            if bench.drive().velocity().abs() < 500.0 {
-                stood_ns = stood_ns.or(Some(bench.now_ns));
-            }
-            assert!(bench.now_ns < stale_ns + 1_000 * MS);
-        }
-        let passed_ms = (stood_ns.unwrap() - stale_ns) / MS;
-        assert!((100..350).contains(&passed_ms), "it stands after {passed_ms} ms");
-        // It does not follow again by itself.
-        bench.run(1_000, |_| (OffCycleWish::Follow, 0.9, 0.0));
-        assert!(!bench.drive().is_enabled());
-        assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
-        let here = bench.position();
-        bench.run(100, |_| (OffCycleWish::Stop, here, 0.0));
-        bench.run(1_500, |_| (OffCycleWish::Follow, here, 0.0));
-        assert_eq!(bench.state(), DriveState::OperationEnabled);
-    }
-
-    #[test]
-    fn a_fault_is_reported_with_its_code_and_cleared_when_that_is_wished() {
-        let mut bench = Bench::following();
-        bench.drive().inject(ModbusDriveFault::Code(0x2310));
-        bench.run(300, |_| (OffCycleWish::Follow, 0.25, 0.0));
-        let (_, report) = *bench.reports.last().unwrap();
-        assert_eq!((report.state, report.error_code), (DriveState::Fault, 0x2310));
-        bench.run(500, |_| (OffCycleWish::Stop, 0.25, 0.0));
-        assert_eq!(bench.state(), DriveState::Fault);
-        bench.run(500, |_| (OffCycleWish::ClearFaults, 0.25, 0.0));
-        assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
-        assert_eq!(bench.written.iter().filter(|register| **register == 0x00F6).count(), 1);
-        bench.run(1_500, |_| (OffCycleWish::Follow, 0.25, 0.0));
-        assert_eq!(bench.state(), DriveState::OperationEnabled);
-    }
-
-    #[test]
-    fn a_drive_that_has_lost_its_torque_is_reported_and_not_enabled_again() {
-        let mut bench = Bench::following();
-        bench.drive().inject(ModbusDriveFault::TorqueOff);
-        bench.run(1_000, |_| (OffCycleWish::Follow, 0.25, 0.0));
-        assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
-        assert!(!bench.drive().is_enabled());
-    }
-
-    #[test]
-    fn a_cut_line_ends_the_reports_and_the_communication_time_out_stops_the_joint() {
-        let mut bench = Bench::following();
-        bench.line.disturb(Disturbance { is_cut: true, ..Disturbance::default() }, 0);
-        let reports = bench.reports.len();
-        bench.run(1_000, |time_s| (OffCycleWish::Follow, 0.25 + 0.5 * time_s, 0.5));
-        assert!(bench.reports.len() <= reports + 1);
-        assert_eq!(bench.drive().fault(), 0x0FA2);
-        assert!(bench.follower.lost_requests() > 5);
-        bench.line.disturb(Disturbance::default(), 0);
-        bench.run(500, |_| (OffCycleWish::Stop, 0.25, 0.0));
-        assert_eq!(bench.state(), DriveState::Fault);
-    }
-
-    #[test]
-    fn a_noisy_line_costs_turns_and_no_motion() {
-        let mut bench = Bench::following();
-        let noise = Disturbance { wrong_per_million: 1_500, lost_per_million: 500, is_cut: false };
-        bench.line.disturb(noise, 7);
-        let mut worst: f64 = 0.0;
-        for _ in 0..10 {
-            bench.run(1_000, |_| (OffCycleWish::Follow, 0.25, 0.0));
-            worst = worst.max((bench.position() - 0.25).abs());
-        }
-        assert!(worst < 0.01, "{worst} rad");
-        assert!(bench.follower.lost_requests() > 10);
-    }
-
-    #[test]
-    fn a_target_that_is_no_number_commands_the_velocity_0() {
-        let mut bench = Bench::following();
-        bench.run(500, |_| (OffCycleWish::Follow, f64::NAN, f64::INFINITY));
-        assert_eq!(bench.drive().velocity(), 0.0);
+    fn a_drive_that_refuses_a_setting_shows_that_as_its_fault_and_one_that_is_busy_is_asked_again() {
+        let refused = Some((0x0040, ExceptionCode::ILLEGAL_VALUE));
+        let mut drive = Drive { refuses: refused, ..Drive::new() };
+        let report = drive.run(100);
+        assert_eq!((report.state, report.error_code), (DriveState::Fault, FaultCode::REFUSED.0));
+        let mut drive = Drive { refuses: Some((0x00F0, ExceptionCode::BUSY)), ..Drive::new() };
+        assert_eq!(drive.run(300).state, DriveState::ReadyToSwitchOn);
+        assert!(
+            drive.written.iter().filter(|register| **register == 0x00F0).count() >= 3,
+            "{:?}",
+            drive.written
+        );
     }
 }

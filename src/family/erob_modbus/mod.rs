@@ -1,43 +1,46 @@
 //! ZeroErr eRob whose RS-485 line speaks Modbus-RTU (eRob Modbus-RTU manual 1.5).
 //!
-//! The line is too slow for the cycle: procedures move such a drive, one request at a time.
+//! The line is too slow for the cycle: procedures move such a drive, one request at a time, and an axis follows its group beside the
+//! cycle.
 //!
 //! - [`registers`]: the table of registers.
 //! - [`fault_code`]: the codes of faults in words.
 //! - [`drive`]: the registers of one drive, by a session.
 //! - [`motion`]: the motions of the manual, with their steps and waits.
 //! - [`commands`]: what is done with a drive beside motions: saving, faults, the encoder, the communication time-out.
-//! - [`follower`]: an axis of a group, led by velocities beside the cycle.
+//! - `axis`, [`follower`], [`line`]: an axis of a group, led by velocities beside the cycle, and the drives of a line by turns.
+//! - [`budget`]: how often each of them is spoken to.
 //! - `commission`: what `takt drive` does with it.
+//! - `simulated`: the drives that stand in for axes.
 
+mod axis;
+pub mod budget;
 pub mod commands;
 mod commission;
 pub mod drive;
 mod facts;
 pub mod fault_code;
-#[cfg_attr(not(feature = "internals"), allow(dead_code, unnameable_types, reason = "no axis uses it yet"))]
 pub mod follower;
+pub mod line;
 pub mod motion;
 pub mod registers;
 mod selection;
+mod simulated;
 
 pub use facts::FACTS;
-
-use std::f64::consts::TAU;
 
 use takt_rt::Frame;
 
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
-use super::{Family, NamedEntry, SettingUp};
-use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys, FrictionShape};
+use super::{Family, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp};
+use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::modbus::frame::SlaveAddress;
-use crate::modbus::line_timing::LineTiming;
-use crate::sim::Drive;
-use crate::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
-use crate::sim::plant::{Encoder, JointParameters};
-use crate::sim::serial_line::DevicesOnLine;
+use crate::sim::{DevicesOnLine, Drive};
+use axis::LineKeys;
+use budget::LineBudget;
 use fault_code::FaultCode;
+use line::FollowedLine;
 
 /// The family.
 #[derive(Clone, Copy, Debug)]
@@ -49,12 +52,11 @@ impl ConfiguredFamily for ErobModbus {
     }
 
     fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
-        keys.refuse(
-            "drive",
-            format!("\"{}\"", FACTS.word),
-            "a drive on a CAN bus; one on a serial line is commissioned by `takt drive --bus serial:/dev/ttyUSB0`",
-        );
-        None
+        Some(DriveFamily::of_drive(FACTS, LineKeys::read(keys)))
+    }
+
+    fn is_on_serial_line(&self) -> bool {
+        FACTS.is_on_serial_line
     }
 }
 
@@ -66,6 +68,34 @@ impl Family for ErobModbus {
     /// It has none.
     fn process_data(&self, _: &Axis) -> ProcessData {
         ProcessData::default()
+    }
+
+    fn off_cycle_line(&self, config: &Config, bus: usize) -> Option<Box<dyn OffCycleLine>> {
+        let budget = LineBudget::of(config, bus)?;
+        let round_ns = budget.round_ns();
+        let slaves = config
+            .axes_of_bus(bus)
+            .map(|axis| Some((SlaveAddress::new(axis.node)?, axis::follower_parameters(axis, round_ns))))
+            .collect::<Option<Vec<_>>>()?;
+        Some(Box::new(FollowedLine::new(budget.timing(), slaves)))
+    }
+
+    fn off_cycle_budget(&self, axis: &Axis, config: &Config) -> Option<OffCycleBudget> {
+        let watchdog_ms = LineKeys::of(axis).communication_timeout_ms;
+        Some(LineBudget::of(config, axis.bus)?.of_drive(watchdog_ms))
+    }
+
+    fn remarks(&self, axis: &Axis) -> Vec<&'static str> {
+        vec![match LineKeys::of(axis).communication_timeout_ms {
+            0 => {
+                "its communication time-out is off: it goes on with its last velocity if the controller or the line fails, so that its \
+                 supply must be cut by other means (a relay that the controller holds closed)"
+            }
+            _ => {
+                "what its motor does after the communication time-out (0x0FA2) stands in no manual: try it without a load before you \
+                 rely on it"
+            }
+        }]
     }
 
     /// It has no object dictionary, and nothing to set up by one.
@@ -121,76 +151,15 @@ impl Family for ErobModbus {
     }
 
     fn simulated_line(&self, addresses: &[u8]) -> Option<Result<Box<dyn DevicesOnLine>, String>> {
-        Some(simulated_line(addresses))
+        Some(simulated::line(addresses))
+    }
+
+    fn simulated_axes_on_line(&self, config: &Config, bus: usize) -> Option<Box<dyn DevicesOnLine>> {
+        Some(Box::new(simulated::line_of_axes(config, bus)))
     }
 
     /// A module that hears nothing of the bus.
-    fn simulated(&self, axis: &Axis, _: &Config) -> Box<dyn Drive> {
-        let direction = if axis.reversed { -1.0 } else { 1.0 };
-        let counts_per_unit = direction * axis.counts_per_turn * axis.gear_ratio / axis.travel.per_turn();
-        let peak_torque = axis.simulated.peak_torque;
-        Box::new(ErobModbusDrive::new(ErobModbusParameters {
-            address: axis.node,
-            bit_rate_code: 4,
-            joint: JointParameters {
-                inertia: axis.joint.inertia(),
-                viscous_friction: axis.joint.viscous_friction(),
-                coulomb_friction: axis.joint.coulomb_friction(),
-                friction_shape: axis.simulated.friction,
-                brake_torque: 2.0 * peak_torque,
-            },
-            encoder: Encoder { counts_per_unit, zero_counts: axis.zero_counts.into() },
-            counts_per_turn: axis.counts_per_turn,
-            initial_position: axis.simulated.initial_position,
-            peak_torque,
-            torque_per_ampere: TORQUE_PER_AMPERE,
-            highest_velocity: 1.5 * axis.limits.velocity,
-            ready_ns: axis.power_up_ns,
-            reply_ns: REPLY_NS,
-            has_battery: true,
-            has_torque_sensor: false,
-        }))
+    fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
+        Box::new(simulated::drive(axis, config))
     }
 }
-
-/// Modules of the size eRob80H120 on a line at 115200 bit/s.
-fn simulated_line(addresses: &[u8]) -> Result<Box<dyn DevicesOnLine>, String> {
-    let mut drives = vec![];
-    for (place, address) in addresses.iter().enumerate() {
-        if SlaveAddress::new(*address).is_none() {
-            return Err(format!("a slave has an address from 1 to 247, not {address}"));
-        }
-        if addresses[..place].contains(address) {
-            return Err(format!("two slaves cannot have the address {address}"));
-        }
-        drives.push(ErobModbusDrive::new(ErobModbusParameters {
-            address: *address,
-            bit_rate_code: 4,
-            joint: JointParameters {
-                inertia: 0.647,
-                viscous_friction: 2.0,
-                coulomb_friction: 4.0,
-                friction_shape: FrictionShape::HarmonicDrive,
-                brake_torque: 140.0,
-            },
-            encoder: Encoder { counts_per_unit: 524_288.0 / TAU, zero_counts: 0.0 },
-            counts_per_turn: 524_288.0,
-            initial_position: 0.0,
-            peak_torque: 70.0,
-            torque_per_ampere: TORQUE_PER_AMPERE,
-            highest_velocity: 2.618,
-            ready_ns: 0,
-            reply_ns: REPLY_NS,
-            has_battery: true,
-            has_torque_sensor: false,
-        }));
-    }
-    Ok(Box::new(SimulatedLine::lenient(LineTiming::new(115_200), PAUSE_NS, drives)))
-}
-
-/// A program on a pseudo-terminal may write a frame in pieces so far apart.
-const PAUSE_NS: u64 = 20_000_000;
-/// Torque for one ampere where the axis says nothing of it: that of an eRob80 with a ratio of 120.
-const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
-/// From a request to its reply. Not published.
-const REPLY_NS: u64 = 1_000_000;

@@ -108,19 +108,10 @@ fn parse(target: &TargetDrive, register: &Register, value: &ValueText) -> Result
         }
         return number.ok_or_else(|| unsuitable(format!("`{text}` is no whole number")));
     }
-    match of_unit(register.unit, text) {
+    match command_value::in_units_of_drive(&UNITS, register.unit, text) {
         Some(raw) => Ok(raw),
         None => of_joint(target, register.unit, text).map_err(unsuitable),
     }
-}
-
-/// A number with one of [`UNITS`].
-fn of_unit(unit: Unit, text: &str) -> Option<i64> {
-    let is_of_unit = |letter: char| !letter.is_ascii_digit() && !".+-−_ ".contains(letter);
-    let (digits, symbol) = text.split_at(text.find(is_of_unit)?);
-    let factor = UNITS.iter().find(|(known, of, _)| *known == symbol.trim() && *of == unit)?.2;
-    let number: f64 = digits.trim().replace('−', "-").parse().ok()?;
-    Some((number * factor).round() as i64)
 }
 
 /// A value of the joint, with its unit.

@@ -141,6 +141,8 @@ impl Ownership {
         }
         let mut clock = MonotonicClock::default();
         let mut buses = vec![];
+        // A serial line has one master by its wiring: nobody else of another host is on it.
+        named.retain(|(_, claim)| claim.interface.is_can());
         for (_, claim) in &named {
             let options = SocketCanOptions::default();
             let port = claim.interface.open_prepared(&claim.bus, &claim.settings, &options)?;

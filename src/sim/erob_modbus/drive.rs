@@ -265,7 +265,7 @@ impl ErobModbusDrive {
     }
 
     /// Advances to a time. Returns a reply whose first byte is due by then, and when that is.
-    pub fn advance(&mut self, now_ns: Nanoseconds) -> Option<(Nanoseconds, Vec<u8>)> {
+    pub fn reply_by(&mut self, now_ns: Nanoseconds) -> Option<(Nanoseconds, Vec<u8>)> {
         self.run_until(now_ns);
         self.reply.take_if(|(due_ns, _)| *due_ns <= now_ns)
     }

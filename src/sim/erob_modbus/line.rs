@@ -7,19 +7,9 @@ use takt_rt::Nanoseconds;
 use super::drive::ErobModbusDrive;
 use crate::modbus::line_timing::LineTiming;
 use crate::modbus::request_gathering::RequestGathering;
+use crate::sim::drive::Drive;
 use crate::sim::random::Random;
-use crate::sim::serial_line::DevicesOnLine;
-
-/// What is wrong with the wire.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Disturbance {
-    /// Of a million bytes, so many have a wrong bit.
-    pub wrong_per_million: u32,
-    /// Of a million bytes, so many do not arrive.
-    pub lost_per_million: u32,
-    /// Nothing arrives.
-    pub is_cut: bool,
-}
+use crate::sim::serial_line::{DevicesOnLine, LineDisturbance};
 
 /// A line of two wires with its modules.
 #[derive(Clone, Debug)]
@@ -31,7 +21,9 @@ pub struct SimulatedLine {
     from_master: VecDeque<(Nanoseconds, Vec<u8>)>,
     /// Bytes on their way to the master, with the time at which each arrives.
     to_master: VecDeque<(Nanoseconds, u8)>,
-    disturbance: Disturbance,
+    disturbance: LineDisturbance,
+    /// The addresses of the drives that are disconnected.
+    disconnected: Vec<u8>,
     random: Random,
 }
 
@@ -48,17 +40,12 @@ impl SimulatedLine {
 
     fn with(timing: LineTiming, gathering: RequestGathering, drives: Vec<ErobModbusDrive>) -> Self {
         let (from_master, to_master) = (VecDeque::new(), VecDeque::new());
-        let (disturbance, random) = (Disturbance::default(), Random::new(0, 0));
-        Self { timing, gathering, drives, from_master, to_master, disturbance, random }
-    }
-
-    /// Disturbs the wire from now on. The same seed disturbs it in the same way.
-    pub fn disturb(&mut self, disturbance: Disturbance, seed: u64) {
-        (self.disturbance, self.random) = (disturbance, Random::new(seed, 0));
+        let (disturbance, random) = (LineDisturbance::default(), Random::new(0, 0));
+        Self { timing, gathering, drives, from_master, to_master, disturbance, disconnected: vec![], random }
     }
 
     /// A drive, by its place.
-    pub fn drive(&mut self, place: usize) -> Option<&mut ErobModbusDrive> {
+    pub fn module(&mut self, place: usize) -> Option<&mut ErobModbusDrive> {
         self.drives.get_mut(place)
     }
 
@@ -68,7 +55,11 @@ impl SimulatedLine {
             self.reply_until(arrives_ns);
             if let Some(request) = self.gathering.receive(arrives_ns, &bytes) {
                 let bit_rate = self.timing.bit_rate();
-                let hearing = self.drives.iter_mut().filter(|drive| drive.bit_rate() == bit_rate);
+                let disconnected = &self.disconnected;
+                let hearing = self
+                    .drives
+                    .iter_mut()
+                    .filter(|drive| drive.bit_rate() == bit_rate && !disconnected.contains(&drive.node()));
                 hearing.for_each(|drive| drive.receive(arrives_ns, &request));
             }
         }
@@ -78,22 +69,26 @@ impl SimulatedLine {
     /// Lets the drives send what is due by a time.
     fn reply_until(&mut self, now_ns: Nanoseconds) {
         for place in 0..self.drives.len() {
-            let Some((begins_ns, reply)) = self.drives[place].advance(now_ns) else { continue };
+            let Some((begins_ns, reply)) = self.drives[place].reply_by(now_ns) else { continue };
+            if self.disconnected.contains(&self.drives[place].node()) {
+                continue;
+            }
             let ends_ns = begins_ns.saturating_add(self.timing.duration_ns(reply.len()));
             self.gathering.hear(ends_ns);
             let bytes = self.disturbed(&reply);
             let timing = self.timing;
+            let arrives_ns = begins_ns.saturating_add(self.disturbance.late_ns);
             let timed = bytes
                 .into_iter()
                 .enumerate()
-                .map(|(at, byte)| (begins_ns.saturating_add(timing.duration_ns(at + 1)), byte));
+                .map(|(at, byte)| (arrives_ns.saturating_add(timing.duration_ns(at + 1)), byte));
             self.to_master.extend(timed);
         }
     }
 
     /// What the wire makes of bytes.
     fn disturbed(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let Disturbance { wrong_per_million, lost_per_million, is_cut } = self.disturbance;
+        let LineDisturbance { wrong_per_million, lost_per_million, is_cut, .. } = self.disturbance;
         let mut happens = |per_million: u32| self.random.within(0..1_000_000) < per_million.into();
         let mut arrived = vec![];
         for byte in bytes.iter().filter(|_| !is_cut) {
@@ -120,6 +115,24 @@ impl DevicesOnLine for SimulatedLine {
         self.advance(now_ns);
         let arrived = self.to_master.partition_point(|(arrives_ns, _)| *arrives_ns <= now_ns);
         self.to_master.drain(..arrived).map(|(_, byte)| byte).collect()
+    }
+
+    fn drive(&mut self, address: u8) -> Option<&mut dyn Drive> {
+        let drive = self.drives.iter_mut().find(|drive| drive.node() == address)?;
+        Some(drive)
+    }
+
+    fn disturb(&mut self, disturbance: LineDisturbance, seed: u64) -> bool {
+        (self.disturbance, self.random) = (disturbance, Random::new(seed, 0));
+        true
+    }
+
+    fn disconnect(&mut self, address: u8, is_disconnected: bool) -> bool {
+        self.disconnected.retain(|other| *other != address);
+        if is_disconnected {
+            self.disconnected.push(address);
+        }
+        self.drives.iter().any(|drive| drive.node() == address)
     }
 }
 
@@ -180,10 +193,10 @@ mod tests {
         line.send(10 * MS, &question(1));
         assert!(line.receive(50 * MS).is_empty());
         let mut line = SimulatedLine::new(LINE, vec![drive(1, 4)]);
-        line.disturb(Disturbance { is_cut: true, ..Disturbance::default() }, 0);
+        line.disturb(LineDisturbance { is_cut: true, ..LineDisturbance::default() }, 0);
         line.send(10 * MS, &question(1));
         assert!(line.receive(50 * MS).is_empty());
-        line.disturb(Disturbance::default(), 0);
+        line.disturb(LineDisturbance::default(), 0);
         line.send(60 * MS, &question(1));
         assert_eq!(line.receive(100 * MS).len(), 7);
     }

@@ -9,4 +9,4 @@ mod line;
 mod registers;
 
 pub use drive::{ErobModbusDrive, ErobModbusParameters, ModbusDriveFault};
-pub use line::{Disturbance, SimulatedLine};
+pub use line::SimulatedLine;

@@ -157,6 +157,13 @@ fn unsupported(task: &Task) -> Option<Failure> {
             "the own protocol of an eRob has no command that restores its parameters",
             "restore them with the vendor's tool",
         ),
+        Task::EmergencyStop => {
+            ("the drive has no command of its own for an emergency stop", "`disable` takes its torque")
+        }
+        Task::CommunicationTimeout { .. } => (
+            "a communication time-out is a register of an eRob with Modbus-RTU",
+            "this protocol has no watchdog: have a relay cut the supply",
+        ),
         Task::SetBitRate { .. } => {
             ("the bit rate of an eRob is fixed at 1 Mbit/s", "set the bus to 1 Mbit/s instead")
         }

@@ -175,20 +175,11 @@ fn parse(target: &TargetDrive, entry: &Entry, value: &ValueText) -> Result<i32, 
         let number = number.and_then(|number| i32::try_from(number).ok());
         return number.ok_or_else(|| unsuitable(format!("`{text}` is no whole number of 32 bits")));
     }
-    let raw = match of_unit(entry.unit, text) {
+    let raw = match command_value::in_units_of_drive(&UNITS, entry.unit, text) {
         Some(raw) => raw,
         None => of_joint(target, entry, text).map_err(unsuitable)?,
     };
     i32::try_from(raw).map_err(|_| unsuitable(format!("{raw} does not fit 32 bits")))
-}
-
-/// A number with one of [`UNITS`].
-fn of_unit(unit: Unit, text: &str) -> Option<i64> {
-    let (digits, symbol) =
-        text.split_at(text.find(|letter: char| !letter.is_ascii_digit() && !".+-−_ ".contains(letter))?);
-    let factor = UNITS.iter().find(|(known, of, _)| *known == symbol.trim() && *of == unit)?.2;
-    let number: f64 = digits.trim().replace('−', "-").parse().ok()?;
-    Some((number * factor).round() as i64)
 }
 
 /// A value of the joint, with its unit.

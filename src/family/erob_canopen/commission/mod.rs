@@ -52,6 +52,13 @@ fn unsupported(task: &Task) -> Failure {
             "the firmware of an eRob has no object that restores its parameters (1011)",
             "restore them with the vendor's tool",
         ),
+        Task::EmergencyStop => {
+            ("the drive has no command of its own for an emergency stop", "`disable` takes its torque")
+        }
+        Task::CommunicationTimeout { .. } => (
+            "a communication time-out is a register of an eRob with Modbus-RTU",
+            "the watchdog of a CANopen drive is its consumer heartbeat (1016): `heartbeat` in the configuration sets it",
+        ),
         Task::ReleaseBrake { .. } => (
             "the CANopen firmware of an eRob has no object that releases its brake",
             "`enable` releases it, with torque",

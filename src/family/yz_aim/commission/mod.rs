@@ -67,6 +67,15 @@ pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Re
         Task::Gear { ratio } => settings::gear(c, s, ratio).await,
         Task::AutoHome { is_on, is_confirmed } => settings::auto_home(c, s, is_on, is_confirmed).await,
         Task::Interpolation => settings::interpolation(c, s).await,
+        Task::EmergencyStop => Err(Failure::Unsupported {
+            what: "the drive has no command of its own for an emergency stop".to_owned(),
+            instead: "`disable` takes its torque".to_owned(),
+        }),
+        Task::CommunicationTimeout { .. } => Err(Failure::Unsupported {
+            what: "a communication time-out is a register of an eRob with Modbus-RTU".to_owned(),
+            instead: "the watchdog of a CANopen drive is its consumer heartbeat (1016): `heartbeat` in the configuration sets it"
+                .to_owned(),
+        }),
         Task::ReleaseBrake { .. } => Err(Failure::Unsupported {
             what: "a YZ-AIM has no object that releases its brake".to_owned(),
             instead: "`enable` releases it, with torque".to_owned(),
