@@ -11,6 +11,10 @@ pub mod bit_fields {
     pub use crate::config::bit_fields::*;
 }
 
+pub mod bus_log {
+    pub use crate::bus_log::*;
+}
+
 pub mod canopen {
     #[cfg(feature = "cli")]
     pub mod lss {
@@ -118,6 +122,11 @@ pub mod link {
 
 pub mod modbus {
     pub use crate::modbus::*;
+}
+
+#[cfg(feature = "cli")]
+pub mod monitor {
+    pub use crate::monitor::*;
 }
 
 pub mod procedure {

@@ -68,6 +68,7 @@
 //! controller                          the engine of a configuration, its life, its ports, the handles
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! faults                              faults on purpose
+//! monitor                             the meaning of every frame on a bus
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
 //! link sim                            sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
@@ -75,6 +76,7 @@
 //! canopen erob_can modbus             CiA 301, 305 and 306; eRob's own protocol; Modbus-RTU; all without I/O
 //! hollow_lines                        the serial lines of the hollow-shaft motors, without I/O
 //! channels                            the lock-free channels to the real-time thread
+//! bus_log                             logs of frames, as other programs write and read them
 //! trajectory frame_time sleep_alignment source_text printable text_file
 //! ```
 //!
@@ -88,6 +90,7 @@
 // Some functions are for the program alone.
 #![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
+mod bus_log;
 pub mod canopen;
 mod channels;
 #[cfg(feature = "cli")]
@@ -126,6 +129,8 @@ pub mod link;
     allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
 )]
 mod modbus;
+#[cfg(feature = "cli")]
+mod monitor;
 #[cfg(feature = "cli")]
 mod play;
 mod printable;

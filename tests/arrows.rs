@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 27] = [
+const ORDER: [&str; 29] = [
     "internals",
     "cli",
     "doctor",
@@ -17,6 +17,7 @@ const ORDER: [&str; 27] = [
     "telemetry",
     "schedule",
     "faults",
+    "monitor",
     "family",
     "link",
     "sim",
@@ -27,6 +28,7 @@ const ORDER: [&str; 27] = [
     "modbus",
     "hollow_lines",
     "channels",
+    "bus_log",
     "trajectory",
     "frame_time",
     "sleep_alignment",

@@ -9,6 +9,7 @@
 //! - [`pdo_configuration`]: the configuration of a PDO, from a device or a file.
 //! - [`object`]: an object's address, type and name; [`objects`]: the standard objects used here.
 
+pub(crate) mod communication_names;
 pub mod dcf;
 pub mod eds;
 pub mod emcy;

@@ -9,6 +9,11 @@ pub trait DataSheet {
     /// Whether the drive has an object.
     fn has(&self, address: ObjectAddress) -> bool;
 
+    /// The name of an object.
+    fn name(&self, _address: ObjectAddress) -> Option<&str> {
+        None
+    }
+
     /// Whether the drive lets an object be written.
     fn is_writable(&self, address: ObjectAddress) -> bool;
 

@@ -60,6 +60,9 @@ pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACT
 /// YZ-AIM integrated servo, CANopen edition.
 pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
 
+/// Describes frames in words.
+pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
+
 /// A part of bring-up or shutdown that is under way.
 pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + Send + 'a>>;
 
@@ -196,6 +199,11 @@ pub trait Family: ConfiguredFamily {
     /// The contents of a PDO in words, if they are known.
     fn process_data_words(&self, _target: &TargetDrive, _frame: &Frame) -> Option<String> {
         None
+    }
+
+    /// What describes the frames between a drive and its master in words. The frames come in their order.
+    fn frame_words(&self, target: TargetDrive) -> FrameWords {
+        Box::new(move |frame| commission::meaning::of(&target, frame))
     }
 
     /// A task of commissioning with a drive, in the protocol that the drive speaks. For drives with an object dictionary,

@@ -136,6 +136,14 @@ pub enum InterfaceError {
         /// The command that brings it up.
         command: String,
     },
+    /// Nothing can be heard on it.
+    #[error(
+        "{name} is down: nothing can be heard on it; to bring it up: sudo ip link set {name} up type can bitrate 1000000"
+    )]
+    Down {
+        /// The interface.
+        name: String,
+    },
     /// The kernel refused for another reason.
     #[error("{name}: {action}: {reason}")]
     System {

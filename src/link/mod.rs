@@ -25,7 +25,7 @@ pub(crate) use interface::{
     ControllerTiming, InterfaceSettings, InterfaceStatus, interface_status, transmit_queue_length,
 };
 pub use open::OpenError;
-pub(crate) use open::open_interface;
+pub(crate) use open::{open_interface, open_to_listen};
 pub use ownership::{
     ClaimError, HeardMaster, IfOwned, LockError, MasterActivity, Process, ReleaseError, Role, TakeOverError,
 };

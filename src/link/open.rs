@@ -1,7 +1,7 @@
 //! Opens an interface for a bus: brings it up as far as that is permitted, and opens a port on it.
 
 use super::converter::ConverterError;
-use super::interface::{InterfaceError, InterfaceSettings};
+use super::interface::{InterfaceError, InterfaceSettings, interface_status};
 use super::port::LinkPort;
 use super::real_interface::RealInterface;
 use super::serial_line::SerialLineError;
@@ -78,5 +78,25 @@ pub fn open_interface(
     options: &SocketCanOptions,
 ) -> Result<LinkPort, OpenError> {
     interface.prepare(bus, settings)?;
+    interface.open_prepared(bus, settings, options)
+}
+
+/// Opens a port for listening alone, for the bus of this name. A network interface stays as it is: it must be up. The channel of an
+/// adapter, which one program has at a time, is opened.
+///
+/// # Errors
+/// See [`OpenError`].
+pub fn open_to_listen(
+    bus: &str,
+    interface: &RealInterface,
+    settings: &InterfaceSettings,
+    options: &SocketCanOptions,
+) -> Result<LinkPort, OpenError> {
+    if let RealInterface::SocketCan(name) = interface {
+        let failed = |error| OpenError::Interface { bus: bus.to_owned(), error };
+        if !interface_status(name).map_err(failed)?.is_up {
+            return Err(failed(InterfaceError::Down { name: name.clone() }));
+        }
+    }
     interface.open_prepared(bus, settings, options)
 }

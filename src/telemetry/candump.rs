@@ -1,13 +1,13 @@
-//! A log of every frame in the format of `candump -l`: `(1700000000.000123) can0 181#3712`, `##` for CAN FD.
-//! `canplayer`, `log2asc`, python-can, SavvyCAN and Wireshark read it.
+//! A log of every frame in the format of `candump -l`.
 
 use std::io::{self, BufWriter, Write};
 
-use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::Nanoseconds;
 
 use super::destination::Opened;
 use super::history::OnBus;
 use super::wall_clock::WallClock;
+use crate::bus_log::candump::CandumpLine;
 use crate::link::trace::{Trace, TracedFrame};
 
 /// Frames wait this long before they are written, so that the log is in the order of time. Received frames are read some
@@ -53,8 +53,7 @@ impl CandumpLog {
         for (traced, bus) in self.waiting.drain(..ready) {
             let name = traces.get(bus).map_or("can", Trace::name);
             let unix_ns = self.wall_clock.unix_ns(traced.at_ns);
-            let (seconds, rest_ns) = (unix_ns / NANOSECONDS_PER_SECOND, unix_ns % NANOSECONDS_PER_SECOND);
-            writeln!(self.writer, "({seconds}.{:06}) {name} {:?}", rest_ns / 1000, traced.frame)?;
+            writeln!(self.writer, "{}", CandumpLine { unix_ns, bus: name, frame: traced.frame })?;
         }
         Ok(())
     }

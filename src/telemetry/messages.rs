@@ -8,7 +8,7 @@ use takt_rt::{AxisRecord, CycleRecord, Event, EventKind, FrameKind, GroupRecord}
 use super::cdr::CdrEncoder;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
-pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event, decode_group};
+pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event, decode_frame, decode_group};
 
 /// A message type: its name, and its definition in the ROS 2 interface language.
 pub struct MessageType {

@@ -37,7 +37,10 @@ pub use destination::RecordingDestination;
 pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
-pub use recorded::{Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, WalkError};
+pub use recorded::frames as recorded_frames;
+pub use recorded::{
+    Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, RecordedFrame, RecordedFrames, WalkError,
+};
 pub use recording_report::{
     AxisCycle, AxisCycles, AxisSummary, BusChange, GroupSummary, RecordingReport, ReportedEvent,
 };

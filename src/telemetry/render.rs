@@ -40,6 +40,14 @@ impl Emphasis {
         self.apply("1", text)
     }
 
+    pub(crate) fn faint(self, text: &str) -> String {
+        self.apply("2", text)
+    }
+
+    pub(crate) fn accent(self, text: &str) -> String {
+        self.apply("36", text)
+    }
+
     pub(crate) fn good(self, text: &str) -> String {
         self.apply("32", text)
     }

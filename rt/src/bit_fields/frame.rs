@@ -115,6 +115,20 @@ impl FieldFrame<CommandValue> {
         let payload = bytes.get(..self.layout.length()).unwrap_or_default();
         Frame::filled(self.id, self.format.kind(), payload)
     }
+
+    /// The values that a frame of this layout carries: what [`FieldFrame::frame`] has packed, for those who listen.
+    ///
+    /// # Errors
+    /// The frame is no command of this layout.
+    pub fn values(&self, frame: &Frame) -> Result<CommandValues, ReplyError> {
+        let (expected, received) = (self.layout.length(), frame.payload().len());
+        if expected != received {
+            return Err(ReplyError::Length { expected, received });
+        }
+        let mut values = CommandValues::default();
+        self.layout.unpack(frame.payload(), &mut values.0).map_err(|field| ReplyError::NoNumber { field })?;
+        Ok(values)
+    }
 }
 
 impl FieldFrame<ReplyValue> {

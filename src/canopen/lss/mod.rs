@@ -10,6 +10,7 @@
 mod fast_scan;
 mod master;
 mod wire;
+mod words;
 
 pub use fast_scan::KnownIdentity;
 pub use master::{LssBusy, LssError, LssMaster, LssOutcome, LssTask, LssTiming};

@@ -82,10 +82,10 @@ struct Printed<'a> {
 pub fn show(at_ns: Nanoseconds, seen: &SessionEvent) {
     let (direction, frame, words) = match seen {
         SessionEvent::Sent(frame) => {
-            ('>', frame, LssRequest::decode(frame).map(|request| format!("{request:?}")))
+            ('>', frame, LssRequest::decode(frame).map(|request| request.to_string()))
         }
         SessionEvent::Received(frame) => {
-            ('<', frame, LssResponse::decode(frame).map(|response| format!("{response:?}")))
+            ('<', frame, LssResponse::decode(frame).map(|response| response.to_string()))
         }
         SessionEvent::Procedure(_) => return,
     };

@@ -317,6 +317,10 @@ impl DataSheet for Device {
         self.entry(address).is_some()
     }
 
+    fn name(&self, address: ObjectAddress) -> Option<&str> {
+        self.entry(address).map(|entry| entry.name.as_str())
+    }
+
     fn is_writable(&self, address: ObjectAddress) -> bool {
         Self::is_writable(self, address)
     }

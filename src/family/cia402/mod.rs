@@ -34,6 +34,12 @@ pub struct Cia402;
 
 const FACTS: DriveFacts = DriveFacts::standard("cia402", "CiA 402 drive");
 
+/// A drive of which nothing is known but what the standard says.
+pub(crate) fn undescribed() -> DriveFamily {
+    static STANDARD: DriveFacts = FACTS;
+    DriveFamily::of_family(&STANDARD)
+}
+
 /// The drive that a data sheet describes.
 pub fn drive(device: Device) -> DriveFamily {
     DriveFamily::of_drive(device.facts(FACTS), device)

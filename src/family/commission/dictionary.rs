@@ -56,6 +56,9 @@ impl ObjectUnit {
     }
 }
 
+/// What an object is called whose name nobody knows.
+pub(crate) const UNNAMED: &str = "object";
+
 /// An object dictionary entry with its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObjectEntry {
@@ -80,7 +83,8 @@ impl ObjectEntry {
 
     /// The value in SI units with its text; `None` for an object without a unit.
     pub fn physical(&self, target: &TargetDrive, value: i64) -> Option<(f64, String)> {
-        let shown = |quantity: Quantity, value: f64| Some((value, quantity.show(value)));
+        let shown =
+            |quantity: Quantity, value: f64| target.has_units().then(|| (value, quantity.show(value)));
         match self.unit {
             ObjectUnit::Position => shown(target.position_quantity(), target.position(value)),
             ObjectUnit::Distance => {
@@ -198,7 +202,7 @@ pub fn entry(drive: &DriveFamily, address: ObjectAddress) -> Option<ObjectEntry>
     let known = family.objects().iter().find(|entry| entry.object.address == address).copied();
     let Some(sheet) = family.data_sheet(drive) else { return known };
     let data_type = sheet.data_type(address)?;
-    let (name, unit) = known.map_or(("object", ObjectUnit::None), |entry| (entry.object.name, entry.unit));
+    let (name, unit) = known.map_or((UNNAMED, ObjectUnit::None), |entry| (entry.object.name, entry.unit));
     let permission = if sheet.is_writable(address) { Permission::Write } else { Permission::Read };
     Some(ObjectEntry { object: Object { address, data_type, name }, permission, unit })
 }

@@ -19,7 +19,7 @@ pub(super) mod contact;
 pub(crate) mod dictionary;
 pub(super) mod failure;
 pub(super) mod guarded;
-mod meaning;
+pub(crate) mod meaning;
 pub(super) mod motion_profile;
 mod objects;
 pub(super) mod polling;

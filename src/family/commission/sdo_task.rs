@@ -3,7 +3,7 @@
 use takt_rt::Frame;
 
 use super::running::DriveTask;
-use super::{Failure, Report, SdoSession, TargetDrive, Task, meaning, objects, scan};
+use super::{Failure, Report, SdoSession, TargetDrive, Task, objects, scan};
 use crate::family;
 use crate::procedure::{CanopenClient, CanopenSession, Procedure};
 
@@ -20,7 +20,7 @@ pub fn over_sdo(
     let quirks = family::sdo_quirks(&target.drive, target.family().sdo_quirks().timing);
     let session = CanopenSession::new(CanopenClient::new(target.node, quirks));
     let c = SdoSession::new(session.clone(), target.drive.node_axis);
-    let described = target.clone();
+    let mut words = target.family().frame_words(target.clone());
     let procedure = Procedure::new(session, async move {
         match work {
             SdoWork::Read(objects) => objects::read(&c, &target, &objects).await,
@@ -29,7 +29,7 @@ pub fn over_sdo(
             SdoWork::Task(task) => carry_out(&c, &target, task).await,
         }
     });
-    Ok(DriveTask::new(procedure, move |frame| meaning::of(&described, frame)))
+    Ok(DriveTask::new(procedure, move |frame| words(frame)))
 }
 
 /// A task whose objects have been found.

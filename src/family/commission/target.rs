@@ -100,6 +100,11 @@ impl TargetDrive {
         family::of(&self.drive)
     }
 
+    /// Whether its counts mean a position: by a configuration, or by what its family says of its encoder.
+    pub fn has_units(&self) -> bool {
+        self.limits.is_some() || self.drive.counts_per_turn.is_some()
+    }
+
     fn data_sheet(&self) -> Option<&dyn DataSheet> {
         self.family().data_sheet(&self.drive)
     }
@@ -107,6 +112,11 @@ impl TargetDrive {
     /// Whether the drive has an object, as far as its data sheet tells.
     pub fn has(&self, address: ObjectAddress) -> bool {
         self.data_sheet().is_none_or(|sheet| sheet.has(address))
+    }
+
+    /// The name that the data sheet of the drive gives an object.
+    pub(super) fn name_by_sheet(&self, address: ObjectAddress) -> Option<&str> {
+        self.data_sheet()?.name(address)
     }
 
     /// Whether the drive lets an object be written, as far as its data sheet tells.

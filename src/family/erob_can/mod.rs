@@ -24,7 +24,7 @@ pub use facts::FACTS;
 use takt_rt::{Frame, Id};
 
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
-use super::{Family, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol, SettingUp};
+use super::{Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol, SettingUp};
 use crate::canopen::function_code;
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::sdo::SdoRequest;
@@ -112,6 +112,10 @@ impl Family for ErobCan {
 
     fn entries(&self, _: &DriveFamily) -> Vec<NamedEntry> {
         commission::entries()
+    }
+
+    fn frame_words(&self, target: TargetDrive) -> FrameWords {
+        commission::frame_words(target)
     }
 
     fn commission(&self, target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failure> {

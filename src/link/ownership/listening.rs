@@ -31,6 +31,9 @@ pub struct CommandedDrive {
     pub feedback: Vec<Id>,
 }
 
+/// The highest node ID.
+const HIGHEST_NODE: u8 = 127;
+
 /// The traffic by which another master is recognised on a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MasterTraffic {
@@ -74,6 +77,18 @@ impl MasterTraffic {
             master: defaults::MASTER_NODE,
             drives: node.into_iter().collect(),
             set_points: node.into_iter().flat_map(rpdos).collect(),
+            duration_ns: SHORTEST_NS,
+        }
+    }
+
+    /// Of an interface without a configuration, where any node may be a drive that somebody commands. What no drive sends under the
+    /// identifiers of the pre-defined connection set (CiA 301, 7.3.3) counts.
+    pub fn of_any_node() -> Self {
+        let drives: Vec<u8> = (1..=HIGHEST_NODE).filter(|node| *node != defaults::MASTER_NODE).collect();
+        Self {
+            master: defaults::MASTER_NODE,
+            set_points: drives.iter().flat_map(|node| rpdos(*node)).collect(),
+            drives,
             duration_ns: SHORTEST_NS,
         }
     }
@@ -325,6 +340,19 @@ mod tests {
         assert!(traffic.judge(&frame(0x77F, &[5])).is_some());
         assert!(traffic.judge(&frame(0x206, &[0; 6])).is_none());
         assert!(MasterTraffic::without_configuration(None).judge(&frame(0x205, &[0; 6])).is_none());
+    }
+
+    #[test]
+    fn where_any_node_may_be_a_drive_the_set_points_and_the_writes_to_each_count() {
+        let traffic = MasterTraffic::of_any_node();
+        for (id, bytes) in
+            [(0x080, &[][..]), (0x201, &[0; 6]), (0x57E, &[0; 8]), (0x67E, &[0x2F; 8]), (0x77F, &[5])]
+        {
+            assert!(traffic.judge(&frame(id, bytes)).is_some(), "{id:03X}");
+        }
+        for (id, bytes) in [(0x181, &[0; 8][..]), (0x601, &[0x40; 8]), (0x581, &[0x60; 8]), (0x701, &[5])] {
+            assert!(traffic.judge(&frame(id, bytes)).is_none(), "{id:03X}");
+        }
     }
 
     #[test]

@@ -1,13 +1,13 @@
 //! Decodes the messages of a recording.
 
 use takt_rt::{
-    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, GroupRecord,
+    AxisRecord, BusHealth, BusState, CycleRecord, CycleTiming, DriveState, EventKind, Frame, GroupRecord, Id,
     OperationMode, Origin, Phase, RecordedStop, RejectReason, RequestError, RequestId, RequestKind, Rule,
     StopCategory, StopCause, StopReason, StreamState, TimingLevel,
 };
 
 use super::EventFields;
-use crate::link::trace::TracedHealth;
+use crate::link::trace::{TracedFrame, TracedHealth};
 use crate::telemetry::cdr::CdrDecoder;
 use crate::telemetry::recorded::RecordedEvent;
 
@@ -98,6 +98,26 @@ pub fn decode_event(message: &[u8]) -> Option<RecordedEvent> {
     };
     let group = if fields.is_over() { None } else { u8::try_from(fields.i16()?).ok() };
     Some(RecordedEvent { slot, at_ns, group, text, kind: of_kind.kind(slot) })
+}
+
+/// Decodes a [`FRAME`](super::FRAME).
+pub fn decode_frame(message: &[u8]) -> Option<TracedFrame> {
+    let mut fields = CdrDecoder::begin(message)?;
+    let (at_ns, is_sent, id) = (fields.u64()?, fields.u8()? != 0, fields.u32()?);
+    let id = if fields.u8()? != 0 { Id::extended(id) } else { Id::base(id) }.ok()?;
+    let (is_remote, is_fd, has_switch) = (fields.u8()? != 0, fields.u8()? != 0, fields.u8()? != 0);
+    let length = fields.u8()?;
+    let mut bytes = [0; Frame::MAX_BYTES];
+    let data = bytes.get_mut(..usize::try_from(fields.u32()?).ok()?)?;
+    for byte in data.iter_mut() {
+        *byte = fields.u8()?;
+    }
+    let frame = match (is_remote, is_fd) {
+        (true, _) => Frame::remote(id, length),
+        (false, true) => Frame::fd(id, data, has_switch),
+        (false, false) => Frame::data(id, data),
+    };
+    Some(TracedFrame { at_ns, is_sent, frame: frame.ok()? })
 }
 
 /// Decodes a [`BUS`](super::BUS).

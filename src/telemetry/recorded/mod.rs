@@ -1,6 +1,7 @@
 //! Reads a recording or a black box: the machine, the events, the timing, and the cycles.
 
 mod cause;
+mod frames;
 mod records;
 mod walk;
 
@@ -28,6 +29,7 @@ use crate::printable::printable;
 use records::Record;
 
 pub use cause::Cause;
+pub use frames::{RecordedFrame, RecordedFrames, frames};
 pub use walk::WalkError;
 
 /// Why a file cannot be read.

@@ -18,6 +18,7 @@ use super::failure;
 use crate::erob_can::client::{RequestClient, RequestError, RequestFailure, RequestTiming};
 use crate::erob_can::entries::{self, EntryAccess, Values};
 use crate::erob_can::frame::NODES;
+use crate::family::FrameWords;
 use crate::family::commission::{
     AnsweredProtocol, DriveTask, Failure, NamedEntry, Report, TargetDrive, Task,
 };
@@ -40,9 +41,15 @@ pub fn begin(target: TargetDrive, task: Task) -> Result<DriveTask<Frame>, Failur
     }
     let work = Work::of(&target, task)?;
     let session = ErobCanSession::new(RequestClient::new(target.node, RequestTiming::default()));
-    let mut words = words::Words::new(target.clone());
+    let mut words = frame_words(target.clone());
     let procedure = Procedure::new(session.clone(), async move { carry_out(&session, &target, work).await });
-    Ok(DriveTask::new(procedure, move |frame| words.of(frame)))
+    Ok(DriveTask::new(procedure, move |frame| words(frame)))
+}
+
+/// What describes the frames of a drive.
+pub fn frame_words(target: TargetDrive) -> FrameWords {
+    let mut words = words::Words::new(target);
+    Box::new(move |frame| words.of(frame))
 }
 
 /// A task whose entries have been found.
