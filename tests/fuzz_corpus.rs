@@ -46,13 +46,14 @@ const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
 #[test]
 fn every_kept_input_is_borne() {
     type Subject = fn(&[u8]);
-    let subjects: [(&str, Subject); 9] = [
+    let subjects: [(&str, Subject); 10] = [
         ("configuration", subjects::configuration::run),
         ("scenario", subjects::scenario::run),
         ("device_description", subjects::device_description::run),
         ("recording", subjects::recording::run),
         ("problem_lines", subjects::problem_lines::run),
         ("lines", subjects::lines::run),
+        ("bus_logs", subjects::bus_logs::run),
         ("wire", subjects::wire::run),
         ("modbus", subjects::modbus::run),
         ("engine", |bytes| drop(subjects::engine::run(bytes))),
@@ -138,6 +139,13 @@ proptest! {
     fn any_bytes_of_a_serial_line_are_decoded_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("lines")) {
         subjects::lines::run(&bytes);
         subjects::lines::run(&seed);
+    }
+
+    #[test]
+    fn any_log_is_read_or_explained_and_any_frames_have_a_meaning(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("bus_logs")) {
+        subjects::bus_logs::run(&bytes);
+        subjects::bus_logs::run(&seed);
+        subjects::bus_logs::decode(&bytes);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The functions that are fuzzed. They take arbitrary bytes and panic if a property does not hold. The fuzz targets call them.
 //! A test (`tests/fuzz_corpus.rs`) also calls them, with the files of `fuzz/seeds` and with random bytes.
 
+pub mod bus_logs;
 pub mod configuration;
 pub mod device_description;
 pub mod engine;

@@ -18,12 +18,14 @@ mod jitter;
 mod log;
 mod lss;
 mod manual;
+mod monitor;
 mod ownership;
 mod plan;
 mod play;
 mod print;
 mod report;
 mod run;
+mod send;
 mod sim;
 mod table;
 mod usage_error;
@@ -65,6 +67,8 @@ enum Command {
     Drive(drive::Arguments),
     Eds(eds::Arguments),
     Lss(lss::Arguments),
+    Monitor(monitor::Arguments),
+    Send(send::Arguments),
     Jitter(jitter::Arguments),
     Completions(completions::Arguments),
     Manual(manual::Arguments),
@@ -85,6 +89,8 @@ impl CommandLine {
             Command::Drive(arguments) => drive::run(&arguments),
             Command::Eds(arguments) => eds::run(&arguments),
             Command::Lss(arguments) => lss::run(&arguments),
+            Command::Monitor(arguments) => monitor::run(&arguments),
+            Command::Send(arguments) => send::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
             Command::Completions(arguments) => completions::run(arguments),
             Command::Manual(arguments) => manual::run(&arguments),

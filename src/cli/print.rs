@@ -52,6 +52,43 @@ pub fn write(text: &str) -> io::Result<bool> {
     }
 }
 
+/// Text that is collected before it is printed, for results that come bit by bit.
+#[derive(Debug, Default)]
+pub struct Collected {
+    /// What is not printed yet.
+    pub text: String,
+    has_no_reader: bool,
+    failed: Option<Exit>,
+}
+
+impl Collected {
+    /// Prints what was collected.
+    pub fn print(&mut self) {
+        let text = std::mem::take(&mut self.text);
+        if text.is_empty() || self.has_no_reader {
+            return;
+        }
+        match write(&text) {
+            Ok(true) => {}
+            Ok(false) => self.has_no_reader = true,
+            Err(error) => {
+                self.has_no_reader = true;
+                self.failed = Some(unwritten(&error, Exit::Done));
+            }
+        }
+    }
+
+    /// Whether nobody reads it any more.
+    pub const fn has_no_reader(&self) -> bool {
+        self.has_no_reader
+    }
+
+    /// The exit code if it could not be printed.
+    pub const fn failed(&self) -> Option<Exit> {
+        self.failed
+    }
+}
+
 /// Reports that the result could not be written. The command must not end with success then.
 pub fn unwritten(error: &io::Error, exit: Exit) -> Exit {
     say!("takt: the result cannot be written to standard output: {error}");

@@ -1,0 +1,13 @@
+//! Logs of buses and the meaning of their frames, given any bytes.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../subjects/mod.rs"]
+#[allow(dead_code, reason = "each target takes its own")]
+mod subjects;
+
+fuzz_target!(|bytes: &[u8]| {
+    subjects::bus_logs::run(bytes);
+    subjects::bus_logs::decode(bytes);
+});
