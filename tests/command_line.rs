@@ -498,7 +498,7 @@ fn shells_and_manual_pages_know_every_subcommand() {
     let folder = tempfile::tempdir().unwrap();
     assert!(takt(&["manual", folder.path().to_str().unwrap()]).status.success());
     for name in &names {
-        let page = std::fs::read_to_string(folder.path().join(format!("takt-{name}.1"))).unwrap();
+        let page = fs::read_to_string(folder.path().join(format!("takt-{name}.1"))).unwrap();
         assert!(page.contains("SYNOPSIS"), "{page}");
     }
     for shell in ["bash", "zsh", "fish"] {
