@@ -2,10 +2,13 @@
 
 use std::fmt;
 
+use crate::command::{CommandError, MotionError, StreamError, WaitError};
 use crate::config::{ConfigError, OverrideError};
+use crate::controller::StartFailure;
 use crate::controller::session::SessionError;
-use crate::controller::{CommandError, MotionError, StartFailure, StreamError, WaitError};
 use crate::faults::ScenarioError;
+use crate::remote::ConnectError;
+use crate::serve::ServeError;
 
 pub use crate::controller::assemble::AssembleError;
 pub use crate::controller::realtime_thread::StartError;
@@ -47,6 +50,12 @@ pub enum Error {
     /// A controller in virtual time could not be made.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
+    /// A controller of another process cannot be connected to.
+    #[error(transparent)]
+    Connect(#[from] ConnectError),
+    /// A controller cannot be offered to other processes.
+    #[error(transparent)]
+    Serve(#[from] ServeError),
     /// A command was not executed.
     #[error(transparent)]
     Command(#[from] CommandError),
@@ -70,6 +79,8 @@ impl fmt::Debug for Error {
             Self::Start(error) => error,
             Self::Session(error) => error,
             Self::Assemble(error) => error,
+            Self::Connect(error) => error,
+            Self::Serve(error) => error,
             Self::Command(error) => error,
             Self::Motion(error) => error,
             Self::Stream(error) => error,

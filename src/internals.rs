@@ -133,6 +133,12 @@ pub mod procedure {
     pub use crate::procedure::{ModbusClient, ModbusSession, Procedure, ProcedureError, ProcedureEvent};
 }
 
+pub mod remote {
+    pub use crate::remote::{
+        Command, Demand, Malformed, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest,
+    };
+}
+
 pub mod schedule {
     pub use crate::frame_time::*;
     pub use crate::schedule::response_time::*;

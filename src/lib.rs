@@ -26,7 +26,8 @@
 //!
 //! # What is here
 //! The root has what most programs need: [`Config`], [`Controller`] and its [`Handle`]s, [`VirtualController`], [`VirtualRun`], [`Trajectory`], the
-//! [`Snapshot`] and the [`Event`]s that they give, and their errors. The rest is in modules, one for each subject:
+//! [`Snapshot`] and the [`Event`]s that they give, and their errors; [`serve`](serve()) and [`connect`] for a controller of another
+//! process. The rest is in modules, one for each subject:
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`trajectory`]: points with times, checked as a whole before they are carried out.
@@ -65,7 +66,10 @@
 //! cli                                 the program `takt`
 //! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
 //! error                               one error for a program that embeds takt
+//! serve                               a running controller, offered to other processes
 //! controller                          the engine of a configuration, its life, its ports, the handles
+//! remote                              a controller of another process: shared state, packets, the client
+//! command                             what may be asked of a running controller, and how it is refused
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! faults                              faults on purpose
 //! monitor                             the meaning of every frame on a bus
@@ -95,6 +99,7 @@ pub mod canopen;
 mod channels;
 #[cfg(feature = "cli")]
 mod cli;
+mod command;
 #[cfg(feature = "cli")]
 mod commission;
 pub mod config;
@@ -135,7 +140,9 @@ mod monitor;
 mod play;
 mod printable;
 mod procedure;
+mod remote;
 pub mod schedule;
+mod serve;
 pub mod sim;
 mod sleep_alignment;
 mod source_text;
@@ -148,19 +155,24 @@ pub mod trajectory;
 pub use cli::main as program;
 
 pub use channels::{Consumer, Producer, ring};
+pub use command::{
+    CommandError, EventSource, LeaseError, MotionError, MotionId, MoveOptions, PointRefusal, Refused,
+    RunningController, Stopped, StreamError, TrajectoryProgress, WaitError,
+};
 pub use config::{Config, ConfigError};
 pub use controller::port::Port;
 pub use controller::realtime_thread::{Begun, Ended};
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
-    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, CommandError, Controller,
-    Events, GroupHandle, Handle, Interrupt, LinePort, MotionError, MotionId, MoveOptions, Outcome,
-    PointRefusal, Refused, SharedLine, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress,
-    VirtualClock, VirtualController, VirtualRun, WaitError,
+    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, Controller, Events,
+    GroupHandle, Handle, Interrupt, LinePort, Outcome, SharedLine, StartFailure, StreamHandle, VirtualClock,
+    VirtualController, VirtualRun,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
 pub use link::IfOwned;
+pub use remote::{Client, ClientEvents, ClientGroup, ClientStream, ConnectError, LeaseHolder, connect};
+pub use serve::{ServeError, ServeOptions, Server, serve};
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 

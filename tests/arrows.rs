@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 29] = [
+const ORDER: [&str; 32] = [
     "internals",
     "cli",
     "doctor",
@@ -13,7 +13,10 @@ const ORDER: [&str; 29] = [
     "commission",
     "play",
     "error",
+    "serve",
     "controller",
+    "remote",
+    "command",
     "telemetry",
     "schedule",
     "faults",

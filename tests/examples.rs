@@ -23,6 +23,7 @@ programs! {
     hand_guiding: "../examples/hand_guiding.rs",
     impedance: "../examples/impedance.rs",
     profile_modes: "../examples/profile_modes.rs",
+    remote: "../examples/remote.rs",
     stream: "../examples/stream.rs",
     supervise: "../examples/supervise.rs",
     trajectory: "../examples/trajectory.rs",
@@ -60,6 +61,17 @@ fn a_configuration_in_code_moves_two_joints() {
 fn drives_that_plan_by_themselves_get_velocities_and_torques() {
     profile_modes::run(config("erob-modes/erob-pv.toml")).unwrap();
     profile_modes::run(config("erob-modes/erob-pt.toml")).unwrap();
+}
+
+#[test]
+fn an_arm_is_moved_through_another_process() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = folder.path().join("arm").display().to_string();
+    let arm = takt::Controller::start(config("arm6-erob.toml"), takt::SessionOptions::default()).unwrap();
+    let _server = takt::serve(arm.handle(), &name, takt::ServeOptions::default()).unwrap();
+    let before = arm.state().axes[0].position_set;
+    remote::run(&name).unwrap();
+    assert!((arm.state().axes[0].position_set - before - 0.05).abs() < 1e-9);
 }
 
 #[test]

@@ -56,6 +56,7 @@ fn every_kept_input_is_borne() {
         ("bus_logs", subjects::bus_logs::run),
         ("wire", subjects::wire::run),
         ("modbus", subjects::modbus::run),
+        ("packets", subjects::packets::run),
         ("engine", |bytes| drop(subjects::engine::run(bytes))),
     ];
     for (name, run) in subjects {
@@ -152,6 +153,12 @@ proptest! {
     fn any_bytes_on_a_modbus_line_are_borne(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("modbus")) {
         subjects::modbus::run(&bytes);
         subjects::modbus::run(&seed);
+    }
+
+    #[test]
+    fn any_packets_are_decoded_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("packets")) {
+        subjects::packets::run(&bytes);
+        subjects::packets::run(&seed);
     }
 
     #[test]

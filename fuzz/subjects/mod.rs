@@ -8,6 +8,7 @@ pub mod engine;
 mod input;
 pub mod lines;
 pub mod modbus;
+pub mod packets;
 pub mod problem_lines;
 mod procedures;
 pub mod recording;

@@ -14,24 +14,40 @@ use super::primitives::{AtomicU64, Ordering, fence};
 /// The slots of a mailbox for the newest value.
 const SLOTS: u64 = 4;
 
-struct Shared {
+/// Where the words of a mailbox are. Any bits in them are harmless.
+pub trait Cells {
     /// How many values have been completed; value `n` is in slot `n` modulo the number of slots.
+    fn completed(&self) -> &AtomicU64;
+
+    /// The slot of a value.
+    fn slot(&self, number: u64) -> &[AtomicU64];
+
+    /// How many slots there are, at least 2.
+    fn slot_count(&self) -> u64;
+
+    /// How many values the writer can complete after a value before it begins to overwrite that value.
+    fn kept_after(&self) -> u64 {
+        self.slot_count().saturating_sub(2)
+    }
+}
+
+/// Words that were allocated for one mailbox.
+pub struct Allocated {
     completed: AtomicU64,
     slots: Box<[Box<[AtomicU64]>]>,
 }
 
-impl Shared {
+impl Cells for Allocated {
+    fn completed(&self) -> &AtomicU64 {
+        &self.completed
+    }
+
     fn slot(&self, number: u64) -> &[AtomicU64] {
         self.slots.get((number % self.slot_count()) as usize).map_or(&[], |slot| slot)
     }
 
     fn slot_count(&self) -> u64 {
         self.slots.len() as u64
-    }
-
-    /// How many values the writer can complete after a value before it begins to overwrite that value.
-    fn kept_after(&self) -> u64 {
-        self.slot_count() - 2
     }
 }
 
@@ -44,32 +60,42 @@ pub fn latest(words: usize) -> (Writer, Reader) {
 pub fn last(words: usize, slots: u64) -> (Writer, Reader) {
     let slot = || (0..words).map(|_| AtomicU64::new(0)).collect();
     let slots = (0..slots.max(2)).map(|_| slot()).collect();
-    let shared = Arc::new(Shared { completed: AtomicU64::new(0), slots });
-    (Writer { shared: Arc::clone(&shared), completed: 0 }, Reader { shared })
+    let cells = Arc::new(Allocated { completed: AtomicU64::new(0), slots });
+    (Writer::over(Arc::clone(&cells)), Reader::over(cells))
 }
 
 /// The only end that writes.
-pub struct Writer {
-    shared: Arc<Shared>,
+pub struct Writer<C = Allocated> {
+    cells: Arc<C>,
     completed: u64,
 }
 
-impl Writer {
+impl<C: Cells> Writer<C> {
+    /// The writing end of a mailbox that nothing has been written to.
+    pub const fn over(cells: Arc<C>) -> Self {
+        Self { cells, completed: 0 }
+    }
+
     /// Writes a value, word by word, and publishes it.
     pub fn write(&mut self, encode: impl FnOnce(&mut Words<'_>)) {
         let number = self.completed + 1;
         // A reader that sees one of the words stored below also sees the `completed` stored before.
         fence(Ordering::Release);
-        encode(&mut Words(self.shared.slot(number).iter()));
+        encode(&mut Words(self.cells.slot(number).iter()));
         self.completed = number;
-        self.shared.completed.store(number, Ordering::Release);
+        self.cells.completed().store(number, Ordering::Release);
     }
 }
 
 /// The reading end. Clone it for every reader.
-#[derive(Clone)]
-pub struct Reader {
-    shared: Arc<Shared>,
+pub struct Reader<C = Allocated> {
+    cells: Arc<C>,
+}
+
+impl<C> Clone for Reader<C> {
+    fn clone(&self) -> Self {
+        Self { cells: Arc::clone(&self.cells) }
+    }
 }
 
 /// The result of one attempt to read.
@@ -83,7 +109,12 @@ pub enum Attempt<T> {
     Torn,
 }
 
-impl Reader {
+impl<C: Cells> Reader<C> {
+    /// A reading end of a mailbox.
+    pub const fn over(cells: Arc<C>) -> Self {
+        Self { cells }
+    }
+
     /// One attempt to read a value newer than number `seen` (0 = any). Never waits.
     pub fn attempt<T>(&self, seen: u64, decode: impl FnOnce(&mut Words<'_>) -> T) -> Attempt<T> {
         let number = self.completed();
@@ -95,27 +126,32 @@ impl Reader {
 
     /// The number of the newest value; 0 before the first one.
     pub fn completed(&self) -> u64 {
-        self.shared.completed.load(Ordering::Acquire)
+        self.cells.completed().load(Ordering::Acquire)
     }
 
     /// The number of the oldest value that can be read after the newest one of [`Reader::completed`].
     pub fn oldest(&self, completed: u64) -> u64 {
-        completed.saturating_sub(self.shared.kept_after()).max(1)
+        completed.saturating_sub(self.cells.kept_after()).max(1)
     }
 
     /// Reads a value that [`Reader::completed`] has counted. `None` if the writer has begun to overwrite it.
     pub fn read<T>(&self, number: u64, decode: impl FnOnce(&mut Words<'_>) -> T) -> Option<T> {
-        let value = decode(&mut Words(self.shared.slot(number).iter()));
+        let value = decode(&mut Words(self.cells.slot(number).iter()));
         fence(Ordering::Acquire);
-        let completed = self.shared.completed.load(Ordering::Relaxed);
-        (completed - number <= self.shared.kept_after()).then_some(value)
+        let completed = self.cells.completed().load(Ordering::Relaxed);
+        (completed.wrapping_sub(number) <= self.cells.kept_after()).then_some(value)
     }
 }
 
 /// The words of one value, in order.
 pub struct Words<'a>(slice::Iter<'a, AtomicU64>);
 
-impl Words<'_> {
+impl<'a> Words<'a> {
+    /// These words, from the first one on.
+    pub fn of(cells: &'a [AtomicU64]) -> Self {
+        Self(cells.iter())
+    }
+
     /// Stores the next word. Words beyond the last one are ignored.
     pub fn put(&mut self, word: u64) {
         if let Some(cell) = self.0.next() {

@@ -39,8 +39,8 @@ use takt_rt::{
 
 use callbacks::CallbackTaker;
 use client_requests::{TakenRequests, client_requests};
-use latest::{Attempt, Reader, Writer};
-use observed_events::{EventWriter, observed_events};
+use latest::{Reader, Writer};
+use observed_events::observed_events;
 use records::{RecordConsumer, RecordProducer};
 use stream::{StreamReceiver, stream_channels};
 use trajectories::TrajectoryTaker;
@@ -51,12 +51,16 @@ pub use callbacks::{
     CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
 };
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub(crate) use event_words::EVENT_WORDS;
 pub use group_axes::GroupAxes;
+pub(crate) use latest::{Attempt, Cells, Reader as LatestReader, Writer as LatestWriter};
 pub use observed_events::EventReader;
+pub(crate) use observed_events::EventWriter;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 pub use stream::{GroupStream, Streamer, chunk};
 pub use trajectories::{GivenTrajectory, TrajectoryGiver};
+pub(crate) use words::{put_snapshot, snapshot_words, take_snapshot};
 
 /// The capacity of each channel.
 #[derive(Clone, Debug)]
@@ -104,7 +108,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
     let (streamer, streams) = stream_channels(&sizes.groups);
     let (snapshot_in, snapshot_out) =
-        latest::latest(words::snapshot_words(sizes.groups.len(), sizes.axes, sizes.buses));
+        latest::latest(snapshot_words(sizes.groups.len(), sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
@@ -253,7 +257,7 @@ impl HostInterface for RtSide {
     }
 
     fn publish(&mut self, snapshot: &Snapshot) {
-        self.snapshot.write(|words| words::put_snapshot(snapshot, words));
+        self.snapshot.write(|words| put_snapshot(snapshot, words));
     }
 }
 
@@ -414,7 +418,7 @@ impl Observer {
     /// The state after the newest complete cycle. Before the first one, it is a passive controller whose drives have reported nothing.
     pub fn snapshot(&self) -> Snapshot {
         loop {
-            match self.snapshot.attempt(0, words::take_snapshot) {
+            match self.snapshot.attempt(0, take_snapshot) {
                 Attempt::Whole(snapshot, _) => return snapshot,
                 // Three cycles have passed during the read, because this thread was preempted. There is one from the beginning.
                 Attempt::Torn | Attempt::Nothing => std::hint::spin_loop(),

@@ -3,18 +3,23 @@
 use takt_rt::Event;
 
 use super::event_words::{EVENT_WORDS, put_event, take_event};
-use super::latest::{self, Reader, Writer};
+use super::latest::{self, Allocated, Cells, Reader, Writer};
 
 /// The events for observers, as the end of the real-time thread and one for an observer. `kept` events (at least 1) can be read.
 pub fn observed_events(kept: usize) -> (EventWriter, EventReader) {
     let (writer, reader) = latest::last(EVENT_WORDS, kept as u64 + 1);
-    (EventWriter(writer), EventReader { reader, next: 1, missed: 0 })
+    (EventWriter::over(writer), EventReader::over(reader))
 }
 
 /// The end of the real-time thread.
-pub struct EventWriter(Writer);
+pub struct EventWriter<C = Allocated>(Writer<C>);
 
-impl EventWriter {
+impl<C: Cells> EventWriter<C> {
+    /// Shows events by this mailbox.
+    pub const fn over(writer: Writer<C>) -> Self {
+        Self(writer)
+    }
+
     /// Shows an event to every observer.
     pub fn write(&mut self, event: &Event) {
         self.0.write(|words| put_event(event, words));
@@ -22,14 +27,24 @@ impl EventWriter {
 }
 
 /// The place of one observer in the sequence of all events.
-#[derive(Clone)]
-pub struct EventReader {
-    reader: Reader,
+pub struct EventReader<C = Allocated> {
+    reader: Reader<C>,
     next: u64,
     missed: u64,
 }
 
-impl EventReader {
+impl<C> Clone for EventReader<C> {
+    fn clone(&self) -> Self {
+        Self { reader: self.reader.clone(), ..*self }
+    }
+}
+
+impl<C: Cells> EventReader<C> {
+    /// The place before the first event of a mailbox.
+    pub const fn over(reader: Reader<C>) -> Self {
+        Self { reader, next: 1, missed: 0 }
+    }
+
     /// A place behind the newest event.
     pub fn begin_now(&self) -> Self {
         Self { next: self.reader.completed() + 1, missed: 0, reader: self.reader.clone() }
@@ -41,7 +56,7 @@ impl EventReader {
     }
 }
 
-impl Iterator for EventReader {
+impl<C: Cells> Iterator for EventReader<C> {
     type Item = Event;
 
     /// The next event, if there is one. Later ones may follow `None`.

@@ -13,10 +13,11 @@ use serde::Serialize;
 use crate::config::{Axis, Config, Interface, Master};
 use crate::controller::realtime_thread::StartError;
 use crate::controller::session::{self, Session, SessionError, SessionOptions};
-use crate::controller::{Interrupt, Outcome, Progress};
+use crate::controller::{Controller, Interrupt, Outcome, Progress, StartFailure};
 use crate::family;
 use crate::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
 use crate::schedule;
+use crate::serve::{self, ServeError, ServeOptions};
 use crate::telemetry::{
     Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
 };
@@ -48,6 +49,12 @@ pub struct Arguments {
     /// Play the faults of this scenario (TOML), to see what they lead to; configs/faults has examples
     #[arg(long, value_name = "FILE.toml")]
     faults: Option<PathBuf>,
+    /// Let other processes observe and command the controller by this name until Ctrl-C, instead of running the program
+    #[arg(long, value_name = "NAME", conflicts_with = "duration")]
+    serve: Option<String>,
+    /// Who may observe (read) and command (write) the served controller, as file permissions
+    #[arg(long, value_name = "MODE", default_value = "600", requires = "serve", value_parser = permissions)]
+    serve_mode: u32,
     /// Have another takt of this host that commands one of the buses stop in control first, and take them over
     #[arg(long)]
     take_over: bool,
@@ -98,12 +105,16 @@ pub fn run(arguments: Arguments) -> Exit {
         return UsageError::from(refused.to_string()).print(arguments.json);
     }
     config.warnings().iter().for_each(|warning| say!("takt: warning: {warning}"));
+    let serve_options = ServeOptions::default().with_mode(arguments.serve_mode);
+    if let Some(Err(error)) = arguments.serve.as_ref().map(|name| serve::verify(name, &serve_options)) {
+        return UsageError::from(error.to_string()).print(arguments.json);
+    }
     let fault_injector =
         match arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose() {
             Ok(fault_injector) => fault_injector,
             Err(error) => return error.print(arguments.json),
         };
-    let mut signals = match Signals::watch() {
+    let signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
             say!("takt: cannot watch for Ctrl-C: {error}");
@@ -120,26 +131,103 @@ pub fn run(arguments: Arguments) -> Exit {
         if_owned: ownership::if_owned(arguments.take_over),
     };
     let notify = notices(&bar, Machine::of(&config));
-    let mut throttled_bar = ThrottledBar::new(bar.clone(), Machine::of(&config));
-    let mut full_queues = FullQueues::new(&config);
-    let mut fault_events = FaultEvents::default();
-    let mut tell = || {
-        let news = fault_injector
-            .as_deref()
-            .map_or_else(Vec::new, |fault_injector| fault_events.next(fault_injector));
-        news.iter().for_each(|fault_event| bar.suspend(|| say!("takt: {fault_event}")));
+    let mut watcher = Watcher {
+        throttled_bar: ThrottledBar::new(bar.clone(), Machine::of(&config)),
+        full_queues: FullQueues::new(&config),
+        fault_injector,
+        fault_events: FaultEvents::default(),
+        signals,
+        bar: bar.clone(),
     };
-    let session = session::run(&config, options, notify, |snapshot, progress| {
-        throttled_bar.show(&progress, snapshot);
-        full_queues.poll(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
-        tell();
-        signals.next()
-    });
-    tell();
+    let session = match &arguments.serve {
+        None => {
+            let session = session::run(&config, options, notify, |snapshot, progress| {
+                watcher.watch(snapshot, &progress)
+            });
+            watcher.tell();
+            session.map_err(|error| NoSession::from(StartFailure::from(error)))
+        }
+        Some(name) => served(&config, options, notify, watcher, (name, serve_options)),
+    };
     bar.finish_and_clear();
     match session {
         Ok(session) => report(&config, &session, arguments.json),
-        Err(error) => refuse(&error, arguments.json),
+        Err(NoSession::NotStarted(StartFailure::NotEnabled(session))) => {
+            report(&config, &session, arguments.json)
+        }
+        Err(NoSession::NotStarted(StartFailure::Session(error))) => refuse(&error, arguments.json),
+        Err(NoSession::NotStarted(error)) => {
+            say!("takt: {error}");
+            Exit::Stopped
+        }
+        Err(NoSession::NotServed(error)) => UsageError::from(error.to_string()).print(arguments.json),
+    }
+}
+
+/// Why a run has no result.
+enum NoSession {
+    NotStarted(StartFailure),
+    NotServed(ServeError),
+}
+
+impl From<StartFailure> for NoSession {
+    fn from(error: StartFailure) -> Self {
+        Self::NotStarted(error)
+    }
+}
+
+/// Serves the controller until it is interrupted.
+fn served(
+    config: &Config,
+    options: SessionOptions,
+    notify: Box<dyn FnMut(&Notice) + Send>,
+    mut watcher: Watcher,
+    (name, serve_options): (&str, ServeOptions),
+) -> Result<Session, NoSession> {
+    let bar = watcher.bar.clone();
+    let watch = move |snapshot: &Snapshot, progress| watcher.watch(snapshot, &progress);
+    let controller = Controller::start_watched(config.clone(), options, notify, watch)?;
+    let _server = match serve::serve(controller.handle(), name, serve_options) {
+        Ok(server) => server,
+        Err(error) => {
+            controller.finish()?;
+            return Err(NoSession::NotServed(error));
+        }
+    };
+    bar.suspend(|| say!("takt: served by the name {name}, until Ctrl-C"));
+    Ok(controller.ended()?)
+}
+
+/// File permissions, in octal.
+fn permissions(text: &str) -> Result<u32, String> {
+    u32::from_str_radix(text, 8).map_err(|_| "file permissions are octal digits, as in 640".to_owned())
+}
+
+/// What is looked at and told during a run.
+struct Watcher {
+    throttled_bar: ThrottledBar,
+    full_queues: FullQueues,
+    fault_injector: Option<Arc<FaultInjector>>,
+    fault_events: FaultEvents,
+    signals: Signals,
+    bar: ProgressBar,
+}
+
+impl Watcher {
+    fn watch(&mut self, snapshot: &Snapshot, progress: &Progress) -> Option<Interrupt> {
+        self.throttled_bar.show(progress, snapshot);
+        let Self { full_queues, bar, .. } = self;
+        full_queues.poll(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
+        self.tell();
+        self.signals.next()
+    }
+
+    /// Tells which faults were injected since the last call.
+    fn tell(&mut self) {
+        let Some(fault_injector) = self.fault_injector.as_deref() else { return };
+        for fault_event in self.fault_events.next(fault_injector) {
+            self.bar.suspend(|| say!("takt: {fault_event}"));
+        }
     }
 }
 

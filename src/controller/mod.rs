@@ -7,7 +7,6 @@ mod handle;
 mod lines;
 mod off_cycle;
 mod outcome;
-mod point_check;
 pub mod port;
 mod program;
 pub mod realtime_thread;
@@ -18,13 +17,11 @@ mod virtual_time;
 
 pub use crate::channels::{CallbackCommand, CallbackState, CallbackTimes};
 pub use handle::{
-    CallbackHandle, CallbackOptions, CommandError, Controller, Events, GroupHandle, Handle, MotionError,
-    MotionId, MoveOptions, Refused, StartFailure, Stopped, StreamError, StreamHandle, TrajectoryProgress,
-    VirtualController, WaitError,
+    CallbackHandle, CallbackOptions, Controller, Events, GroupHandle, Handle, StartFailure, StreamHandle,
+    VirtualController,
 };
 pub use lines::{LinePort, Lines, SharedLine};
 pub use outcome::{Interrupt, Outcome, Progress};
-pub use point_check::{PointRefusal, check_point};
 pub use program::{ProgramRunner, ProgramStep};
 pub use supervisor::Supervisor;
 pub use virtual_time::{VirtualClock, VirtualRun};

@@ -11,8 +11,9 @@ use takt_rt::{CycleRecord, Nanoseconds, RequestId, Snapshot, StopCategory, Strea
 use super::groups::PlayedGroup;
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::{AxisMaxima, SetPointLog};
+use crate::command::MoveOptions;
 use crate::controller::session::Session;
-use crate::controller::{Controller, GroupHandle, MoveOptions, StartFailure};
+use crate::controller::{Controller, GroupHandle, StartFailure};
 
 /// The time from one look at the state to the next.
 const LOOK: Duration = Duration::from_millis(1);

@@ -6,8 +6,8 @@ use super::error::{FileProblem, PlayFileError};
 use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
 use crate::channels::GroupAxes;
+use crate::command::check_point;
 use crate::config::{Axis, Config};
-use crate::controller::check_point;
 
 /// Nanoseconds in a second, to and from the seconds of a file.
 const NANOSECONDS: f64 = 1e9;

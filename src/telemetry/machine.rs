@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use takt_rt::ControlLaw;
 
 use crate::config::{Axis, Config, Travel};
 use crate::family;
 
 /// Names and units of a controller.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Machine {
     /// The name of the machine.
     pub name: String,
@@ -24,7 +24,7 @@ pub struct Machine {
 }
 
 /// Name, unit and resolution of an axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AxisDescription {
     /// Its name in the configuration.
     pub name: String,
@@ -47,7 +47,7 @@ pub struct AxisDescription {
 }
 
 /// Magnitudes, or limits, of the derivatives of a set-point, in rad (m) and seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SetPointMagnitudes {
     /// rad/s (m/s)
     pub velocity: f64,
@@ -58,7 +58,7 @@ pub struct SetPointMagnitudes {
 }
 
 /// Names of a bus.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BusDescription {
     /// Its name in the configuration.
     pub name: String,
@@ -67,11 +67,13 @@ pub struct BusDescription {
 }
 
 /// The unit of an axis' position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Unit {
     /// rad, and N·m
+    #[serde(rename = "rad")]
     Radian,
     /// m, and N
+    #[serde(rename = "m")]
     Metre,
 }
 

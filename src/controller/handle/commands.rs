@@ -8,9 +8,8 @@ use takt_rt::{
 };
 
 use super::Handle;
-use super::error::{CommandError, Refused};
-use super::motion::{MotionId, MoveOptions};
 use crate::channels::{MotionEnd, WAITING_AT_MOST};
+use crate::command::{CommandError, MotionId, MoveOptions, Refused, needed};
 use crate::config::{Axis, Control};
 
 impl Handle {
@@ -90,7 +89,7 @@ impl Handle {
         velocity: f64,
         valid_for: Duration,
     ) -> Result<MotionId, CommandError> {
-        let own = self.axis(axis, ControlLaw::ProfileVelocity, "profile velocity, mode = \"pv\"")?;
+        let own = self.axis(axis, ControlLaw::ProfileVelocity, needed::PROFILE_VELOCITY)?;
         within(own, velocity, -own.limits.velocity, own.limits.velocity)?;
         self.set_profile_target(axis, ProfileTarget::Velocity(velocity), valid_for)
     }
@@ -100,7 +99,7 @@ impl Handle {
     /// # Errors
     /// See [`CommandError`]; nothing has changed then.
     pub fn torque(&self, axis: usize, torque: f64, valid_for: Duration) -> Result<MotionId, CommandError> {
-        let own = self.axis(axis, ControlLaw::ProfileTorque, "profile torque, mode = \"pt\"")?;
+        let own = self.axis(axis, ControlLaw::ProfileTorque, needed::PROFILE_TORQUE)?;
         within(own, torque, -own.limits.torque, own.limits.torque)?;
         self.set_profile_target(axis, ProfileTarget::Torque(torque), valid_for)
     }

@@ -5,8 +5,8 @@ use std::time::Duration;
 use takt_rt::Event;
 
 use super::Handle;
-use super::error::WaitError;
 use crate::channels::EventReader;
+use crate::command::WaitError;
 use crate::telemetry::words;
 
 /// The events of a controller since a beginning: changes of phase, stops, emergency messages, rejections …

@@ -5,10 +5,9 @@ use std::time::Duration;
 use takt_rt::{CallbackCycle, GroupSnapshot, OperationMode, Phase, Request, RequestTarget, StopCategory};
 
 use super::Handle;
-use super::error::{CommandError, Stopped, WaitError};
 use super::in_loop::{CallbackHandle, CallbackOptions};
-use super::motion::{MotionId, MoveOptions};
 use crate::channels::{CallbackCommand, CallbackState};
+use crate::command::{CommandError, MotionId, MoveOptions, Stopped, WaitError};
 
 /// Commands and observes one group of a running controller, from any thread. Clones are cheap and equal. The drives in profile velocity
 /// and profile torque are commanded by [`Handle::velocity`] and [`Handle::torque`]: the axis names its group.

@@ -9,11 +9,10 @@ use takt_rt::{
 };
 
 use super::Handle;
-use super::error::{CommandError, MotionError};
-use super::motion::MotionId;
 use crate::channels::{
     CallbackCommand, CallbackGiver, CallbackRecord, CallbackState, CallbackTimes, GivenCallback,
 };
+use crate::command::{CommandError, MotionError, MotionId};
 
 /// A callback that has panicked is back from the real-time thread within this time.
 const COMING_BACK: Duration = Duration::from_secs(1);

@@ -23,7 +23,6 @@
 //! owner dereferences to a handle, so a program of one thread needs no handle of its own.
 
 mod commands;
-mod error;
 mod events;
 mod group;
 mod in_loop;
@@ -31,6 +30,8 @@ mod life;
 mod messages;
 mod motion;
 mod pace;
+mod running_controller;
+mod start_failure;
 mod stream;
 mod trajectory;
 mod virtual_controller;
@@ -44,7 +45,7 @@ use std::time::Duration;
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Phase, Snapshot, StopCategory};
 
-use super::outcome::{Interrupt, Outcome};
+use super::outcome::{Interrupt, Outcome, Progress};
 use super::session::{self, RemoteHandles, Session, SessionError, SessionOptions};
 use crate::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use crate::config::{Axis, Config, Group};
@@ -55,13 +56,11 @@ use messages::Messages;
 use pace::{Pace, VirtualPace};
 use trajectory::Trajectories;
 
-pub use error::{CommandError, MotionError, Refused, StartFailure, Stopped, WaitError};
 pub use events::Events;
 pub use group::GroupHandle;
 pub use in_loop::{CallbackHandle, CallbackOptions};
-pub use motion::{MotionId, MoveOptions};
-pub use stream::{StreamError, StreamHandle};
-pub use trajectory::TrajectoryProgress;
+pub use start_failure::StartFailure;
+pub use stream::StreamHandle;
 pub use virtual_controller::VirtualController;
 
 /// The drives must be enabled within this time. It covers the power-up time of all drives.
@@ -81,7 +80,21 @@ impl Controller {
     /// # Errors
     /// See [`StartFailure`]; nothing has moved then.
     pub fn start(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
-        let controller = Self::begin(config, options)?;
+        Self::start_watched(config, options, |_| {}, |_, _| None)
+    }
+
+    /// As [`Controller::start`], with what [`session::run`] takes: `tell` is called with each notice, and `watch` about once in a
+    /// millisecond. An interrupt of `watch` ends the controller, at bring-up too.
+    ///
+    /// # Errors
+    /// As [`Controller::start`].
+    pub(crate) fn start_watched(
+        config: Config,
+        options: SessionOptions,
+        tell: impl FnMut(&Notice) + Send + 'static,
+        watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt> + Send + 'static,
+    ) -> Result<Self, StartFailure> {
+        let controller = Self::begin_watched(config, options, tell, watch)?;
         match controller.wait_for(Phase::Holding, ENABLE_TIMEOUT) {
             Ok(()) => Ok(controller),
             Err(_) => Err(controller.into_failure()),
@@ -95,20 +108,34 @@ impl Controller {
     /// # Errors
     /// See [`StartFailure`]; nothing was sent to the drives then.
     pub fn begin(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
+        Self::begin_watched(config, options, |_| {}, |_, _| None)
+    }
+
+    fn begin_watched(
+        config: Config,
+        options: SessionOptions,
+        mut tell: impl FnMut(&Notice) + Send + 'static,
+        mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt> + Send + 'static,
+    ) -> Result<Self, StartFailure> {
         let (handles_in, handles_out) = mpsc::sync_channel(1);
         let (life, messages) = (Arc::<Life>::default(), Arc::<Messages>::default());
         let (axes, groups) = (config.axes.clone(), config.groups.clone());
         let machine = Machine::of(&config);
         let thread = {
             let (life, messages) = (Arc::clone(&life), Arc::clone(&messages));
-            let notify = move |notice: &Notice| match notice {
-                Notice::NotWritten(message) => messages.add(message.clone()),
-                // Observers get the events directly from the real-time thread.
-                Notice::Event(_) => {}
+            let notify = move |notice: &Notice| {
+                match notice {
+                    Notice::NotWritten(message) => messages.add(message.clone()),
+                    // Observers get the events directly from the real-time thread.
+                    Notice::Event(_) => {}
+                }
+                tell(notice);
             };
             let run = move || {
                 let life = life.over_when_dropped();
-                let watch = |_: &Snapshot, _| life.is_ending().then_some(Interrupt::Controlled);
+                let watch = |state: &Snapshot, progress| {
+                    life.is_ending().then_some(Interrupt::Controlled).max(watch(state, progress))
+                };
                 session::run_with(&config, options, Box::new(notify), watch, Some(handles_in))
             };
             thread::Builder::new().name("takt-session".into()).spawn(run)
@@ -163,6 +190,16 @@ impl Controller {
             Ok(session) => Ok(session?),
             Err(_) => Err(StartFailure::Died),
         }
+    }
+
+    /// Waits until the controller has been ended by what watches it, and returns the result of the run.
+    ///
+    /// # Errors
+    /// [`StartFailure::Died`] if the session thread has panicked.
+    #[cfg(feature = "cli")]
+    pub(crate) fn ended(mut self) -> Result<Session, StartFailure> {
+        let joined = self.thread.take().map(JoinHandle::join);
+        joined.and_then(Result::ok).map_or(Err(StartFailure::Died), |session| Ok(session?))
     }
 
     /// Stops the present motion and ends the run. Waiting requests are discarded.

@@ -8,40 +8,9 @@ use takt_rt::{
     StreamState,
 };
 
-use super::error::CommandError;
 use super::{GroupHandle, Handle};
 use crate::channels::chunk;
-use crate::controller::point_check::{PointRefusal, check_point};
-
-/// Why points were not taken; none of them was, then.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum StreamError {
-    /// A point needs an entry for each axis.
-    #[error("there are {axes} axes, and the point has entries for {given}")]
-    Count {
-        /// The entries.
-        given: usize,
-        /// The axes.
-        axes: usize,
-    },
-    /// An axis does not take what a point says of it.
-    #[error("axis {axis} does not take point {point}: {reason}")]
-    Refused {
-        /// Which point, from 0 on.
-        point: usize,
-        /// Which axis, from 0 on.
-        axis: usize,
-        /// Why.
-        reason: PointRefusal,
-    },
-    /// Too many points wait: the group does not stream, or gets more than it can look ahead.
-    #[error("too many points wait for the controller: does it stream?")]
-    Full,
-    /// The controller has ended, or is about to.
-    #[error("the controller has ended")]
-    Ended,
-}
+use crate::command::{CommandError, StreamError, check_point};
 
 /// Hands points to the stream of a group, or to those of all groups, from any thread. Clones are cheap and equal.
 ///

@@ -9,10 +9,9 @@ use takt_rt::{
     RequestId, RequestTarget, TrajectoryId,
 };
 
-use super::error::CommandError;
-use super::motion::MotionId;
 use super::{GroupHandle, Handle};
 use crate::channels::{GivenTrajectory, GroupAxes, TrajectoryGiver};
+use crate::command::{CommandError, MotionId, TrajectoryProgress, needed};
 use crate::config::Axis;
 use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError, TrajectoryPoint};
 
@@ -207,10 +206,9 @@ impl GroupHandle {
         let trajectory = make(&TrajectoryConditions { start, limits: &limits, period_s })?;
         let moves = |(index, axis): &(usize, &Axis)| axis.control.is_profile() && trajectory.moves(*index);
         match self.own_axes().enumerate().find(moves) {
-            Some((_, axis)) => Err(CommandError::WrongMode {
-                axis: axis.name.clone(),
-                needed: "a mode that follows set-points",
-            }),
+            Some((_, axis)) => {
+                Err(CommandError::WrongMode { axis: axis.name.clone(), needed: needed::SET_POINTS })
+            }
             None => Ok(trajectory),
         }
     }
@@ -331,16 +329,4 @@ impl GroupHandle {
     fn period_s(&self) -> f64 {
         self.handle.machine().cycle_ns as f64 / NANOSECONDS_PER_SECOND as f64
     }
-}
-
-/// How far a trajectory is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct TrajectoryProgress {
-    /// The time on the path, in seconds: that of the point that is passed now.
-    pub path_s: f64,
-    /// The time of its last point.
-    pub of_s: f64,
-    /// Seconds of the path in a second: 1 as it was written, 0 while it is paused.
-    pub rate: f64,
 }

@@ -7,10 +7,10 @@ use std::time::Duration;
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Phase, StopCategory};
 
-use super::error::StartFailure;
 use super::in_loop::Callbacks;
 use super::life::Life;
 use super::pace::{Pace, VirtualPace};
+use super::start_failure::StartFailure;
 use super::trajectory::Trajectories;
 use super::{ENABLE_TIMEOUT, Handle, Shared};
 use crate::channels::MotionEnd;

@@ -10,7 +10,7 @@ use takt_rt::linux::MonotonicClock;
 use takt_rt::{Clock, Nanoseconds, Phase, Snapshot};
 
 use super::Handle;
-use super::error::WaitError;
+use crate::command::WaitError;
 
 /// How much later than the last one the next state is looked for, beyond the period. It covers the usual jitter of a cycle.
 const MARGIN_NS: Nanoseconds = 20_000;

@@ -14,6 +14,14 @@ pub enum PointRefusal {
         /// What is given.
         value: AxisPoint,
     },
+    /// A number is too large to be computed with. Positions and velocities beyond the limits of the axis are led to within them, up to it.
+    #[error("a number is too large: {number}, beyond {largest}")]
+    TooLarge {
+        /// What is given.
+        number: f64,
+        /// The largest one.
+        largest: f64,
+    },
     /// A torque or an impedance needs a loop that is closed here.
     #[error("a torque or an impedance needs mode \"cst\", and the axis is in {mode:?}")]
     NoTorqueInMode {
@@ -51,6 +59,24 @@ pub enum PointRefusal {
     },
 }
 
+/// The largest number of a point. What is computed from numbers up to it stays finite.
+const LARGEST: f64 = 1e9;
+
+/// The numbers of a point.
+fn numbers(point: &AxisPoint) -> impl Iterator<Item = f64> {
+    let (motion, others) = match *point {
+        AxisPoint::Position { motion, torque } => (Some(motion), [torque, 0.0, 0.0]),
+        AxisPoint::Impedance { motion, stiffness, damping, torque } => {
+            (Some(motion), [torque, stiffness, damping])
+        }
+        AxisPoint::Velocity(number) | AxisPoint::Torque(number) => (None, [number, 0.0, 0.0]),
+    };
+    let of_motion = motion.into_iter().flat_map(|motion| {
+        [Some(motion.position), motion.velocity, motion.acceleration].into_iter().flatten()
+    });
+    of_motion.chain(others)
+}
+
 /// Checks that an axis takes a point while it is commanded so: in the mode that it starts in, or in one that it has been changed to.
 /// Positions and velocities are led to within the limits, whatever they are.
 ///
@@ -59,6 +85,9 @@ pub enum PointRefusal {
 pub fn check_point(axis: &Axis, control: &Control, point: &AxisPoint) -> Result<(), PointRefusal> {
     if !point.is_finite() {
         return Err(PointRefusal::NotFinite { value: *point });
+    }
+    if let Some(number) = numbers(point).find(|number| number.abs() > LARGEST) {
+        return Err(PointRefusal::TooLarge { number, largest: LARGEST });
     }
     let has_torque_loop = matches!(control, Control::Torque { .. });
     let within = |torque: f64| {
@@ -152,5 +181,15 @@ mod tests {
         let damping = PointRefusal::Damping { damping: -1.0, limit: 80.0 };
         assert_eq!(refusal(soft.with_impedance(1.0, -1.0)), damping);
         assert!(matches!(refusal(f64::NAN.into()), PointRefusal::NotFinite { .. }));
+        for huge in [
+            f64::MAX.into(),
+            AxisPoint::moving(0.0, -1e300),
+            AxisPoint::Velocity(-1e10),
+            AxisPoint::Torque(1e10),
+            soft.with_impedance(1e10, 1.0),
+        ] {
+            assert!(matches!(refusal(huge), PointRefusal::TooLarge { .. }), "{huge:?}");
+        }
+        assert_eq!(check_point(&cst, &cst.control, &1e9.into()), Ok(()));
     }
 }

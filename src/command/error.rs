@@ -1,34 +1,13 @@
-//! Errors of an embedded controller. Their `Debug` text is their `Display` text, so that `?` in `main` prints a sentence.
+//! Why a command, a motion, a point or a wait did not come to what it was for. Their `Debug` text is their `Display` text, so that `?` in `main` prints a sentence.
 
 use std::fmt;
 use std::time::Duration;
 
 use takt_rt::{RequestError, StopReason};
 
-use crate::controller::session::{Session, SessionError};
+use super::point_check::PointRefusal;
 use crate::telemetry::{Machine, words};
 use crate::trajectory::{RateError, TrajectoryError};
-
-/// Why a controller could not be started.
-#[derive(thiserror::Error)]
-#[non_exhaustive]
-pub enum StartFailure {
-    /// The session could not be started: nothing was sent to the drives.
-    #[error(transparent)]
-    Session(#[from] SessionError),
-    /// The drives could not be brought up or enabled. The session tells why.
-    #[error("the drives could not be enabled: {}", .0.outcome.words(&.0.log.machine))]
-    NotEnabled(Box<Session>),
-    /// The simulated drives of a [`VirtualController`](super::VirtualController) could not be brought up or enabled.
-    #[error("the simulated drives could not be enabled: {words}")]
-    NotEnabledVirtually {
-        /// Why.
-        words: String,
-    },
-    /// The session thread has panicked. That is a defect of takt.
-    #[error("the session thread has panicked; this is a defect of takt, please report it")]
-    Died,
-}
 
 /// The real-time thread has refused a request.
 #[derive(Clone, PartialEq, thiserror::Error)]
@@ -40,7 +19,7 @@ pub struct Refused {
 }
 
 impl Refused {
-    pub(super) fn new(refusal: Option<RequestError>, machine: &Machine) -> Self {
+    pub(crate) fn new(refusal: Option<RequestError>, machine: &Machine) -> Self {
         let forgotten = || {
             "the request was refused; the reason is no longer known, because many later requests were refused"
                 .to_owned()
@@ -60,9 +39,21 @@ pub struct Stopped {
 }
 
 impl Stopped {
-    pub(super) fn new(reason: StopReason, machine: &Machine) -> Self {
+    pub(crate) fn new(reason: StopReason, machine: &Machine) -> Self {
         Self { reason, words: words::stop(&reason, machine) }
     }
+}
+
+/// Modes that commands need, as [`CommandError::WrongMode`] names them.
+pub(crate) mod needed {
+    /// For a velocity.
+    pub const PROFILE_VELOCITY: &str = "profile velocity, mode = \"pv\"";
+    /// For a torque.
+    pub const PROFILE_TORQUE: &str = "profile torque, mode = \"pt\"";
+    /// For a trajectory.
+    pub const SET_POINTS: &str = "a mode that follows set-points";
+    /// All of them.
+    pub const ALL: [&str; 3] = [PROFILE_VELOCITY, PROFILE_TORQUE, SET_POINTS];
 }
 
 /// Why a command was not executed. It has changed nothing.
@@ -154,7 +145,86 @@ pub enum CommandError {
     /// A stop has discarded the request before the real-time thread took it.
     #[error("a stop has discarded the request before it began")]
     Overtaken,
-    /// The controller has ended.
+    /// This client of another process may not command now.
+    #[error(transparent)]
+    Lease(#[from] LeaseError),
+    /// The process of the controller is there and does not answer. The command may still be carried out.
+    #[error(
+        "the process of the controller has not answered for {after:?}: it is paused, or overloaded; the command may still be carried out"
+    )]
+    NoReply {
+        /// For how long.
+        after: Duration,
+    },
+    /// The controller has ended, or the process that it runs in.
+    #[error("the controller has ended")]
+    Ended,
+}
+
+/// Why a client of another process may not command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LeaseError {
+    /// Another client commands.
+    #[error(
+        "process {process} commands this controller, until {} ms after its last command; to command in its place, take it over",
+        expires_in.as_millis()
+    )]
+    Held {
+        /// The process that commands.
+        process: u32,
+        /// When its lease expires, unless it gives another command.
+        expires_in: Duration,
+    },
+    /// Another client has taken this one's place. It commands again once it takes its place back.
+    #[error("process {process} has taken over from this client; to command again, take it over")]
+    TakenOver {
+        /// The process that has taken over.
+        process: u32,
+    },
+    /// The file permissions let this process observe, and not command.
+    #[error("this process may observe the controller, and not command it: it may not write to its socket")]
+    ReadOnly,
+    /// The process of the controller has no room for another client that commands.
+    #[error("too many clients are connected to the controller")]
+    TooManyClients,
+}
+
+/// Why points were not taken; none of them was, then.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StreamError {
+    /// A point needs an entry for each axis.
+    #[error("there are {axes} axes, and the point has entries for {given}")]
+    Count {
+        /// The entries.
+        given: usize,
+        /// The axes.
+        axes: usize,
+    },
+    /// An axis does not take what a point says of it.
+    #[error("axis {axis} does not take point {point}: {reason}")]
+    Refused {
+        /// Which point, from 0 on.
+        point: usize,
+        /// Which axis, from 0 on.
+        axis: usize,
+        /// Why.
+        reason: PointRefusal,
+    },
+    /// Too many points wait: the group does not stream, or gets more than it can look ahead.
+    #[error("too many points wait for the controller: does it stream?")]
+    Full,
+    /// This client of another process may not command now.
+    #[error(transparent)]
+    Lease(#[from] LeaseError),
+    /// The process of the controller is there and does not answer. The points may still be taken.
+    #[error("the process of the controller has not answered for {after:?}: it is paused, or overloaded")]
+    NoReply {
+        /// For how long.
+        after: Duration,
+    },
+    /// The controller has ended, or is about to.
     #[error("the controller has ended")]
     Ended,
 }
@@ -203,16 +273,6 @@ pub enum WaitError {
     /// The controller has ended.
     #[error("the controller has ended")]
     Ended,
-}
-
-impl fmt::Debug for StartFailure {
-    /// A session would be hundreds of lines.
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Session(error) => fmt::Debug::fmt(error, formatter),
-            other => fmt::Display::fmt(other, formatter),
-        }
-    }
 }
 
 /// `main` prints the error that `?` hands it by `Debug`.

@@ -1,0 +1,191 @@
+//! A running controller, wherever it runs.
+
+use std::time::Duration;
+
+use takt_rt::{
+    AxisLimits, AxisPoint, Event, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot,
+    StopCategory,
+};
+
+use super::error::{CommandError, MotionError, StreamError, WaitError};
+use super::motion::{MotionId, MoveOptions};
+use crate::telemetry::Machine;
+use crate::trajectory::TrajectoryPoint;
+
+/// A running controller, in this process ([`Handle`](crate::Handle)) or in another one ([`Client`](crate::Client)): the calls that both
+/// have, for programs and bindings that hold either.
+///
+/// `target` says whose axes are meant: all of the controller, or those of one group, by its number in the configuration. Values of axes
+/// come in the order of the controller or of the group. Units are rad, rad/s, N·m (m, m/s, N) and seconds.
+pub trait RunningController: Send + Sync {
+    /// The names and units of the machine, for texts about events and states.
+    fn machine(&self) -> &Machine;
+
+    /// The numbers of the axes that a target means, in its order; none for a group that there is not.
+    fn axes_of(&self, target: RequestTarget) -> Vec<usize>;
+
+    /// The limits of an axis.
+    fn limits(&self, axis: usize) -> Option<AxisLimits>;
+
+    /// The state after the newest complete cycle that is known here.
+    fn state(&self) -> Snapshot;
+
+    /// Whether the controller has ended, or the process that it runs in.
+    fn has_ended(&self) -> bool;
+
+    /// The newest of the stops that the real-time thread has taken, of those that concern a target. It discards what was asked before.
+    fn newest_stop(&self, target: RequestTarget) -> RequestId;
+
+    /// Waits for a state that is newer than that of `slot`, and returns it.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    fn cycle_after(&self, slot: u64, at_most: Duration) -> Result<Snapshot, WaitError>;
+
+    /// The events from now on.
+    fn event_source(&self) -> Box<dyn EventSource>;
+
+    /// Starts a coordinated move to these positions.
+    ///
+    /// # Errors
+    /// See [`Handle::move_to`](crate::Handle::move_to); nothing has changed then.
+    fn begin_move(
+        &self,
+        target: RequestTarget,
+        positions: &[f64],
+        options: MoveOptions,
+    ) -> Result<MotionId, CommandError>;
+
+    /// Starts a trajectory through points with times.
+    ///
+    /// # Errors
+    /// See [`Handle::execute`](crate::Handle::execute); nothing has changed then.
+    fn begin_trajectory(
+        &self,
+        target: RequestTarget,
+        points: &[TrajectoryPoint],
+    ) -> Result<MotionId, CommandError>;
+
+    /// Starts a trajectory through waypoints.
+    ///
+    /// # Errors
+    /// See [`Handle::move_through`](crate::Handle::move_through); nothing has changed then.
+    fn begin_through(&self, target: RequestTarget, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError>;
+
+    /// Changes the speed along a trajectory under way.
+    ///
+    /// # Errors
+    /// See [`Handle::set_speed`](crate::Handle::set_speed).
+    fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError>;
+
+    /// Brings the axes to rest on the path of a trajectory under way.
+    ///
+    /// # Errors
+    /// See [`Handle::set_speed`](crate::Handle::set_speed).
+    fn pause(&self, motion: MotionId) -> Result<(), CommandError>;
+
+    /// Goes on with a trajectory that was paused.
+    ///
+    /// # Errors
+    /// See [`Handle::set_speed`](crate::Handle::set_speed).
+    fn resume(&self, motion: MotionId) -> Result<(), CommandError>;
+
+    /// Gives a drive in profile velocity a velocity.
+    ///
+    /// # Errors
+    /// See [`Handle::velocity`](crate::Handle::velocity).
+    fn velocity(&self, axis: usize, velocity: f64, valid_for: Duration) -> Result<MotionId, CommandError>;
+
+    /// Gives a drive in profile torque a torque.
+    ///
+    /// # Errors
+    /// See [`Handle::torque`](crate::Handle::torque).
+    fn torque(&self, axis: usize, torque: f64, valid_for: Duration) -> Result<MotionId, CommandError>;
+
+    /// Changes the mode of operation of the axes of a target.
+    ///
+    /// # Errors
+    /// See [`Handle::change_mode`](crate::Handle::change_mode).
+    fn begin_mode_change(&self, target: RequestTarget, mode: OperationMode)
+    -> Result<MotionId, CommandError>;
+
+    /// Changes the mode of operation of one axis.
+    ///
+    /// # Errors
+    /// See [`Handle::change_axis_mode`](crate::Handle::change_axis_mode).
+    fn change_axis_mode(&self, axis: usize, mode: OperationMode) -> Result<MotionId, CommandError>;
+
+    /// The axes of a target begin to follow the points of [`RunningController::push_point`].
+    ///
+    /// # Errors
+    /// See [`Handle::begin_stream`](crate::Handle::begin_stream).
+    fn begin_streaming(&self, target: RequestTarget) -> Result<(), CommandError>;
+
+    /// Takes a point of a stream, with an entry for each axis, that is meant for a time of `CLOCK_MONOTONIC`.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    fn push_point(
+        &self,
+        target: RequestTarget,
+        at_ns: Nanoseconds,
+        axes: &[AxisPoint],
+    ) -> Result<(), StreamError>;
+
+    /// Takes a chunk of a stream: points at equal intervals from a time on, in place of every earlier point from there on.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    fn push_chunk(
+        &self,
+        target: RequestTarget,
+        from_ns: Nanoseconds,
+        interval: Duration,
+        points: &[Vec<AxisPoint>],
+    ) -> Result<(), StreamError>;
+
+    /// Requests a stop of this category. It waits for nothing, and is never refused.
+    ///
+    /// # Errors
+    /// [`CommandError::Ended`]; of a client also [`CommandError::Lease`] without write permission.
+    fn request_stop(&self, target: RequestTarget, category: StopCategory) -> Result<(), CommandError>;
+
+    /// Begins to enable the axes of a target.
+    ///
+    /// # Errors
+    /// See [`Handle::enable`](crate::Handle::enable).
+    fn begin_enable(&self, target: RequestTarget) -> Result<(), CommandError>;
+
+    /// Begins to bring the axes of a target to rest and to disable them.
+    ///
+    /// # Errors
+    /// See [`Handle::disable`](crate::Handle::disable).
+    fn begin_disable(&self, target: RequestTarget) -> Result<(), CommandError>;
+
+    /// Clears the latched faults of a target.
+    ///
+    /// # Errors
+    /// See [`Handle::reset_faults`](crate::Handle::reset_faults).
+    fn clear_faults(&self, target: RequestTarget) -> Result<(), CommandError>;
+
+    /// How a motion has ended; `None` while it is under way. Does not wait.
+    fn result_of(&self, motion: MotionId) -> Option<Result<(), MotionError>>;
+
+    /// Waits until a motion has ended.
+    ///
+    /// # Errors
+    /// See [`MotionError`].
+    fn wait(&self, motion: MotionId, at_most: Duration) -> Result<(), MotionError>;
+}
+
+/// The events of a running controller, wherever it runs. As an iterator it never waits: later events may follow `None`.
+pub trait EventSource: Iterator<Item = Event> + Send {
+    /// Waits for the next event, for no longer than `at_most`.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`]; [`WaitError::Ended`] if the controller has ended and no event is left.
+    fn wait(&mut self, at_most: Duration) -> Result<Event, WaitError>;
+
+    /// How many events were missed because this observer was too slow.
+    fn missed(&self) -> u64;
+}

@@ -1,0 +1,137 @@
+//! One group of a controller in another process.
+
+use std::time::Duration;
+
+use takt_rt::{GroupSnapshot, OperationMode, Phase, RequestTarget, StopCategory};
+
+use super::client::Client;
+use super::stream::ClientStream;
+use crate::command::{CommandError, MotionId, MoveOptions, RunningController, WaitError};
+use crate::trajectory::TrajectoryPoint;
+
+/// Commands and observes one group of a controller of another process. It has the calls of a [`GroupHandle`](crate::GroupHandle), with the
+/// same meaning; the errors of all commands are those of [`Client::move_to`].
+#[derive(Clone, Debug)]
+pub struct ClientGroup {
+    client: Client,
+    number: u8,
+}
+
+impl ClientGroup {
+    pub(super) const fn new(client: Client, number: u8) -> Self {
+        Self { client, number }
+    }
+
+    /// The numbers of its axes, in the order in which the configuration names them in the group.
+    pub fn axes(&self) -> Vec<usize> {
+        self.client.axes_of(self.target())
+    }
+
+    /// See [`GroupHandle::state`](crate::GroupHandle::state).
+    pub fn state(&self) -> GroupSnapshot {
+        let state = self.client.state();
+        state.groups().get(usize::from(self.number)).copied().unwrap_or_default()
+    }
+
+    /// See [`GroupHandle::move_to`](crate::GroupHandle::move_to).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn move_to(&self, target: &[f64]) -> Result<MotionId, CommandError> {
+        self.move_with(target, MoveOptions::default())
+    }
+
+    /// See [`GroupHandle::move_with`](crate::GroupHandle::move_with).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn move_with(&self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
+        self.client.begin_move(self.target(), target, options)
+    }
+
+    /// See [`GroupHandle::execute`](crate::GroupHandle::execute).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn execute(&self, points: &[TrajectoryPoint]) -> Result<MotionId, CommandError> {
+        self.client.begin_trajectory(self.target(), points)
+    }
+
+    /// See [`GroupHandle::move_through`](crate::GroupHandle::move_through).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
+        self.client.begin_through(self.target(), waypoints)
+    }
+
+    /// See [`GroupHandle::change_mode`](crate::GroupHandle::change_mode).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn change_mode(&self, mode: OperationMode) -> Result<MotionId, CommandError> {
+        self.client.begin_mode_change(self.target(), mode)
+    }
+
+    /// See [`GroupHandle::begin_stream`](crate::GroupHandle::begin_stream).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn begin_stream(&self) -> Result<(), CommandError> {
+        self.client.begin_streaming(self.target())
+    }
+
+    /// See [`GroupHandle::stream`](crate::GroupHandle::stream).
+    pub fn stream(&self) -> ClientStream {
+        ClientStream::new(self.client.clone(), self.target())
+    }
+
+    /// As [`Client::stop`], of this group alone.
+    ///
+    /// # Errors
+    /// See [`Client::stop`].
+    pub fn stop(&self, category: StopCategory) -> Result<(), CommandError> {
+        self.client.request_stop(self.target(), category)
+    }
+
+    /// See [`GroupHandle::enable`](crate::GroupHandle::enable).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn enable(&self) -> Result<(), CommandError> {
+        self.client.begin_enable(self.target())
+    }
+
+    /// See [`GroupHandle::disable`](crate::GroupHandle::disable).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn disable(&self) -> Result<(), CommandError> {
+        self.client.begin_disable(self.target())
+    }
+
+    /// See [`GroupHandle::reset_faults`](crate::GroupHandle::reset_faults).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn reset_faults(&self) -> Result<(), CommandError> {
+        self.client.clear_faults(self.target())
+    }
+
+    /// Waits until the group is in a phase.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    pub fn wait_for(&self, phase: Phase, at_most: Duration) -> Result<(), WaitError> {
+        self.client.look_until(at_most, || (self.state().phase == phase).then_some(()))
+    }
+
+    /// What is asked of the only group is asked of all.
+    fn target(&self) -> RequestTarget {
+        if self.client.machine().groups.len() > 1 {
+            RequestTarget::Group(self.number)
+        } else {
+            RequestTarget::All
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! The commands of one client.
+
+use std::sync::Arc;
+
+use takt_rt::RequestTarget;
+
+use super::Served;
+use super::lease::Claimant;
+use crate::command::{CommandError, MotionId, StreamError};
+use crate::remote::{Command, Demand, Malformed, PACKET_WORDS, Packets, Received, Reply, now_ns};
+use crate::trajectory::TrajectoryPoint;
+
+/// Points of a trajectory that a client can hand over before it is carried out: 100 s at 1 kHz.
+const POINTS_AT_MOST: usize = 100_000;
+
+/// Carries the commands of one client out.
+pub struct Worker {
+    served: Arc<Served>,
+    claimant: Claimant,
+    /// The points of a trajectory that is to come.
+    points: Vec<TrajectoryPoint>,
+}
+
+impl Worker {
+    /// For a client.
+    pub const fn new(served: Arc<Served>, claimant: Claimant) -> Self {
+        Self { served, claimant, points: vec![] }
+    }
+
+    /// Carries commands out until the client disconnects, or sends what is no command.
+    pub fn run(mut self, connection: &Packets) {
+        let mut words = [0; PACKET_WORDS];
+        while let Received::Words(count) = connection.receive(&mut words, true) {
+            let Ok(demand) = Demand::of(words.get(..count).unwrap_or_default()) else { break };
+            let number = demand.number;
+            let Ok(reply) = self.answer(demand.command) else { break };
+            // A client that does not receive its replies is disconnected.
+            if connection.send(&reply.words(number)).is_err() {
+                break;
+            }
+        }
+        connection.shut_down();
+    }
+
+    /// Checks a command, and carries it out.
+    ///
+    /// # Errors
+    /// It names a group that there is not: its sender has not read the description.
+    pub fn answer(&mut self, command: Command) -> Result<Reply, Malformed> {
+        if let Some(RequestTarget::Group(group)) = command.target()
+            && self.served.controller.axes_of(RequestTarget::Group(group)).is_empty()
+        {
+            return Err(Malformed);
+        }
+        let is_of_stream = matches!(command, Command::Point { .. } | Command::Chunk { .. });
+        Ok(match self.admit(&command) {
+            Ok(()) => {
+                let reply = self.carry_out(command);
+                // The controller may have taken its time.
+                let _ = self.admit(&Command::Lease { is_taken_over: false });
+                reply
+            }
+            Err(error) if is_of_stream => Reply::NotTaken(StreamError::Lease(error)),
+            Err(error) => Reply::Refused(error.into()),
+        })
+    }
+
+    /// Whether this client may command.
+    fn admit(&self, command: &Command) -> Result<(), crate::command::LeaseError> {
+        let mut lease = self.served.lease();
+        match command {
+            Command::Lease { is_taken_over: true } => lease.take_over(self.claimant, now_ns()),
+            Command::Release => lease.release(self.claimant.connection),
+            _ => lease.renew(self.claimant, now_ns())?,
+        }
+        Ok(())
+    }
+
+    fn carry_out(&mut self, command: Command) -> Reply {
+        let controller = &self.served.controller;
+        match command {
+            Command::Lease { .. } | Command::Release => Reply::Done,
+            Command::Move { target, options, positions } => {
+                motion(controller.begin_move(target, &positions, options))
+            }
+            Command::Velocity { axis, velocity, valid_for } => {
+                motion(controller.velocity(axis, velocity, valid_for))
+            }
+            Command::Torque { axis, torque, valid_for } => motion(controller.torque(axis, torque, valid_for)),
+            Command::ChangeMode { target, mode } => motion(controller.begin_mode_change(target, mode)),
+            Command::ChangeAxisMode { axis, mode } => motion(controller.change_axis_mode(axis, mode)),
+            Command::Enable(target) => done(controller.begin_enable(target)),
+            Command::Disable(target) => done(controller.begin_disable(target)),
+            Command::ResetFaults(target) => done(controller.clear_faults(target)),
+            Command::BeginStream(target) => done(controller.begin_streaming(target)),
+            Command::Point { target, at_ns, axes } => taken(controller.push_point(target, at_ns, &axes)),
+            Command::Chunk { target, from_ns, interval, points } => {
+                taken(controller.push_chunk(target, from_ns, interval, &points))
+            }
+            Command::Points(points) => self.keep(points),
+            Command::Execute(target) => {
+                let points = std::mem::take(&mut self.points);
+                motion(controller.begin_trajectory(target, &points))
+            }
+            Command::Through(target) => {
+                let points = std::mem::take(&mut self.points);
+                let waypoints: Vec<Vec<f64>> = points.into_iter().map(|point| point.positions).collect();
+                motion(controller.begin_through(target, &waypoints))
+            }
+            Command::SetSpeed { motion, rate } => done(controller.set_speed(motion, rate)),
+            Command::Pause(motion) => done(controller.pause(motion)),
+            Command::Resume(motion) => done(controller.resume(motion)),
+        }
+    }
+
+    fn keep(&mut self, points: Vec<TrajectoryPoint>) -> Reply {
+        if self.points.len() + points.len() > POINTS_AT_MOST {
+            self.points.clear();
+            return Reply::Refused(CommandError::Full { waiting: POINTS_AT_MOST });
+        }
+        self.points.extend(points);
+        Reply::Done
+    }
+}
+
+impl Drop for Worker {
+    fn drop(&mut self) {
+        self.served.lease().leave(self.claimant.connection);
+    }
+}
+
+fn done(result: Result<(), CommandError>) -> Reply {
+    result.map_or_else(Reply::Refused, |()| Reply::Done)
+}
+
+fn motion(result: Result<MotionId, CommandError>) -> Reply {
+    result.map_or_else(Reply::Refused, Reply::Motion)
+}
+
+fn taken(result: Result<(), StreamError>) -> Reply {
+    result.map_or_else(Reply::NotTaken, |()| Reply::Done)
+}
