@@ -62,6 +62,8 @@ pub mod homing_switches;
 #[cfg(feature = "cli")]
 #[cfg_attr(not(feature = "internals"), allow(unnameable_types, reason = "only the port of a link names it"))]
 pub(crate) mod line_faults;
+#[cfg(feature = "cli")]
+#[cfg_attr(not(feature = "internals"), allow(unnameable_types, reason = "only the port of a link names it"))]
 pub(crate) mod live;
 mod loops;
 #[cfg(feature = "cli")]
