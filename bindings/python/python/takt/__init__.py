@@ -1,0 +1,66 @@
+"""takt: a hard-real-time joint-motion controller for CAN drives.
+
+    import takt
+
+    with takt.Arm("configs/arm6-erob.toml", simulated=True) as arm:
+        arm.move([0.3, -0.2, 0.4, -0.9, 0.2, 0.5], speed=0.5)
+        print(arm.state.position)
+
+Angles are in rad, lengths in m, times in seconds, torques in N·m (forces in N).
+"""
+
+import atexit as _atexit
+
+from . import _takt
+from ._takt import Arm, Axis, Event, Events, Group, Motion, Recording, Simulation, State, Stream, simulate
+from .errors import (
+    ArgumentError,
+    CommandError,
+    ConfigError,
+    ConfigWarning,
+    EndedError,
+    Error,
+    LimitError,
+    MotionError,
+    RefusedError,
+    ReplacedError,
+    ShutdownError,
+    StartError,
+    StoppedError,
+    StreamError,
+    TimeoutError,
+    TrajectoryError,
+)
+
+__all__ = [
+    "Arm",
+    "ArgumentError",
+    "Axis",
+    "CommandError",
+    "ConfigError",
+    "ConfigWarning",
+    "EndedError",
+    "Error",
+    "Event",
+    "Events",
+    "Group",
+    "LimitError",
+    "Motion",
+    "MotionError",
+    "Recording",
+    "RefusedError",
+    "ReplacedError",
+    "ShutdownError",
+    "Simulation",
+    "StartError",
+    "State",
+    "StoppedError",
+    "Stream",
+    "StreamError",
+    "TimeoutError",
+    "TrajectoryError",
+    "simulate",
+]
+
+# A program that ends without closing its arms leaves them at rest, too.
+_atexit.register(_takt._close_all)

@@ -1,0 +1,245 @@
+//! Recordings of every cycle, as arrays. They are filled by the logger's thread of the library, which knows nothing of Python.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::thread;
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+use takt::rt::{AxisRecord, CycleRecord};
+use takt::telemetry::EachCycle;
+
+use crate::array::{array, array_of_rows};
+use crate::link::{Link, seconds};
+use crate::waiting::until;
+
+/// A part of the record of an axis.
+type Quantity = fn(&AxisRecord) -> f64;
+
+/// What is kept of an axis, by its name.
+const QUANTITIES: [(&str, Quantity); 9] = [
+    ("position", |axis| axis.position),
+    ("velocity", |axis| axis.velocity.into()),
+    ("torque", |axis| axis.torque.into()),
+    ("position_set", |axis| axis.position_set),
+    ("velocity_set", |axis| axis.velocity_set.into()),
+    ("acceleration_set", |axis| axis.acceleration_set.into()),
+    ("torque_set", |axis| axis.torque_set.into()),
+    ("following_error", |axis| axis.following_error.into()),
+    ("age", |axis| axis.feedback_age.into()),
+];
+/// The pause between two looks at what the logger has written.
+const LOOK: Duration = Duration::from_millis(2);
+
+/// Hands the records of the cycles to the recordings that are made at present.
+#[derive(Clone, Default)]
+pub struct Recorder(Arc<Taps>);
+
+#[derive(Default)]
+struct Taps {
+    /// Whether there is one.
+    any: AtomicBool,
+    tapes: Mutex<Vec<Weak<Tape>>>,
+}
+
+impl Recorder {
+    /// What the logger is to call.
+    pub fn each_cycle(&self) -> EachCycle {
+        let taps = Arc::clone(&self.0);
+        Box::new(move |record| taps.write(record))
+    }
+
+    /// A recording of these axes, of at most so many cycles, from the next cycle on.
+    pub fn begin(&self, link: Link, axes: Vec<usize>, at_most: usize) -> Recording {
+        let tape = Arc::new(Tape { axes, at_most, columns: Mutex::default() });
+        lock(&self.0.tapes).push(Arc::downgrade(&tape));
+        self.0.any.store(true, Ordering::Release);
+        Recording { link, tape, recorder: self.clone() }
+    }
+
+    fn end(&self, tape: &Arc<Tape>) {
+        let mut tapes = lock(&self.0.tapes);
+        tapes.retain(|own| !own.ptr_eq(&Arc::downgrade(tape)) && own.strong_count() > 0);
+        self.0.any.store(!tapes.is_empty(), Ordering::Release);
+    }
+}
+
+impl Taps {
+    fn write(&self, record: &CycleRecord) {
+        if self.any.load(Ordering::Acquire) {
+            lock(&self.tapes).iter().filter_map(Weak::upgrade).for_each(|tape| tape.write(record));
+        }
+    }
+}
+
+/// What has been recorded.
+struct Tape {
+    axes: Vec<usize>,
+    at_most: usize,
+    columns: Mutex<Columns>,
+}
+
+#[derive(Default)]
+struct Columns {
+    times: Vec<f64>,
+    slots: Vec<u64>,
+    /// Of each quantity, a row for each cycle.
+    values: [Vec<f64>; QUANTITIES.len()],
+}
+
+impl Tape {
+    fn write(&self, record: &CycleRecord) {
+        let mut columns = lock(&self.columns);
+        if columns.times.len() >= self.at_most {
+            return;
+        }
+        columns.times.push(seconds(record.timing.slot_start_ns));
+        columns.slots.push(record.timing.slot);
+        for (values, (_, of)) in columns.values.iter_mut().zip(QUANTITIES) {
+            values.extend(self.axes.iter().filter_map(|axis| record.axes().get(*axis)).map(of));
+        }
+    }
+
+    fn is_full(&self) -> bool {
+        lock(&self.columns).times.len() >= self.at_most
+    }
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Every cycle of a time, as arrays.
+#[pyclass(module = "takt", frozen)]
+pub struct Recording {
+    link: Link,
+    tape: Arc<Tape>,
+    recorder: Recorder,
+}
+
+impl Recording {
+    fn quantity<'py>(&self, py: Python<'py>, number: usize) -> PyResult<Bound<'py, PyAny>> {
+        let columns = py.detach(|| lock(&self.tape.columns).values.get(number).cloned().unwrap_or_default());
+        array_of_rows(py, &columns, self.tape.axes.len())
+    }
+}
+
+#[pymethods]
+impl Recording {
+    /// Ends it, when everything up to now has been written down.
+    fn stop(&self, py: Python<'_>) -> PyResult<()> {
+        let handle = self.link.handle(py)?;
+        let now = handle.state().slot;
+        let late = "the logger is far behind: the recording lacks its last cycles";
+        until(py, &self.link, Some(5.0), late, |handle, at_most| {
+            let is_written = self.tape.is_full()
+                || handle.has_ended()
+                || lock(&self.tape.columns).slots.last().is_some_and(|slot| *slot >= now);
+            if !is_written {
+                thread::sleep(LOOK.min(at_most));
+            }
+            is_written.then_some(())
+        })?;
+        self.recorder.end(&self.tape);
+        Ok(())
+    }
+
+    /// The beginning of each cycle: seconds on the clock of the arm.
+    #[getter]
+    fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let times = py.detach(|| lock(&self.tape.columns).times.clone());
+        array(py, &times)
+    }
+
+    /// Where the joints were.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 0)
+    }
+
+    /// How fast they were.
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 1)
+    }
+
+    /// The torques that the drives reported.
+    #[getter]
+    fn torque<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 2)
+    }
+
+    /// The set-points of the positions.
+    #[getter]
+    fn position_set<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 3)
+    }
+
+    /// The set-points of the velocities.
+    #[getter]
+    fn velocity_set<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 4)
+    }
+
+    /// The set-points of the accelerations.
+    #[getter]
+    fn acceleration_set<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 5)
+    }
+
+    /// The torques that were sent.
+    #[getter]
+    fn torque_set<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 6)
+    }
+
+    /// How far the joints were off their set-points.
+    #[getter]
+    fn following_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 7)
+    }
+
+    /// Cycles since the feedback of each axis; 0 for feedback of the same cycle.
+    #[getter]
+    fn age<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.quantity(py, 8)
+    }
+
+    /// All arrays by their names, as `numpy.savez` takes them.
+    fn arrays<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let arrays = PyDict::new(py);
+        arrays.set_item("time", self.time(py)?)?;
+        for (number, (name, _)) in QUANTITIES.iter().enumerate() {
+            arrays.set_item(*name, self.quantity(py, number)?)?;
+        }
+        Ok(arrays)
+    }
+
+    /// Whether it has as many cycles as it may have.
+    #[getter]
+    fn is_full(&self) -> bool {
+        self.tape.is_full()
+    }
+
+    fn __len__(&self) -> usize {
+        lock(&self.tape.columns).times.len()
+    }
+
+    fn __enter__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    #[pyo3(signature = (*exception))]
+    fn __exit__(&self, py: Python<'_>, exception: &Bound<'_, PyTuple>) -> PyResult<()> {
+        if exception.get_item(0).is_ok_and(|class| !class.is_none()) {
+            self.recorder.end(&self.tape);
+            return Ok(());
+        }
+        self.stop(py)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<recording of {} cycles>", self.__len__())
+    }
+}

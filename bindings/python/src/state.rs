@@ -1,0 +1,213 @@
+//! The state of an arm, or of a group of its axes, after a cycle.
+
+use pyo3::prelude::*;
+use takt::config::mode_word;
+use takt::telemetry::phase_words;
+use takt::{AxisSnapshot, Handle, OperationMode};
+
+use crate::array::{array, array_of_bools};
+use crate::link::seconds;
+
+/// The state after a cycle. Each array has a value for each axis; nan where a drive has not reported it.
+#[pyclass(module = "takt", frozen)]
+pub struct State {
+    names: Vec<String>,
+    axes: Vec<AxisSnapshot>,
+    /// The group and the phase of each.
+    phases: Vec<(String, &'static str)>,
+    fault: Option<String>,
+    slot: u64,
+    at_ns: u64,
+    now_ns: u64,
+    missed_slots: u64,
+}
+
+impl State {
+    /// The state of the axes with these numbers, and of the group that is named; of all of them without a name.
+    pub fn of(handle: &Handle, axes: &[usize], group: Option<&str>) -> Self {
+        let snapshot = handle.state();
+        let names = match handle.groups() {
+            [] => vec![handle.machine().name.clone()],
+            groups => groups.iter().map(|group| group.name.clone()).collect(),
+        };
+        let groups = names.into_iter().zip(snapshot.groups());
+        let meant: Vec<_> = groups.filter(|(name, _)| group.is_none_or(|group| group == name)).collect();
+        let is_faulty = meant.iter().any(|(_, group)| group.stop.is_some_and(|stop| !stop.is_requested()));
+        let of = |axis: &usize| Some((handle.axes().get(*axis)?.name.clone(), *snapshot.axes().get(*axis)?));
+        let (names, axes) = axes.iter().filter_map(of).unzip();
+        Self {
+            names,
+            axes,
+            phases: meant.into_iter().map(|(name, group)| (name, phase_words(group.phase))).collect(),
+            fault: handle.fault().filter(|_| is_faulty).map(|fault| fault.to_string()),
+            slot: snapshot.slot,
+            at_ns: snapshot.at_ns,
+            now_ns: handle.now_ns(),
+            missed_slots: snapshot.missed_slots,
+        }
+    }
+
+    fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&AxisSnapshot) -> f64,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        array(py, &self.axes.iter().map(of).collect::<Vec<f64>>())
+    }
+
+    /// What a drive reports; a drive that has reported nothing has no position of 0.
+    fn reported<'py>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&AxisSnapshot) -> Option<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, |axis| of(axis).filter(|_| axis.is_heard).unwrap_or(f64::NAN))
+    }
+
+    fn ages(&self) -> Vec<f64> {
+        let age = |axis: &AxisSnapshot| axis.feedback_age_ns(self.now_ns).map_or(f64::INFINITY, seconds);
+        self.axes.iter().map(age).collect()
+    }
+}
+
+#[pymethods]
+impl State {
+    /// The slot of the cycle.
+    #[getter]
+    const fn slot(&self) -> u64 {
+        self.slot
+    }
+
+    /// When the cycle was: seconds on the clock of the arm.
+    #[getter]
+    fn time(&self) -> f64 {
+        seconds(self.at_ns)
+    }
+
+    /// Slots that passed unused since the start, because the thread was late.
+    #[getter]
+    const fn missed_slots(&self) -> u64 {
+        self.missed_slots
+    }
+
+    /// Where the joints are: rad or m.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.reported(py, |axis| Some(axis.position))
+    }
+
+    /// How fast they are: rad/s or m/s.
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.reported(py, |axis| Some(axis.velocity))
+    }
+
+    /// The torques that the drives report: N·m or N.
+    #[getter]
+    fn torque<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.reported(py, |axis| axis.torque)
+    }
+
+    /// The set-points of the positions.
+    #[getter]
+    fn position_set<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, |axis| axis.position_set)
+    }
+
+    /// The set-points of the velocities.
+    #[getter]
+    fn velocity_set<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, |axis| axis.velocity_set)
+    }
+
+    /// The torques that are sent.
+    #[getter]
+    fn torque_set<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, |axis| axis.torque_set)
+    }
+
+    /// How far the joints are off their set-points.
+    #[getter]
+    fn following_error<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.reported(py, |axis| Some(axis.following_error))
+    }
+
+    /// The currents, as fractions of the rated ones.
+    #[getter]
+    fn current<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.reported(py, |axis| axis.current_per_mille.map(|current| f64::from(current) / 1000.0))
+    }
+
+    /// The temperatures of the drives: °C.
+    #[getter]
+    fn temperature<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.reported(py, |axis| axis.temperature.map(f64::from))
+    }
+
+    /// How old what each drive reports is, in seconds; infinite before its first report.
+    #[getter]
+    fn age<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        array(py, &self.ages())
+    }
+
+    /// Whether what a drive reports is not from its last cycle.
+    #[getter]
+    fn is_stale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        array_of_bools(py, &self.axes.iter().map(AxisSnapshot::is_stale).collect::<Vec<bool>>())
+    }
+
+    /// What the axes are doing: "holding", "moving", …; where groups do different things, what the first does.
+    #[getter]
+    fn phase(&self) -> &'static str {
+        self.phases.first().map_or("passive", |(_, phase)| phase)
+    }
+
+    /// What each group is doing.
+    #[getter]
+    fn phases(&self) -> std::collections::BTreeMap<String, &'static str> {
+        self.phases.iter().cloned().collect()
+    }
+
+    /// The fault that has stopped the axes, in words; None while there is none.
+    #[getter]
+    fn fault(&self) -> Option<&str> {
+        self.fault.as_deref()
+    }
+
+    /// The mode of operation of each axis, as the drives show it, or as it is commanded where they do not.
+    #[getter]
+    fn mode(&self) -> Vec<&'static str> {
+        let word = |axis: &AxisSnapshot| {
+            OperationMode::from_number(axis.mode.unwrap_or(axis.mode_set)).map_or("none", mode_word)
+        };
+        self.axes.iter().map(word).collect()
+    }
+
+    /// The state of each drive (CiA 402).
+    #[getter]
+    fn drive_state(&self) -> Vec<&'static str> {
+        self.axes.iter().map(|axis| axis.drive_state.name()).collect()
+    }
+
+    /// The error code of each drive; 0 for none.
+    #[getter]
+    fn error_code(&self) -> Vec<u16> {
+        self.axes.iter().map(|axis| axis.error_code).collect()
+    }
+
+    fn __repr__(&self) -> String {
+        let mut text = format!("<state of slot {}: {}", self.slot, self.phase());
+        for ((name, axis), age) in self.names.iter().zip(&self.axes).zip(self.ages()) {
+            text.push_str(&match (axis.is_heard, axis.is_stale()) {
+                (false, _) => format!(", {name} unknown"),
+                (true, false) => format!(", {name} {:+.4}", axis.position),
+                (true, true) => format!(", {name} {:+.4} ({:.0} ms old)", axis.position, age * 1e3),
+            });
+        }
+        if let Some(fault) = &self.fault {
+            text.push_str("; ");
+            text.push_str(fault);
+        }
+        text + ">"
+    }
+}

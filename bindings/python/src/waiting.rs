@@ -1,0 +1,48 @@
+//! Waiting without the interpreter's lock, so that other threads of the program go on, and with an eye on signals, so that Ctrl-C works.
+
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use takt::{Handle, StopCategory};
+
+use crate::error::raise_timeout;
+use crate::link::{Link, duration};
+
+/// The longest time from a signal to its Python handler.
+const SLICE: Duration = Duration::from_millis(50);
+
+/// Tries until `attempt` gives something, which waits for no longer than it is told to. `words` say what has not happened in `timeout`
+/// seconds of the arm's time.
+///
+/// When a signal's handler raises, as that of Ctrl-C does, a stop of category 2 is asked for, and the exception is passed on.
+pub fn until<T: Send>(
+    py: Python<'_>,
+    link: &Link,
+    timeout: Option<f64>,
+    words: &str,
+    mut attempt: impl FnMut(&Handle, Duration) -> Option<T> + Send,
+) -> PyResult<T> {
+    let handle = link.handle(py)?;
+    let timeout = timeout.map(|seconds| duration("timeout", seconds)).transpose()?;
+    let begun_ns = handle.now_ns();
+    loop {
+        let passed = Duration::from_nanos(handle.now_ns().saturating_sub(begun_ns));
+        let left = timeout.map(|timeout| timeout.saturating_sub(passed));
+        let slice = left.map_or(SLICE, |left| left.min(SLICE));
+        if let Some(found) = py.detach(|| attempt(handle, slice)) {
+            return Ok(found);
+        }
+        look_for_signals(py, handle)?;
+        if left.is_some_and(|left| left <= slice) {
+            return Err(raise_timeout(py, words));
+        }
+    }
+}
+
+/// Runs the handlers of signals that have come. If one raises, the axes stop.
+pub fn look_for_signals(py: Python<'_>, handle: &Handle) -> PyResult<()> {
+    py.check_signals().inspect_err(|_| {
+        // It is refused only after the end.
+        let _ = handle.stop(StopCategory::Two);
+    })
+}
