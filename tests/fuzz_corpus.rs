@@ -46,7 +46,7 @@ const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
 #[test]
 fn every_kept_input_is_borne() {
     type Subject = fn(&[u8]);
-    let subjects: [(&str, Subject); 10] = [
+    let subjects: [(&str, Subject); 11] = [
         ("configuration", subjects::configuration::run),
         ("scenario", subjects::scenario::run),
         ("device_description", subjects::device_description::run),
