@@ -237,7 +237,7 @@ impl Client {
         self.done(Command::Release)
     }
 
-    /// See [`Handle::state`](crate::Handle::state). It is shown to other processes about 0.1 ms after it is complete.
+    /// See [`Handle::state`](crate::Handle::state). An ordinary thread shows it to other processes, shortly after it is complete.
     pub fn state(&self) -> Snapshot {
         self.0.shown.state().snapshot
     }

@@ -9,7 +9,7 @@ use super::shown::now_ns;
 use crate::command::{RunningController, StreamError};
 
 /// Hands points to the stream of a controller in another process, from any thread. It has the calls of a
-/// [`StreamHandle`](crate::StreamHandle), with the same meaning. Each call waits for the answer of the other process: about 0.1 ms.
+/// [`StreamHandle`](crate::StreamHandle), with the same meaning. Each call waits for the answer of the other process.
 #[derive(Clone, Debug)]
 pub struct ClientStream {
     client: Client,
