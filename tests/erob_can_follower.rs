@@ -1,7 +1,8 @@
 //! An axis that speaks eRob's own CAN protocol follows its group beside the cycle, in virtual time.
 
 use takt::family::{OffCycleDrive, OffCycleTarget, OffCycleWish};
-use takt::internals::erob_can::frame::{ReceivedRequest, replying_node};
+use takt::internals::erob_can::entries;
+use takt::internals::erob_can::frame::{ReceivedRequest, Reply, replying_node};
 use takt::internals::family::erob_can::follower::Follower;
 use takt::schedule::{self, MessageKind};
 use takt::sim::{Defect, DriveFault, SimulatedBus};
@@ -219,6 +220,48 @@ fn an_error_of_the_drive_is_reported_and_cleared_when_that_is_wanted() {
     bench.run(100, |at_ns| of_wish(OffCycleWish::ClearFaults, at_ns));
     bench.run(100, |at_ns| of_wish(OffCycleWish::Stop, at_ns));
     assert_eq!((bench.last().state, bench.last().error_code), (DriveState::ReadyToSwitchOn, 0));
+}
+
+#[test]
+fn a_drive_that_seems_to_have_an_error_is_disabled_before_that_counts() {
+    let mut bench = Bench::new();
+    bench.run(100, |at_ns| of_wish(OffCycleWish::Observe, at_ns));
+    bench.follow(1500, 0.0, 0.5);
+    assert_eq!(bench.bus.observe(NODE).unwrap().state, DriveState::OperationEnabled);
+    // The reply to the question for its error is the late one to another question.
+    let asks_for_error = |frame: &Frame| {
+        ReceivedRequest::decode(frame).is_some_and(|request| request.address == entries::ERROR_CODE.address)
+    };
+    let began_ns = bench.now_ns;
+    while !bench.sent.last().is_some_and(asks_for_error) {
+        bench.follow(1, 0.5, 0.5);
+        assert!(bench.now_ns < began_ns + 1000 * MS);
+    }
+    bench.follower.receive(bench.now_ns, &Reply::Value(0x1234).frame(NODE));
+    bench.reports.clear();
+    bench.run(200, |at_ns| wanted(0.5, 0.0, at_ns));
+    assert_eq!(bench.bus.observe(NODE).unwrap().state, DriveState::SwitchOnDisabled);
+    assert_eq!((bench.last().state, bench.last().error_code), (DriveState::Fault, 0x1234));
+}
+
+#[test]
+fn a_drive_that_is_not_to_be_enabled_is_told_so_again_and_again() {
+    let mut bench = Bench::new();
+    bench.run(100, |at_ns| of_wish(OffCycleWish::Observe, at_ns));
+    bench.follow(1000, 0.0, 0.0);
+    bench.sent.clear();
+    bench.run(1000, |at_ns| of_wish(OffCycleWish::Stop, at_ns));
+    let told = bench.writes(0x0100);
+    assert!(told.len() > 5 && told.iter().all(|value| *value == Some(0)), "{told:?}");
+}
+
+#[test]
+fn an_axis_whose_drive_has_just_been_switched_on_is_waited_for() {
+    let mut config = config();
+    config.axes[0].power_up_ns = 8_000 * MS;
+    let mut run = VirtualRun::simulated(&config).unwrap().0;
+    assert_eq!(run.run(60_000, |_| ()), Some(Outcome::Finished), "{:?}", run.snapshot().groups()[0]);
+    assert!(run.snapshot().at_ns > 8_000 * MS);
 }
 
 #[test]

@@ -14,7 +14,12 @@ mod subjects;
 use subjects::engine::Journey;
 
 fn seeds(name: &str) -> Vec<Vec<u8>> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds").join(name);
+    let folder = match name {
+        // The descriptions that come with takt.
+        "field_description" => "drives/bit-fields".to_owned(),
+        name => format!("fuzz/seeds/{name}"),
+    };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
     let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.sort();
     assert!(!paths.is_empty(), "no seeds for {name}");
@@ -46,7 +51,7 @@ const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
 #[test]
 fn every_kept_input_is_borne() {
     type Subject = fn(&[u8]);
-    let subjects: [(&str, Subject); 11] = [
+    let subjects: [(&str, Subject); 13] = [
         ("configuration", subjects::configuration::run),
         ("scenario", subjects::scenario::run),
         ("device_description", subjects::device_description::run),
@@ -57,6 +62,8 @@ fn every_kept_input_is_borne() {
         ("wire", subjects::wire::run),
         ("modbus", subjects::modbus::run),
         ("packets", subjects::packets::run),
+        ("field_description", subjects::field_description::run),
+        ("erob_can", subjects::erob_can::run),
         ("engine", |bytes| drop(subjects::engine::run(bytes))),
     ];
     for (name, run) in subjects {
@@ -162,8 +169,25 @@ proptest! {
     }
 
     #[test]
+    fn any_text_describes_a_drive_of_bit_fields_or_is_explained(text in TOML, seed in mutated("field_description")) {
+        subjects::field_description::run(text.as_bytes());
+        subjects::field_description::run(&seed);
+    }
+
+    #[test]
     fn the_engine_bears_anything(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("engine")) {
         subjects::engine::run(&bytes);
         subjects::engine::run(&seed);
+    }
+}
+
+proptest! {
+    // Each of them is seconds of a drive.
+    #![proptest_config(ProptestConfig { cases: 60, ..ProptestConfig::default() })]
+
+    #[test]
+    fn whoever_speaks_to_an_erob_bears_any_bus(bytes in proptest::collection::vec(any::<u8>(), 0..4000), seed in mutated("erob_can")) {
+        subjects::erob_can::run(&bytes);
+        subjects::erob_can::run(&seed);
     }
 }

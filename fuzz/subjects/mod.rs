@@ -5,6 +5,8 @@ pub mod bus_logs;
 pub mod configuration;
 pub mod device_description;
 pub mod engine;
+pub mod erob_can;
+pub mod field_description;
 mod input;
 pub mod lines;
 pub mod modbus;

@@ -2,17 +2,16 @@
 //! an impedance itself.
 
 mod fixture;
-
-use std::collections::VecDeque;
+#[path = "fixture/plain_host.rs"]
+mod plain_host;
 
 use fixture::{LIMITS, PERIOD_NS, PERIOD_S, axis_in};
+use plain_host::{PlainHost, cycle, one_bus, slow_move};
 use takt_rt::{
-    AxisParameters, AxisSnapshot, BesideTarget, BitField, BitSet, BusHealth, BusParameters, ByteOrder,
-    CommandValue, ControlLaw, CycleInput, CycleTiming, Deadline, DriveState, Engine, EngineParameters, Event,
-    EventKind, Exchange, FeedbackSince, FieldBits, FieldDriveParameters, FieldFrame, FieldGains, Frame,
-    FrameFormat, Heartbeat, HostInterface, Id, LifeCycle, LinearScale, ModeCodes, Move, Number, OwnFrame,
-    OwnFrames, Phase, PositionReference, Received, ReplyValue, Request, RequestEnvelope, RequestId,
-    RequestTarget, SenderByte, Snapshot, StopCategories, StopCause, StopReason, StreamSample, TimingLadder,
+    AxisParameters, BesideTarget, BitField, ByteOrder, CommandValue, ControlLaw, Deadline, DriveState,
+    Engine, Exchange, FeedbackSince, FieldBits, FieldDriveParameters, FieldFrame, FieldGains, Frame,
+    FrameFormat, Heartbeat, Id, LifeCycle, LinearScale, ModeCodes, Number, OwnFrame, OwnFrames, Phase,
+    PositionReference, Received, ReplyValue, Request, SenderByte, StopCause,
 };
 
 const MASTER: Id = Id::canopen(0, 0x64);
@@ -205,44 +204,9 @@ impl Motor {
     }
 }
 
-#[derive(Default)]
-struct Host {
-    requests: VecDeque<Request<2>>,
-    axes: [AxisSnapshot; 2],
-    phase: Option<Phase>,
-    stops: Vec<StopReason>,
-    /// What a stream wants of the first axis.
-    stream: StreamSample<2>,
-}
-
-impl HostInterface<2, 1> for Host {
-    fn request(&mut self) -> Option<RequestEnvelope<2>> {
-        let request = self.requests.pop_front()?;
-        Some(RequestEnvelope { id: RequestId(0), target: RequestTarget::All, request })
-    }
-
-    fn stream(&mut self, _group: u8, _slot_start_ns: u64) -> StreamSample<2> {
-        self.stream
-    }
-
-    fn event(&mut self, event: &Event) -> bool {
-        match event.kind {
-            EventKind::Stop(reason) => self.stops.push(reason),
-            EventKind::Rejected(rejection) => panic!("{rejection:?}"),
-            _ => {}
-        }
-        true
-    }
-
-    fn publish(&mut self, snapshot: &Snapshot<2, 1>) {
-        self.phase = Some(snapshot.groups()[0].phase);
-        self.axes = snapshot.axes;
-    }
-}
-
 struct Rig {
     engine: Engine<2, 1>,
-    host: Host,
+    host: PlainHost<2>,
     motors: [Motor; 2],
     is_hollow: bool,
     /// Whether every cycle misses its deadline.
@@ -254,30 +218,12 @@ struct Rig {
 
 impl Rig {
     fn of(axes: [AxisParameters; 2], is_hollow: bool) -> Self {
-        let parameters = EngineParameters {
-            period_ns: PERIOD_NS,
-            axes: axes.into_iter().collect(),
-            groups: Default::default(),
-            buses: [BusParameters {
-                canopen: None,
-                divider: 1,
-                service_frames_active: 1,
-                service_frames_passive: 6,
-            }]
-            .into_iter()
-            .collect(),
-            heartbeat: Some(Heartbeat { node: 127, cycles: 20, timeout_cycles: 100 }),
-            time_cycles: None,
-            enable_timeout_cycles: 200,
-            not_transmitted_cycles: 5,
-            acknowledge_timeout_cycles: 500,
-            categories: StopCategories::default(),
-            timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_slots: 20 },
-        };
+        let heartbeat = Heartbeat { node: 127, cycles: 20, timeout_cycles: 100 };
+        let parameters = one_bus(axes, 1, Some(heartbeat), 200);
         let motor = |position| Motor { position, ..Motor::default() };
         Self {
             engine: Engine::new(parameters).unwrap(),
-            host: Host::default(),
+            host: PlainHost::default(),
             motors: [motor(0.7), motor(-0.4)],
             is_hollow,
             is_late: false,
@@ -325,23 +271,8 @@ impl Rig {
                 self.engine.receive(0, &Received { frame, at_ns: now_ns - PERIOD_NS / 10 });
             }
         }
-        let buses = [BusHealth::default()];
-        let input = CycleInput {
-            slot: self.slot,
-            slot_start_ns: now_ns,
-            set_points_due_ns: now_ns + 800_000,
-            now_ns: now_ns + 500_000,
-            buses: &buses,
-            behind: BitSet::default(),
-        };
-        self.engine.sync(0, self.slot, now_ns);
-        self.engine.compute(&input, &mut self.host);
-        let mut batch = takt_rt::SendBatch::new();
         let deadline = if self.is_late { Deadline::Missed } else { Deadline::Met };
-        self.engine.encode(0, deadline, &mut self.host, &mut batch);
-        self.sent = batch.to_vec();
-        let timing = CycleTiming { slot: self.slot, ..CycleTiming::default() };
-        self.engine.finish(timing, now_ns, &buses, &mut self.host);
+        self.sent = cycle(&mut self.engine, &mut self.host, self.slot, deadline).to_vec();
         self.slot += 1;
     }
 
@@ -351,7 +282,7 @@ impl Rig {
 
     fn run_until(&mut self, phase: Phase) {
         for _ in 0..5_000 {
-            if self.host.phase == Some(phase) {
+            if self.host.phase == phase {
                 return;
             }
             self.step();
@@ -369,13 +300,7 @@ impl Rig {
     }
 
     fn move_to(&mut self, target: [f64; 2]) {
-        self.host.requests.push_back(Request::Move(Move {
-            target,
-            target_velocity: [0.0; 2],
-            velocity_scale: 1.0,
-            acceleration_scale: 1.0,
-            minimum_duration_s: 0.0,
-        }));
+        self.host.requests.push_back(Request::Move(slow_move(target, 1.0)));
         self.run(2);
         self.run_until(Phase::Holding);
     }
@@ -427,19 +352,13 @@ fn each_motor_gets_exactly_one_frame_a_cycle_from_activation_on() {
         let ids: Vec<u32> = rig.sent.iter().map(|frame| frame.id().value()).collect();
         assert_eq!(ids, [1, 2], "cycle {cycle}");
     }
-    assert_eq!(rig.host.phase, Some(Phase::Holding));
+    assert_eq!(rig.host.phase, Phase::Holding);
 }
 
 #[test]
 fn a_motor_that_falls_silent_stops_the_group_with_one_reason_and_both_are_told_to_stop() {
     let mut rig = Rig::hollow().enable();
-    rig.host.requests.push_back(Request::Move(Move {
-        target: [2.0, -2.0],
-        target_velocity: [0.0; 2],
-        velocity_scale: 1.0,
-        acceleration_scale: 1.0,
-        minimum_duration_s: 0.0,
-    }));
+    rig.host.requests.push_back(Request::Move(slow_move([2.0, -2.0], 1.0)));
     rig.run(300);
     rig.motors[1].is_silent = true;
     rig.run_until(Phase::Disabled);
@@ -457,10 +376,56 @@ fn a_motor_without_a_watchdog_that_does_not_reply_is_told_to_stop_for_seconds_be
     assert_eq!(rig.host.stops.len(), 1, "{:?}", rig.host.stops);
     // Longer than any heartbeat is waited for.
     rig.run(150);
-    assert_eq!((rig.host.phase, rig.motors[0].runs), (Some(Phase::Disabling), true));
+    assert_eq!((rig.host.phase, rig.motors[0].runs), (Phase::Disabling, true));
     rig.motors[0].is_deaf = false;
     rig.run(20);
-    assert_eq!((rig.host.phase, rig.motors.map(|motor| motor.runs)), (Some(Phase::Disabled), [false; 2]));
+    assert_eq!((rig.host.phase, rig.motors.map(|motor| motor.runs)), (Phase::Disabled, [false; 2]));
+}
+
+#[test]
+fn a_motor_whose_reply_to_its_start_is_lost_is_told_to_stop_before_its_group_counts_as_disabled() {
+    for is_hollow in [true, false] {
+        let mut rig = if is_hollow { Rig::hollow() } else { Rig::impedance() };
+        rig.slot = 1;
+        rig.host.requests.push_back(Request::Activate);
+        rig.run(20);
+        rig.host.requests.push_back(Request::Enable);
+        let is_start = |frame: &Frame| match is_hollow {
+            true => frame.payload()[12] == 1,
+            false => frame.payload().len() == 8 && frame.payload()[7] == 0xFC,
+        };
+        let started = (0..500).find(|_| {
+            rig.step();
+            rig.sent.iter().any(is_start)
+        });
+        assert!(started.is_some());
+        rig.motors.iter_mut().for_each(|motor| motor.is_silent = true);
+        rig.step();
+        assert_eq!(rig.motors.map(|motor| motor.runs), [true; 2]);
+        rig.motors.iter_mut().for_each(|motor| motor.is_deaf = true);
+        rig.host.requests.push_back(Request::Disable);
+        rig.run(60);
+        assert_eq!(rig.host.phase, Phase::Disabling);
+        rig.motors.iter_mut().for_each(|motor| (motor.is_silent, motor.is_deaf) = (false, false));
+        rig.run(30);
+        assert_eq!((rig.host.phase, rig.motors.map(|motor| motor.runs)), (Phase::Disabled, [false; 2]));
+    }
+}
+
+#[test]
+fn a_motor_that_is_sent_nothing_because_the_controller_is_late_has_missed_no_reply() {
+    for is_hollow in [true, false] {
+        let mut rig = if is_hollow { Rig::hollow() } else { Rig::impedance() }.enable();
+        rig.run(10);
+        rig.is_late = true;
+        rig.run(30);
+        assert_eq!((rig.host.phase, rig.host.stops.clone()), (Phase::Holding, vec![]));
+        rig.is_late = false;
+        rig.run(30);
+        assert_eq!((rig.host.phase, rig.host.stops.clone()), (Phase::Holding, vec![]));
+        assert_eq!(rig.motors.map(|motor| motor.runs), [true; 2]);
+        assert_eq!(rig.host.axes.map(|axis| axis.feedback_age), [0; 2]);
+    }
 }
 
 #[test]
@@ -472,7 +437,7 @@ fn motors_are_told_to_stop_by_a_controller_that_is_always_late() {
         rig.is_late = true;
         rig.run(1_500);
         assert_eq!((rig.motors.map(|motor| motor.runs), rig.host.stops.len()), ([false; 2], 1));
-        assert_eq!(rig.host.phase, Some(Phase::Disabled));
+        assert_eq!(rig.host.phase, Phase::Disabled);
     }
 }
 
@@ -484,12 +449,7 @@ fn a_motor_that_takes_its_torque_away_or_shows_an_error_stops_the_group() {
         fault(&mut rig.motors[0]);
         rig.run_until(Phase::Disabled);
         rig.run(20);
-        assert_eq!(
-            (rig.host.phase, rig.host.stops.len()),
-            (Some(Phase::Disabled), 1),
-            "{:?}",
-            rig.host.stops
-        );
+        assert_eq!((rig.host.phase, rig.host.stops.len()), (Phase::Disabled, 1), "{:?}", rig.host.stops);
         let shown = rig.host.axes[0];
         assert_eq!(shown.error_code, rig.motors[0].error.into());
         assert_eq!(shown.drive_state.is_faulted(), rig.motors[0].error != 0);

@@ -6,7 +6,7 @@ use takt_rt::{
     BesideTarget, BitField, BitRange, ByteOrder, CommandValue, DriveState, FieldBits, FieldDrive,
     FieldDriveParameters, FieldFrame, FieldGains, FieldMode, FieldTargets, Frame, FrameFormat, Id, LifeCycle,
     LifeState, LifeWish, LinearScale, ModeCodes, Number, OwnFrame, OwnFrames, PositionReference, ReplyError,
-    ReplyValue, RunningMode, SetUpAgain, Setting,
+    ReplyValue, RunningMode, SetUpAgain, Setting, StateCodes,
 };
 
 const MOTOR: Id = Id::canopen(0, 1);
@@ -417,4 +417,27 @@ fn a_reply_of_any_other_length_sets_nothing_up() {
     let (mut drive, targets) = (FieldDrive::default(), FieldTargets::default());
     drive.receive(&by, &Frame::data(MASTER, &[1, 0x80]).unwrap()).unwrap_err();
     assert!((0..5).all(|_| !drive.step(&by, LifeWish::Stop, &targets).id().is_extended()));
+}
+
+#[test]
+fn one_reply_that_shows_an_error_does_not_show_that_a_motor_has_stopped() {
+    let fields = [plain(ReplyValue::State, 0), counts(ReplyValue::Position, FieldBits::of(8, 40))];
+    let (format, order) = (FrameFormat::Fd, ByteOrder::BigEndian);
+    let reply = FieldFrame::compile(MASTER, format, 6, order, &fields).unwrap();
+    let by = FieldDriveParameters {
+        reply: reply.with_states(StateCodes { stopped: 0, running: 1 }),
+        ..flexible()
+    };
+    let mut master = Master { by, drive: FieldDrive::default() };
+    let mut answered = |wish: LifeWish, state: Option<u8>| {
+        let command = master.step(wish, &to(0.0));
+        let state = state.unwrap_or(command.payload()[12]);
+        master.receive(&Frame::fd(MASTER, &[state, 0, 0, 0, 0, 0], false).unwrap()).unwrap();
+        master.shown().0
+    };
+    let shown = (0..20).map(|_| answered(RUN, None)).last();
+    assert_eq!(shown, Some(DriveState::OperationEnabled));
+    let shown: Vec<DriveState> = (0..9).map(|_| answered(LifeWish::Stop, Some(9))).collect();
+    assert_eq!(shown[..7], [DriveState::FaultReactionActive; 7]);
+    assert_eq!(shown[8], DriveState::Fault);
 }

@@ -1,15 +1,14 @@
 //! An axis whose drive is spoken to outside of the cycle.
 
 mod fixture;
+#[path = "fixture/plain_host.rs"]
+mod plain_host;
 
-use std::collections::VecDeque;
-
-use fixture::{LIMITS, PERIOD_NS, PERIOD_S, axis_in};
+use fixture::{LIMITS, PERIOD_S, axis_in};
+use plain_host::{PlainHost, cycle, one_bus, slow_move};
 use takt_rt::{
-    AxisParameters, AxisSnapshot, BitSet, BusHealth, BusParameters, Command, ControlLaw, CycleInput,
-    CycleTiming, Deadline, DriveState, Engine, EngineParameters, Event, EventKind, Exchange, FeedbackSince,
-    HostInterface, Move, OffCycleReport, Phase, Request, RequestEnvelope, RequestId, RequestTarget, Rule,
-    SendBatch, Snapshot, StopCategories, StopReason, TimingLadder,
+    AxisParameters, Command, ControlLaw, Deadline, DriveState, Engine, Exchange, FeedbackSince,
+    OffCycleReport, Phase, Request, Rule,
 };
 
 /// Slots of a cycle of the bus: one report is expected in each.
@@ -25,44 +24,13 @@ struct Drive {
     /// Slots from one report to the next.
     pace: u64,
     is_silent: bool,
-}
-
-#[derive(Default)]
-struct Host {
-    requests: VecDeque<Request<1>>,
-    reports: VecDeque<OffCycleReport>,
-    shown: AxisSnapshot,
-    phase: Phase,
-    stops: Vec<StopReason>,
-}
-
-impl HostInterface<1, 1> for Host {
-    fn request(&mut self) -> Option<RequestEnvelope<1>> {
-        let request = self.requests.pop_front()?;
-        Some(RequestEnvelope { id: RequestId(0), target: RequestTarget::All, request })
-    }
-
-    fn off_cycle_report(&mut self) -> Option<(u8, OffCycleReport)> {
-        self.reports.pop_front().map(|report| (0, report))
-    }
-
-    fn event(&mut self, event: &Event) -> bool {
-        match event.kind {
-            EventKind::Stop(reason) => self.stops.push(reason),
-            EventKind::Rejected(rejection) => panic!("{rejection:?}"),
-            _ => {}
-        }
-        true
-    }
-
-    fn publish(&mut self, snapshot: &Snapshot<1, 1>) {
-        (self.shown, self.phase) = (snapshot.axes[0], snapshot.groups()[0].phase);
-    }
+    /// It is being enabled, and does not follow yet.
+    is_settling: bool,
 }
 
 struct Rig {
     engine: Engine<1, 1>,
-    host: Host,
+    host: PlainHost<1>,
     drive: Drive,
     slot: u64,
 }
@@ -77,25 +45,7 @@ fn axis() -> AxisParameters {
 
 impl Rig {
     fn new(pace: u64) -> Self {
-        let bus = BusParameters {
-            canopen: None,
-            divider: DIVIDER,
-            service_frames_active: 1,
-            service_frames_passive: 6,
-        };
-        let parameters = EngineParameters {
-            period_ns: PERIOD_NS,
-            axes: [axis()].into_iter().collect(),
-            groups: Default::default(),
-            buses: [bus].into_iter().collect(),
-            heartbeat: None,
-            time_cycles: None,
-            enable_timeout_cycles: 2_000,
-            not_transmitted_cycles: 5,
-            acknowledge_timeout_cycles: 500,
-            categories: StopCategories::default(),
-            timing: TimingLadder { warning: 10, degraded: 50, unfit: 250, leak_slots: 20 },
-        };
+        let parameters = one_bus([axis()], DIVIDER, None, 2_000);
         let drive = Drive {
             state: DriveState::ReadyToSwitchOn,
             position: 0.6,
@@ -103,12 +53,13 @@ impl Rig {
             error: 0,
             pace,
             is_silent: false,
+            is_settling: false,
         };
-        Self { engine: Engine::new(parameters).unwrap(), host: Host::default(), drive, slot: 1 }
+        Self { engine: Engine::new(parameters).unwrap(), host: PlainHost::default(), drive, slot: 1 }
     }
 
     fn speak(&mut self) {
-        let (drive, shown) = (&mut self.drive, self.host.shown);
+        let (drive, shown) = (&mut self.drive, self.host.axes[0]);
         drive.position += drive.velocity * PERIOD_S;
         if !self.slot.is_multiple_of(drive.pace) || drive.is_silent {
             return;
@@ -117,6 +68,7 @@ impl Rig {
             matches!(Command::decode(shown.controlword), Command::SwitchOn | Command::EnableOperation);
         drive.state = match drive.state {
             _ if drive.error != 0 => DriveState::Fault,
+            _ if is_wanted && drive.is_settling => DriveState::SwitchedOn,
             _ if is_wanted => DriveState::OperationEnabled,
             _ => DriveState::ReadyToSwitchOn,
         };
@@ -128,34 +80,14 @@ impl Rig {
             _ => 0.0,
         };
         let Drive { state, position, velocity, error, .. } = *drive;
-        self.host.reports.push_back(OffCycleReport {
-            state,
-            position,
-            velocity,
-            torque: 0.0,
-            error_code: error,
-        });
+        let report = OffCycleReport { state, position, velocity, torque: 0.0, error_code: error };
+        self.host.reports.push_back((0, report));
     }
 
     fn step(&mut self) {
         self.speak();
-        let now_ns = self.slot * PERIOD_NS;
-        let buses = [BusHealth::default()];
-        let input = CycleInput {
-            slot: self.slot,
-            slot_start_ns: now_ns,
-            set_points_due_ns: now_ns + 800_000,
-            now_ns: now_ns + 500_000,
-            buses: &buses,
-            behind: BitSet::default(),
-        };
-        assert_eq!(self.engine.sync(0, self.slot, now_ns), None);
-        self.engine.compute(&input, &mut self.host);
-        let mut batch = SendBatch::new();
-        self.engine.encode(0, Deadline::Met, &mut self.host, &mut batch);
+        let batch = cycle(&mut self.engine, &mut self.host, self.slot, Deadline::Met);
         assert!(batch.is_empty(), "nothing is sent in the cycle");
-        let timing = CycleTiming { slot: self.slot, ..CycleTiming::default() };
-        self.engine.finish(timing, now_ns, &buses, &mut self.host);
         self.slot += 1;
     }
 
@@ -182,13 +114,7 @@ impl Rig {
     }
 
     fn begin_move(&mut self, target: f64) {
-        self.host.requests.push_back(Request::Move(Move {
-            target: [target],
-            target_velocity: [0.0],
-            velocity_scale: 0.5,
-            acceleration_scale: 0.5,
-            minimum_duration_s: 0.0,
-        }));
+        self.host.requests.push_back(Request::Move(slow_move([target], 0.5)));
         self.run(2);
     }
 }
@@ -197,7 +123,7 @@ impl Rig {
 fn a_drive_is_enabled_moved_and_disabled_by_what_is_shown_of_its_axis() {
     for pace in [1, 4, 7, 10] {
         let mut rig = Rig::new(pace).enable();
-        assert_eq!(rig.host.shown.drive_state, DriveState::OperationEnabled);
+        assert_eq!(rig.host.axes[0].drive_state, DriveState::OperationEnabled);
         assert!((rig.drive.position - 0.6).abs() < 1e-6, "it stays where it is: {:?}", rig.drive);
         rig.begin_move(-1.0);
         rig.run_until(Phase::Holding);
@@ -222,8 +148,8 @@ fn a_drive_that_is_not_heard_any_more_or_has_an_error_stops_the_group_with_one_r
         fault(&mut rig.drive);
         rig.run_until(Phase::Disabled);
         assert_eq!(rig.host.stops.len(), 1, "{:?}", rig.host.stops);
-        assert_eq!(rig.host.shown.error_code, rig.drive.error);
-        let last = Command::decode(rig.host.shown.controlword);
+        assert_eq!(rig.host.axes[0].error_code, rig.drive.error);
+        let last = Command::decode(rig.host.axes[0].controlword);
         assert!(!matches!(last, Command::SwitchOn | Command::EnableOperation), "{last:?}");
     }
 }
@@ -231,13 +157,49 @@ fn a_drive_that_is_not_heard_any_more_or_has_an_error_stops_the_group_with_one_r
 #[test]
 fn a_report_without_a_number_is_none() {
     let mut rig = Rig::new(5).enable();
-    let before = rig.host.shown.position;
+    let before = rig.host.axes[0].position;
     rig.drive.is_silent = true;
     for number in [f64::NAN, f64::INFINITY] {
         let report = OffCycleReport { position: number, ..OffCycleReport::default() };
-        rig.host.reports.push_back(report);
+        rig.host.reports.push_back((0, report));
         rig.run(1);
     }
-    assert_eq!(rig.host.shown.position, before);
-    assert_eq!(rig.host.shown.drive_state, DriveState::OperationEnabled);
+    assert_eq!(rig.host.axes[0].position, before);
+    assert_eq!(rig.host.axes[0].drive_state, DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_group_that_sends_no_set_points_in_the_cycle_goes_on_in_every_slot_after_missed_ones() {
+    let mut rig = Rig::new(5).enable();
+    rig.begin_move(1.5);
+    rig.run(300);
+    while !rig.slot.is_multiple_of(DIVIDER.into()) {
+        rig.step();
+    }
+    // The only slot in ten in which the bus has a cycle.
+    rig.slot += 1;
+    for _ in 0..30 {
+        let before = rig.host.steps;
+        rig.step();
+        assert_eq!(rig.host.steps, before + 1);
+    }
+}
+
+#[test]
+fn a_drive_that_is_being_enabled_is_waited_for_when_its_group_is_disabled() {
+    let mut rig = Rig::new(5);
+    rig.host.requests.push_back(Request::Activate);
+    rig.run(50);
+    rig.drive.is_settling = true;
+    rig.host.requests.push_back(Request::Enable);
+    rig.run(300);
+    assert_eq!(rig.host.axes[0].drive_state, DriveState::SwitchedOn);
+    // It may have torque, and says nothing more for some time.
+    rig.drive.is_silent = true;
+    rig.host.requests.push_back(Request::Disable);
+    rig.run(300);
+    assert_eq!(rig.host.phase, Phase::Disabling);
+    rig.drive.is_silent = false;
+    rig.run(50);
+    assert_eq!(rig.host.phase, Phase::Disabled);
 }

@@ -92,6 +92,8 @@ pub struct DriveFacts {
     pub codec: Cia402Codec,
     /// The pause that they need between two controlwords.
     pub controlword_spacing_ns: u64,
+    /// So long after power-on they can be enabled, where they answer long before.
+    pub enabled_from_ns: u64,
     /// What is plausible for such a drive.
     pub plausible: Plausible,
 }
@@ -258,6 +260,7 @@ impl DriveFacts {
             may_power_up_operational: false,
             codec: Cia402Codec::STANDARD,
             controlword_spacing_ns: 0,
+            enabled_from_ns: 0,
             plausible: Plausible::ANYTHING,
         }
     }

@@ -16,7 +16,7 @@ use crate::config::{self, Axis, Compliance, Config, ConfigError, Interface};
 use crate::family;
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 
-/// How long the drives may take from the first controlword to operation enabled.
+/// How long the drives may take from the first controlword to operation enabled, where they have been on for long enough.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
 /// How long a drive may take to acknowledge a target in profile position.
 const ACKNOWLEDGE_TIMEOUT_NS: u64 = 500_000_000;
@@ -104,7 +104,7 @@ pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
         buses: buses.collect(),
         heartbeat,
         time_cycles: config.master.time_ns.map(&cycles),
-        enable_timeout_cycles: cycles(ENABLE_TIMEOUT_NS),
+        enable_timeout_cycles: cycles(ENABLE_TIMEOUT_NS + enabled_from_ns(config)),
         not_transmitted_cycles: cycles(NOT_TRANSMITTED_NS),
         categories: config.stops,
         timing: TimingLadder {
@@ -115,6 +115,11 @@ pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
         },
         acknowledge_timeout_cycles: cycles(ACKNOWLEDGE_TIMEOUT_NS),
     })
+}
+
+/// So long after power-on every drive can be enabled: some have just been switched on.
+pub(super) fn enabled_from_ns(config: &Config) -> u64 {
+    config.axes.iter().map(|axis| axis.drive.enabled_from_ns).max().unwrap_or(0)
 }
 
 /// Moves the engine to the heap. Each step that passes it on by value would take its size of the stack once more, so there is only one.

@@ -18,6 +18,7 @@ use takt_rt::{
 use tracing::{info, warn};
 
 use super::arrival::{ARRIVAL_NS, Arrival};
+use super::assemble::enabled_from_ns;
 use super::lines::Lines;
 use super::off_cycle::OffCycleDrives;
 use super::outcome::{Interrupt, Outcome, Progress};
@@ -28,7 +29,7 @@ use crate::family;
 use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
 
-/// A stage must be completed within this time. The engine has its own, shorter time-outs.
+/// A stage must be completed within this time, where every drive can be enabled at once. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
 /// The drives of serial lines have this time for the last requests, of which a silent one gets one every 500 ms.
 const LINES_NS: u64 = 1_000_000_000;
@@ -76,11 +77,14 @@ pub struct Supervisor {
     axes: usize,
     stage: Stage,
     stage_since_ns: Option<u64>,
+    stage_timeout_ns: u64,
     bring_up: BringUp,
     off_cycle: OffCycleDrives,
     /// Whether the drive of an axis tells its position at bring-up.
     tells_position: Vec<bool>,
     shutdown: Shutdown,
+    /// For how long the drive of each axis is told to stop at least.
+    least_shut_down_ns: Vec<u64>,
     /// The program of each group.
     programs: Vec<ProgramRunner>,
     arrival: Arrival,
@@ -108,10 +112,16 @@ impl Supervisor {
             axes: config.axes.len(),
             stage: Stage::Configure,
             stage_since_ns: None,
+            stage_timeout_ns: STAGE_TIMEOUT_NS + enabled_from_ns(config),
             bring_up: BringUp::new(config),
             off_cycle: OffCycleDrives::new(config),
             tells_position: config.axes.iter().map(|axis| family::has_pdos(axis, config)).collect(),
             shutdown: Shutdown::new(config),
+            least_shut_down_ns: config
+                .axes
+                .iter()
+                .map(|axis| family::of(&axis.drive).least_shut_down_ns(axis))
+                .collect(),
             programs: (0..config.groups.len().max(1))
                 .map(|group| {
                     let axes = config.axes_of_group(group);
@@ -232,7 +242,7 @@ impl Supervisor {
                     matches!(phase, Phase::Moving | Phase::Streaming | Phase::Stopping)
                 });
                 let missed = self.missed_target(snapshot);
-                let is_waited_for = (is_moving && elapsed_ns <= STAGE_TIMEOUT_NS)
+                let is_waited_for = (is_moving && elapsed_ns <= self.stage_timeout_ns)
                     || (missed.is_some() && elapsed_ns <= ARRIVAL_NS);
                 if let Some(stop) = fault_stop(snapshot) {
                     self.end(now_ns, Outcome::Stopped(stop));
@@ -248,17 +258,19 @@ impl Supervisor {
                 if is_every_group_off(snapshot) {
                     self.note_fault_while_disabling(snapshot);
                     self.begin_shut_down(now_ns);
-                } else if elapsed_ns > STAGE_TIMEOUT_NS {
+                } else if elapsed_ns > self.stage_timeout_ns {
                     let phase = stuck_phase(snapshot, |phase| !is_off(phase));
                     self.outcome.get_or_insert(Outcome::Stuck { phase });
                     self.begin_shut_down(now_ns);
                 }
             }
-            Stage::ShutDown => self.shut_down(now_ns, elapsed_ns, host),
+            Stage::ShutDown => self.shut_down(now_ns, elapsed_ns, snapshot, host),
             Stage::RemovePower => {
                 // The last controlwords take effect at the next SYNC, and may wait for the bus. So the loop goes on until the
                 // group is disabled.
-                if (is_every_group_off(snapshot) && elapsed_ns > 0) || elapsed_ns > STAGE_TIMEOUT_NS {
+                let is_off = is_every_group_off(snapshot) && elapsed_ns > 0;
+                if is_off && self.are_told_to_stop(elapsed_ns, snapshot) || elapsed_ns > self.stage_timeout_ns
+                {
                     self.request(Request::Shutdown);
                     self.enter(Stage::Done, now_ns);
                 }
@@ -320,8 +332,8 @@ impl Supervisor {
                     self.begin_enable(now_ns);
                 }
             }
-            Some(axis) if elapsed_ns > STAGE_TIMEOUT_NS => self.end(now_ns, Outcome::NotHeard { axis }),
-            _ if elapsed_ns > STAGE_TIMEOUT_NS => {
+            Some(axis) if elapsed_ns > self.stage_timeout_ns => self.end(now_ns, Outcome::NotHeard { axis }),
+            _ if elapsed_ns > self.stage_timeout_ns => {
                 let phase = stuck_phase(snapshot, |phase| phase != Phase::Disabled);
                 self.end(now_ns, Outcome::Stuck { phase });
             }
@@ -332,7 +344,7 @@ impl Supervisor {
     fn reset_faults(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         match self.faulted(snapshot) {
             None => self.begin_enable(now_ns),
-            Some((axis, code)) if elapsed_ns > STAGE_TIMEOUT_NS / 4 => {
+            Some((axis, code)) if elapsed_ns > self.stage_timeout_ns / 4 => {
                 self.end(now_ns, Outcome::FaultPersists { axis, code });
             }
             Some(_) => {}
@@ -352,7 +364,7 @@ impl Supervisor {
         } else if is_enabled {
             self.deadline_ns = self.duration_ns.map(|duration_ns| now_ns + duration_ns);
             self.enter(Stage::Run, now_ns);
-        } else if elapsed_ns > STAGE_TIMEOUT_NS {
+        } else if elapsed_ns > self.stage_timeout_ns {
             let phase = stuck_phase(snapshot, |phase| !is_in_operation(phase));
             self.end(now_ns, Outcome::Stuck { phase });
         }
@@ -447,12 +459,26 @@ impl Supervisor {
         self.enter(Stage::ShutDown, now_ns);
     }
 
-    fn shut_down(&mut self, now_ns: u64, elapsed_ns: u64, host: &mut HostSide) {
+    /// Whether the drives that would go on without the controller have been told to stop for long enough, and the newest reply of
+    /// none shows torque.
+    fn are_told_to_stop(&self, elapsed_ns: u64, snapshot: &Snapshot) -> bool {
+        if is_any(snapshot, |phase| phase == Phase::Passive) {
+            // None has been told to start.
+            return true;
+        }
+        self.axes_of(snapshot).iter().zip(&self.least_shut_down_ns).all(|(axis, least_ns)| {
+            let has_torque = axis.drive_state.has_torque() && axis.feedback_age == 0;
+            *least_ns == 0 || elapsed_ns >= *least_ns && !has_torque
+        })
+    }
+
+    fn shut_down(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {
         self.shutdown.poll(now_ns, &mut service_sender(host));
         let outcome = self.shutdown.outcome();
         let unsettled = self.off_cycle.lines().unsettled();
         let is_awaited = !unsettled.is_empty() && elapsed_ns <= LINES_NS;
-        if (outcome.is_some() && !is_awaited) || elapsed_ns > STAGE_TIMEOUT_NS {
+        let is_over = outcome.is_some() && !is_awaited && self.are_told_to_stop(elapsed_ns, snapshot);
+        if is_over || elapsed_ns > self.stage_timeout_ns {
             match outcome {
                 Some(Err(error)) if !self.facts.is_empty() => {
                     let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());

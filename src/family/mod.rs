@@ -28,7 +28,7 @@ pub(crate) mod yz_aim;
 
 use std::pin::Pin;
 
-use takt_rt::{FieldDriveParameters, Frame, Id, MappedObject};
+use takt_rt::{FieldDriveParameters, Frame, Id, MappedObject, Nanoseconds};
 
 pub use crate::procedure::{
     AxisReading, CanopenClient, CanopenSession, Client, Procedure, ProcedureEvent, ProcedureSession,
@@ -62,6 +62,9 @@ pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
 
 /// Describes frames in words.
 pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
+
+/// [`Family::least_shut_down_ns`] of drives without a watchdog: longer than a bus is usually disturbed.
+const UNWATCHED_SHUT_DOWN_NS: Nanoseconds = 1_000_000_000;
 
 /// A part of bring-up or shutdown that is under way.
 pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + Send + 'a>>;
@@ -145,6 +148,12 @@ pub trait Family: ConfiguredFamily {
 
     /// From operational to pre-operational, without torque, and without the watchdog on the controller's heartbeat.
     fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
+
+    /// For how long the drive of an axis is told to stop, at the least, before the controller leaves it. A drive without a watchdog that
+    /// has misheard it would go on without end, and its replies may not show that.
+    fn least_shut_down_ns(&self, _axis: &Axis) -> Nanoseconds {
+        0
+    }
 
     /// What an axis has to do without, because its drive lacks something: sentences for people.
     fn remarks(&self, _axis: &Axis) -> Vec<&'static str> {

@@ -1,6 +1,6 @@
 //! What is stated of a stop: how long it takes and how far it leads.
 
-use takt::config::{Axis, Config};
+use takt::config::{Axis, Config, Protocol};
 
 /// How far behind its set-point a joint may be that obeys.
 const LAG_S: f64 = 0.4;
@@ -37,6 +37,9 @@ pub fn coasting_s(axis: &Axis) -> f64 {
     let joint = &axis.joint;
     match axis.drive.word {
         "yz-aim" => axis.limits.velocity * joint.inertia() / joint.coulomb_friction(),
+        _ if axis.drive.protocol == Protocol::BitFields => {
+            axis.limits.velocity * joint.inertia() / joint.coulomb_friction()
+        }
         _ => 0.0,
     }
 }

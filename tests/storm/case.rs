@@ -7,7 +7,7 @@ use takt::faults::Scenario;
 use crate::dice::Dice;
 use crate::machine;
 use crate::overload::Overload;
-use crate::weather::{KINDS, NEEDS_EROB, fault, when};
+use crate::weather::{KINDS, NEEDS_EROB, fault, fault_of_own_protocol, when};
 
 pub struct Case {
     pub config: Config,
@@ -106,6 +106,33 @@ impl Case {
     pub fn of_bit_fields(seed: u64) -> Self {
         let mut dice = Dice::new(seed).split(u64::MAX - 6);
         let mut case = Self::with(seed, Some(machine::of_bit_fields(&mut dice)));
+        if dice.chance(0.5) {
+            case.harden(&mut dice);
+        }
+        case
+    }
+
+    /// The same on a machine that has too little time.
+    pub fn of_bit_fields_in_overload(seed: u64) -> Self {
+        let mut case = Self::of_bit_fields(seed);
+        let mut dice = Dice::new(seed).split(u64::MAX - 7);
+        case.overload = Overload::of(&mut dice, &case.config, case.length);
+        if dice.chance(0.6) {
+            (case.text, case.scenario) = (String::new(), Scenario::default());
+        }
+        case
+    }
+
+    /// One on a machine with drives that are spoken to outside of the cycle.
+    pub fn of_off_cycle(seed: u64) -> Self {
+        let mut dice = Dice::new(seed).split(u64::MAX - 8);
+        let mut case = Self::with(seed, Some(machine::of_off_cycle(&mut dice)));
+        let length_ms = (case.length * case.config.cycle.period_ns / 1_000_000) as usize;
+        for _ in 0..dice.pick(&[0, 1, 1, 2, 3]) {
+            let when = when(&mut dice, length_ms);
+            case.text.push_str(&fault_of_own_protocol(&mut dice, &case.config, &when));
+        }
+        case.scenario = scenario(&case.text, &case.config);
         if dice.chance(0.5) {
             case.harden(&mut dice);
         }

@@ -21,12 +21,16 @@ pub struct Concern {
     pub is_driven_by_others: bool,
     /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
     pub is_misled: bool,
+    /// The same, or nothing that stops its drive gets there, and that has no end. Where its drive has no watchdog, nothing stops it.
+    pub is_beyond_reach: bool,
     /// Its drive waits for no heartbeat: another master has reset its communication, or it has heard none yet.
     pub is_unwatched: bool,
-    /// No SDO gets to its drive while this lasts.
-    pub is_cut_off: bool,
     /// Somebody else sends on its bus, and what its drive reports may have to wait for that.
     pub is_crowded: bool,
+    /// The loop was away for some time.
+    pub has_paused: bool,
+    /// Its drive is spoken to outside of the cycle, by a thread that is late every time.
+    pub is_neglected: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
     pub is_loaded: bool,
     /// Whether its drive has missed the heartbeat, and stops by itself.
@@ -41,9 +45,11 @@ impl Concern {
             is_present: self.is_present || other.is_present,
             is_driven_by_others: self.is_driven_by_others || other.is_driven_by_others,
             is_misled: self.is_misled || other.is_misled,
+            is_beyond_reach: self.is_beyond_reach || other.is_beyond_reach,
             is_unwatched: self.is_unwatched || other.is_unwatched,
-            is_cut_off: self.is_cut_off || other.is_cut_off,
             is_crowded: self.is_crowded || other.is_crowded,
+            has_paused: self.has_paused || other.has_paused,
+            is_neglected: self.is_neglected || other.is_neglected,
             is_loaded: self.is_loaded || other.is_loaded,
             missed_heartbeat: self.missed_heartbeat.max(other.missed_heartbeat),
             unreachable_since_ns: self.unreachable_since_ns.or(other.unreachable_since_ns),
@@ -77,7 +83,7 @@ impl Concerns {
             has_begun: vec![false; by_fault.len()],
             buses: fault_injector.progress().map(|(fault, _)| fault.bus).collect(),
             by_fault,
-            by_axis: vec![Concern::default(); config.axes.len()],
+            by_axis: config.axes.iter().map(without_fault).collect(),
             by_bus: vec![false; config.buses.len()],
             is_overloaded: analyse(config).iter().map(|bus| !bus.fits()).collect(),
             bus_of_axis: config.axes.iter().map(|axis| axis.bus).collect(),
@@ -90,6 +96,21 @@ impl Concerns {
         for concern in &mut self.by_axis {
             concern.is_crowded = true;
         }
+    }
+
+    /// The life cycle looks only after so many cycles: the drives that are spoken to outside of the cycle wait for that.
+    pub fn neglect(&mut self, config: &Config, cycles: u64) {
+        // What a controller that is alive keeps to: see the budget of the family.
+        const PUNCTUAL_CYCLES: u64 = 2;
+        for (concern, axis) in self.by_axis.iter_mut().zip(&config.axes) {
+            concern.is_neglected =
+                cycles > PUNCTUAL_CYCLES && axis.drive.protocol.own_identifiers().is_some();
+        }
+    }
+
+    /// The loop is away for some time.
+    pub fn pause(&mut self) {
+        self.by_axis.iter_mut().for_each(|concern| concern.has_paused = true);
     }
 
     /// From now on the loop is too late in every slot.
@@ -106,7 +127,7 @@ impl Concerns {
         self.by_bus[bus] = true;
         for (concern, _) in self.by_axis.iter_mut().zip(&self.bus_of_axis).filter(|(_, of)| **of == bus) {
             (concern.is_present, concern.is_crowded) = (true, true);
-            concern.is_cut_off |= is_for_ever;
+            concern.is_beyond_reach |= is_for_ever;
             if is_for_ever {
                 concern.unreachable_since_ns.get_or_insert(now_ns);
             }
@@ -118,6 +139,15 @@ impl Concerns {
         for (concern, missed) in self.by_axis.iter_mut().zip(missed) {
             concern.missed_heartbeat = missed;
         }
+    }
+
+    /// Whether the last frames to an axis may have been corrupted: such a fault has not ended yet.
+    pub fn is_misled_now(&self, fault_injector: &FaultInjector, axis: usize) -> bool {
+        let mut faults = fault_injector.progress().zip(&self.by_fault);
+        faults.any(|((_, progress), concerns)| {
+            let is_active = progress.began_ns().is_some() && progress.ended_ns().is_none();
+            is_active && concerns[axis].is_misled
+        })
     }
 
     /// Looks which faults have begun since the last look, and calls `begun` with the number of each.
@@ -133,6 +163,11 @@ impl Concerns {
             }
         }
     }
+}
+
+/// What cannot be expected of a joint from the first.
+fn without_fault(axis: &Axis) -> Concern {
+    Concern { is_unwatched: !axis.drive.consumes_heartbeat, ..Concern::default() }
 }
 
 fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
@@ -197,13 +232,16 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
     // Frames with the identifier of a motor are commands to it, and one that replies to them has no time for others.
     let is_flooded_by_commands = !axis.drive.consumes_heartbeat
         && matches!(fault.effect, Effect::Foreign(ForeignFrames::Frame { .. }));
+    let has_no_end = fault.window.lasts_ns.is_none() && fault.selection.count.is_none();
     Concern {
         is_present,
         is_misled,
-        is_unwatched: is_unwatched || !axis.drive.consumes_heartbeat,
         // A flood leaves no room for anything else.
-        is_cut_off: is_cut_off || is_flooded_by_commands,
+        is_beyond_reach: has_no_end && (is_misled || is_cut_off || is_flooded_by_commands),
+        is_unwatched,
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
+        has_paused: false,
+        is_neglected: false,
         is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray)
             || is_flooded_by_commands,
         is_loaded: is_own && fault.kind == "load",

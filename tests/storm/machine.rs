@@ -31,6 +31,61 @@ const SHIPPED: [&str; 15] = [
 ];
 /// Those whose drives are spoken to by bit fields.
 const OF_BIT_FIELDS: [&str; 3] = ["damiao-arm", "hollow-leg-fd", "hollow-arm"];
+/// One drive that is spoken to outside of the cycle.
+const TURNTABLE: &str = "turntable-erob-can";
+/// Drives that are spoken to outside of the cycle, beside one that is spoken to in it.
+const TURNTABLES: &str = r#"
+name = "turntables"
+
+[[bus]]
+name = "tables"
+period = "20 ms"
+
+[[bus]]
+name = "arm"
+
+[[axis]]
+name = "table"
+bus = "tables"
+node = 1
+drive = "erob-can"
+
+[axis.limits]
+position = ["-170 deg", "170 deg"]
+velocity = "60 deg/s"
+acceleration = "120 deg/s^2"
+torque = "31 Nm"
+
+[[axis]]
+name = "tilt"
+bus = "tables"
+node = 2
+drive = "erob-can"
+reversed = true
+
+[axis.limits]
+position = ["-60 deg", "60 deg"]
+velocity = "30 deg/s"
+acceleration = "60 deg/s^2"
+jerk = "600 deg/s^3"
+torque = "31 Nm"
+
+[[axis]]
+name = "arm"
+bus = "arm"
+node = 1
+drive = "erob-canopen"
+mode = "csp"
+
+[axis.limits]
+position = ["-170 deg", "170 deg"]
+velocity = "90 deg/s"
+acceleration = "360 deg/s^2"
+torque = "31 Nm"
+
+[[program.move]]
+to = ["0 deg", "0 deg", "0 deg"]
+"#;
 /// As many axes as one controller moves.
 const CROWD: &str = "axes32-erob";
 const RANDOM_SHARE: f64 = 0.5;
@@ -42,8 +97,14 @@ const RECORDS: usize = 16;
 /// A shipped machine, read once.
 pub fn load(name: &str) -> Config {
     static READ: OnceLock<HashMap<&str, Config>> = OnceLock::new();
-    let read =
-        || SHIPPED.into_iter().chain(OF_BIT_FIELDS).chain([CROWD]).map(|name| (name, read(name))).collect();
+    let read = || {
+        SHIPPED
+            .into_iter()
+            .chain(OF_BIT_FIELDS)
+            .chain([CROWD, TURNTABLE])
+            .map(|name| (name, read(name)))
+            .collect()
+    };
     READ.get_or_init(read)[name].clone()
 }
 
@@ -69,6 +130,21 @@ pub fn crowd() -> Config {
     load(CROWD)
 }
 
+/// One with drives that are spoken to outside of the cycle. Some have just been switched on, and can be enabled only after seconds.
+pub fn of_off_cycle(dice: &mut Dice) -> Config {
+    let mut config = match dice.chance(0.5) {
+        true => load(TURNTABLE),
+        false => parse("turntables", TURNTABLES),
+    };
+    if dice.chance(0.2) {
+        let power_up_ns = (dice.between(0.1, 8.0) * 1e9) as u64;
+        for axis in config.axes.iter_mut().filter(|axis| axis.drive.enabled_from_ns > 0) {
+            axis.power_up_ns = power_up_ns;
+        }
+    }
+    config
+}
+
 /// One whose drives are spoken to by bit fields.
 pub fn of_bit_fields(dice: &mut Dice) -> Config {
     load(dice.pick(&OF_BIT_FIELDS))
@@ -89,8 +165,11 @@ pub fn any(dice: &mut Dice, needs_erob: bool) -> Config {
 }
 
 fn random(dice: &mut Dice) -> Config {
-    let text = text(dice);
-    match Config::parse("random", &text) {
+    parse("random", &text(dice))
+}
+
+fn parse(name: &str, text: &str) -> Config {
+    match Config::parse(name, text) {
         Ok(config) => ready(config),
         Err(error) => {
             let problems: Vec<String> = error.problems().iter().map(ToString::to_string).collect();

@@ -2,7 +2,7 @@
 //! faults.
 //!
 //! `TAKT_STORM_CYCLES=100000000` for a long one (with `--release`), `TAKT_STORM_FIRST=…` for the cases from this seed on in
-//! place of those from 0 on, `TAKT_STORM_CASES=…` for so many on machines of bit fields, `TAKT_STORM_SEED=…` for one case again, `TAKT_STORM_TABLE=1` for the tables of what has been gone
+//! place of those from 0 on, `TAKT_STORM_CASES=…` for so many on machines of bit fields and with drives outside of the cycle, `TAKT_STORM_SEED=…` for one case again, `TAKT_STORM_TABLE=1` for the tables of what has been gone
 //! through and of the reactions.
 
 mod bounds;
@@ -19,6 +19,7 @@ mod fingerprint;
 mod heartbeat;
 mod invariants;
 mod machine;
+mod off_cycle;
 mod overload;
 mod regressions;
 mod run;
@@ -52,6 +53,10 @@ const POINT_CASES: u64 = 240;
 const MODE_CASES: u64 = 120;
 /// Of storms over drives of bit fields.
 const BIT_FIELD_CASES: u64 = 600;
+/// The same on a machine with too little time.
+const OVERLOADED_BIT_FIELD_CASES: u64 = 200;
+/// Of storms over drives that are spoken to outside of the cycle.
+const OFF_CYCLE_CASES: u64 = 300;
 /// A shard ends after so many failures.
 const FAILURES_AT_MOST: usize = 5;
 
@@ -139,18 +144,43 @@ fn the_invariants_hold_in_every_storm_and_every_fault_has_its_turn() {
     assert!(gaps.is_empty(), "never: {gaps:?}");
 }
 
-#[test]
-fn the_invariants_hold_for_drives_of_bit_fields() {
+/// Plays so many cases of a kind, and says at once what fails. Returns the rules of all stops.
+fn play_all(kind: &str, cases: u64, case: impl Fn(u64) -> Case) -> BTreeSet<&'static str> {
     let first = number("TAKT_STORM_FIRST").unwrap_or(0);
-    let mut failures = vec![];
-    for seed in first..first + number("TAKT_STORM_CASES").unwrap_or(BIT_FIELD_CASES) {
-        let case = Case::of_bit_fields(seed);
-        if let Err(wrong) = play(&case) {
-            println!("seed {seed}, bit fields: {} {wrong}\n{}", case.config.name, case.text);
-            failures.push(seed);
+    let (mut failures, mut stops) = (vec![], BTreeSet::new());
+    for seed in first..first + number("TAKT_STORM_CASES").unwrap_or(cases) {
+        let case = case(seed);
+        match play(&case) {
+            Ok(done) => stops.extend(done.stops),
+            Err(wrong) => {
+                let Case { config, hardship, text, .. } = &case;
+                println!(
+                    "seed {seed}, {kind}: {} {wrong}\n{hardship:?} {:?}\n{text}",
+                    config.name, case.overload
+                );
+                failures.push(seed);
+            }
         }
     }
     assert!(failures.is_empty(), "storms have failed: {failures:?}");
+    stops
+}
+
+#[test]
+fn the_invariants_hold_for_drives_of_bit_fields() {
+    play_all("bit fields", BIT_FIELD_CASES, Case::of_bit_fields);
+}
+
+#[test]
+fn the_invariants_hold_for_drives_of_bit_fields_on_a_machine_with_too_little_time() {
+    let stops =
+        play_all("bit fields in overload", OVERLOADED_BIT_FIELD_CASES, Case::of_bit_fields_in_overload);
+    assert!(number("TAKT_STORM_CASES").is_some() || stops.contains(Rule::TimingUnfit.key()));
+}
+
+#[test]
+fn the_invariants_hold_for_off_cycle_drives() {
+    play_all("off cycle", OFF_CYCLE_CASES, Case::of_off_cycle);
 }
 
 #[test]

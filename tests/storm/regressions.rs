@@ -299,6 +299,28 @@ const FAILED_WITH_POINTS: [(u64, &str); 3] = [
     (6_095, "A stream that began with an impedance was stopped in its first cycle"),
 ];
 
+/// The same of those on machines of bit fields.
+const FAILED_WITH_BIT_FIELDS: [(u64, &str); 7] = [
+    (20_268, "A drive that does not show its torque was left while its stops were corrupted"),
+    (20_443, "The same, with a fault of the other drive in the stop"),
+    (3_001_699, "The same, after both drives had failed"),
+    (3_002_429, "One corrupted reply with an error counted as a drive that has stopped"),
+    (3_019_548, "A drive whose start had no reply, because the bus was lost, was not told to stop"),
+    (
+        3_001_546,
+        "A joint swung while the loop was away that gives it torque, and the storm blamed the controller",
+    ),
+    (4_000_594, "A joint without a brake coasted after its run, which the storm had not watched for so long"),
+];
+
+#[test]
+fn storms_that_have_failed_with_bit_fields_pass() {
+    for (seed, what) in FAILED_WITH_BIT_FIELDS {
+        let played = play(&Case::of_bit_fields(seed));
+        assert!(played.is_ok(), "{seed}, {what}: {played:?}");
+    }
+}
+
 #[test]
 fn storms_that_have_failed_with_everything_pass() {
     for (seed, what) in FAILED_WITH_EVERYTHING {

@@ -25,6 +25,7 @@ use crate::concern::Concerns;
 use crate::fingerprint::Fingerprint;
 use crate::heartbeat::Heartbeats;
 use crate::invariants::{Invariants, REST, Seen};
+use crate::off_cycle::OffCycle;
 use crate::tap::Tap;
 use crate::wire::Wire;
 
@@ -130,6 +131,9 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut world = World::with(config, &case.scenario, case.is_serving);
     let fault_injector = Arc::clone(&world.fault_injector);
     let mut invariants = Invariants::new(config);
+    let off_cycle = OffCycle::new(config);
+    // Whether each drive has been without torque since its group was last enabled.
+    let mut was_stopped = vec![true; config.axes.len()];
     let mut concerns = Concerns::new(config, &fault_injector);
     let mut wire = Wire::new(config);
     let mut heartbeats = Heartbeats::new(config);
@@ -144,6 +148,7 @@ pub fn play(case: &Case) -> Result<Done, String> {
     let mut goes_on = true;
     let mut overload_dice = case.dice.split(u64::MAX - 2);
     world.run.poll_life_cycle_every(case.hardship.neglect.max(1));
+    concerns.neglect(config, case.hardship.neglect);
     while goes_on {
         let before = world.snapshot;
         goes_on = world.step(config);
@@ -151,6 +156,11 @@ pub fn play(case: &Case) -> Result<Done, String> {
         let wrong =
             |snapshot: &Snapshot, what: String| format!("cycle {cycles}, {:?}: {what}", phases_of(snapshot));
         wire.read(&world.sent);
+        off_cycle.check(&world.sent).map_err(|what| wrong(&world.snapshot, what))?;
+        for (axis, was_stopped) in was_stopped.iter_mut().enumerate() {
+            let is_led = is_led(world.snapshot.groups()[groups[axis]].phase);
+            *was_stopped = !is_led && (*was_stopped || !world.truth[axis].state.has_torque());
+        }
         heartbeats.observe(&world.sent, world.snapshot.at_ns, &world.truth);
         concerns.note_missed_heartbeats(heartbeats.missed());
         concerns.observe(&fault_injector, |fault| {
@@ -213,10 +223,11 @@ pub fn play(case: &Case) -> Result<Done, String> {
         clients.act(case, &mut world, is_open);
         case.overload.act(cycles, &mut overload_dice, &mut world.run, &mut concerns);
         for (_, late_ns) in case.hardship.stalls.iter().filter(|(cycle, _)| *cycle == cycles) {
+            concerns.pause();
             world.run.clock().stall(*late_ns);
         }
     }
-    at_rest(case, &mut concerns, &mut world)?;
+    at_rest(case, &mut concerns, &mut world, &was_stopped)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
     let trajectories = clients.trajectories.map_or(0, |client| client.begun);
     let fingerprint = fingerprint.value();
@@ -230,6 +241,11 @@ pub fn play(case: &Case) -> Result<Done, String> {
         trajectories,
         is_bring_up_failed,
     })
+}
+
+/// Whether the drives of a group in this phase have torque.
+fn is_led(phase: Phase) -> bool {
+    !matches!(phase, Phase::Passive | Phase::Disabled | Phase::Disabling)
 }
 
 fn moves_in_other_mode(config: &Config, snapshot: &Snapshot) -> bool {
@@ -352,8 +368,17 @@ impl Clients {
 }
 
 /// Some time after the controller has gone, whatever it could not stop has been stopped by its own watchdog.
-fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<(), String> {
+fn at_rest(
+    case: &Case,
+    concerns: &mut Concerns,
+    world: &mut World,
+    was_stopped: &[bool],
+) -> Result<(), String> {
     let end_ns = world.snapshot.at_ns;
+    // Its very last frame has told a drive to start again that had been stopped, and nobody is there any more to see it.
+    let is_restarted: Vec<bool> = (0..case.config.axes.len())
+        .map(|axis| was_stopped[axis] && concerns.is_misled_now(&world.fault_injector, axis))
+        .collect();
     let rest_ns = end_ns + WATCHDOG_MS * 1_000_000;
     let mut batch = ReceiveBatch::new();
     for now_ns in (1..=WATCHDOG_MS).map(|passed_ms| end_ns + passed_ms * 1_000_000) {
@@ -364,12 +389,12 @@ fn at_rest(case: &Case, concerns: &mut Concerns, world: &mut World) -> Result<()
     }
     // A fault may have begun in that time.
     concerns.observe(&world.fault_injector, |_| ());
-    for (axis, concern) in case.config.axes.iter().zip(&concerns.by_axis) {
+    for ((axis, concern), is_restarted) in case.config.axes.iter().zip(&concerns.by_axis).zip(is_restarted) {
         let truth = world.run.ports()[axis.bus].observe(rest_ns, axis.node);
         // Set-points of another master enable a drive again whose node somebody has started.
         let is_driven = truth.state == DriveState::OperationEnabled && !concern.is_driven_by_others;
-        // Nothing stops a drive that has no watchdog any more and that no frame reaches, or none as it was sent.
-        let is_beyond_reach = concern.is_unwatched && (concern.is_cut_off || concern.is_misled);
+        // Nothing stops a drive that has no watchdog any more and that no frame ever reaches again as it was sent.
+        let is_beyond_reach = concern.is_unwatched && (concern.is_beyond_reach || is_restarted);
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {
             return Err(format!("{} is not at rest in the end: {truth:?}", axis.name));
         }

@@ -84,6 +84,31 @@ pub fn fault(dice: &mut Dice, config: &Config, kind: &str, when: &str) -> String
     format!("[[fault]]\nkind = \"{kind}\"\n{place}\n{keys}\n{when}\n{lasts}\n")
 }
 
+/// One fault that concerns a drive with a protocol of its own: the pre-defined connection set has no functions for its frames, and what it
+/// is asked and replies may be later than a few cycles.
+pub fn fault_of_own_protocol(dice: &mut Dice, config: &Config, when: &str) -> String {
+    let own: Vec<&Axis> =
+        config.axes.iter().filter(|axis| axis.drive.protocol.own_identifiers().is_some()).collect();
+    let axis = &own[dice.below(own.len())].name;
+    let kind = dice.pick(&["drop", "delay", "duplicate", "corrupt", "reboot", "torque-off", "stuck-sdo"]);
+    let mut keys = vec![format!("kind = \"{kind}\"\naxis = \"{axis}\"\n{when}")];
+    let is_event = matches!(kind, "reboot" | "torque-off");
+    if matches!(kind, "drop" | "delay" | "duplicate" | "corrupt") {
+        keys.push(format!("direction = \"{}\"", dice.pick(&["sent", "received", "received", "both"])));
+        keys.push(format!("seed = {}\nprobability = \"{} %\"", dice.below(1000), 1 + dice.below(100)));
+    }
+    match kind {
+        "delay" => keys.push(format!("by = \"{} us\"", 1 + dice.below(40_000))),
+        "duplicate" => keys.push(format!("copies = {}", 1 + dice.below(8))),
+        "corrupt" => keys.push(format!("bits = {}", 1 + dice.below(8))),
+        _ => {}
+    }
+    if !is_event && dice.chance(0.8) {
+        keys.push(format!("for = \"{} ms\"", 1 + dice.below(600)));
+    }
+    format!("[[fault]]\n{}\n", keys.join("\n"))
+}
+
 /// Where, whether it may end, and the keys of a fault.
 fn particulars(dice: &mut Dice, axis: &Axis, kind: &str) -> (Place, bool, String) {
     let somewhere = if dice.chance(0.6) { Place::Axis } else { Place::Bus };

@@ -11,12 +11,12 @@
 //!
 //! Its numbers are those of the joint in SI units; the layouts of its frames have all scales in them.
 
-use super::exchange::{Exchange, NoFeedback};
+use super::exchange::Exchange;
 use super::late_reply::SetPointSkip;
 use super::mode::Mode;
 use super::{Axis, ControlLaw};
 use crate::bit_fields::{
-    FieldDriveParameters, FieldGains, FieldMode, FieldTargets, LifeWish, ReplyValue, RunningMode,
+    FieldDriveParameters, FieldGains, FieldMode, FieldTargets, LifeWish, ReplyError, ReplyValue, RunningMode,
 };
 use crate::cia402::{Command, OperationMode, controlword};
 use crate::control::{LoopInput, TorqueDemand};
@@ -24,11 +24,11 @@ use crate::frame::Frame;
 use crate::pdo::FeedbackSlot;
 
 impl Axis {
-    /// Takes a reply of the drive.
+    /// Takes a reply of the drive. One of another kind has none.
     #[inline(never)]
-    pub(super) fn receive_fields(&mut self, frame: &Frame) -> Result<(), NoFeedback> {
-        let Exchange::BitFields(by) = &self.parameters.exchange else { return Err(NoFeedback) };
-        self.field_drive.receive(by, frame).map_err(|_| NoFeedback)?;
+    pub(super) fn receive_fields(&mut self, frame: &Frame) -> Result<(), ReplyError> {
+        let Exchange::BitFields(by) = &self.parameters.exchange else { return Ok(()) };
+        self.field_drive.receive(by, frame)?;
         let (drive, scale) = (&self.field_drive, &self.parameters.scale);
         let reported = |value| drive.reported(by, value).unwrap_or(0.0);
         let mode = match drive.mode(by) {

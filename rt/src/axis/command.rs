@@ -128,6 +128,7 @@ impl Axis {
         if !(self.answers_set_points() && is_sent) {
             return;
         }
+        self.is_asked_by_set_point = true;
         match self.set_point_skip {
             SetPointSkip::Now => self.late_reply.note_skip(),
             SetPointSkip::No | SetPointSkip::Next => self.late_reply.note_request(),

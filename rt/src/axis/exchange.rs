@@ -3,10 +3,10 @@
 use arrayvec::ArrayVec;
 
 use super::off_cycle::OffCycleReport;
-use crate::bit_fields::{CommandValue, FieldDriveParameters, ReplyValue};
+use crate::bit_fields::{CommandValue, FieldDriveParameters, ReplyError, ReplyValue};
 use crate::frame::{Frame, FrameFormat, Id};
 use crate::pdo::{
-    CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, Mapping, ProcessImage, TransmissionType,
+    CommandSlot, FeedbackSlot, FeedbackSlots, MAX_PDOS, Mapping, ProcessImage, TooShort, TransmissionType,
 };
 
 /// What is exchanged with a drive in each cycle of its bus.
@@ -119,13 +119,24 @@ impl Exchange {
 
 /// A frame whose payload is no feedback of the drive that it comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NoFeedback;
+pub enum NoFeedback {
+    /// It is shorter than the mapping of its PDO.
+    Pdo(TooShort),
+    /// It is no reply of bit fields.
+    Reply(ReplyError),
+    /// The drive sends nothing in the cycle.
+    OffCycle,
+}
 
 impl core::error::Error for NoFeedback {}
 
 impl core::fmt::Display for NoFeedback {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("the frame is no feedback of this drive")
+        match self {
+            Self::Pdo(error) => error.fmt(f),
+            Self::Reply(error) => error.fmt(f),
+            Self::OffCycle => f.write_str("the drive is spoken to outside of the cycle"),
+        }
     }
 }
 

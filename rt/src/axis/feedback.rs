@@ -66,7 +66,7 @@ impl Axis {
     /// Takes feedback frame number `pdo` (from 0) that arrived at `at_ns`. One that is late changes nothing.
     ///
     /// # Errors
-    /// Its length is none of a feedback of this drive. Nothing is changed then.
+    /// What keeps it from being feedback of this drive. Nothing is changed then.
     #[inline]
     pub fn receive(&mut self, pdo: usize, frame: &Frame, at_ns: Nanoseconds) -> Result<(), NoFeedback> {
         if pdo == 0 {
@@ -81,10 +81,10 @@ impl Axis {
                 // No remote frame is feedback: what has a length has as many bytes.
                 let unpacked =
                     parameters.mapping.unpack(frame.first_word(), frame.length(), &mut self.feedback);
-                unpacked.map_err(|_| NoFeedback)?;
+                unpacked.map_err(NoFeedback::Pdo)?;
             }
-            Exchange::BitFields(_) => self.receive_fields(frame)?,
-            Exchange::OffCycle { .. } => return Err(NoFeedback),
+            Exchange::BitFields(_) => self.receive_fields(frame).map_err(NoFeedback::Reply)?,
+            Exchange::OffCycle { .. } => return Err(NoFeedback::OffCycle),
         }
         if self.reception.note_arrival(pdo) {
             self.duplicate_node.note_repetition();
@@ -251,6 +251,14 @@ impl Axis {
             && self.late_reply.is_punctual()
             && !self.drive_state().has_torque()
             && self.joint.is_settled()
+    }
+
+    /// Whether the drive may have reported in this cycle. One that answers set-points, and was sent none, has missed no answer; one
+    /// that is late may still have come.
+    #[inline]
+    pub fn is_due_to_report(&mut self) -> bool {
+        let is_asked = core::mem::take(&mut self.is_asked_by_set_point);
+        !self.answers_set_points() || is_asked || self.reception.has_any()
     }
 
     /// Whether the drive answers set-points.

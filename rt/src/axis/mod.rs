@@ -109,6 +109,8 @@ pub struct Axis {
     reception: Reception,
     late_reply: LateReplyDetector,
     set_point_skip: SetPointSkip,
+    /// Whether a set-point, which requests the feedback, has been made since the last cycle of the bus.
+    is_asked_by_set_point: bool,
     report: DriveReport,
     power: Power,
     controlwords: ControlwordSender,
@@ -146,6 +148,7 @@ impl Axis {
             reception: Reception::default(),
             late_reply: LateReplyDetector::default(),
             set_point_skip: SetPointSkip::default(),
+            is_asked_by_set_point: false,
             report: DriveReport::default(),
             power: Power::default(),
             controlwords: ControlwordSender::default(),

@@ -7,7 +7,8 @@ use crate::pdo::FeedbackSlot;
 /// What a drive has said outside of the cycle. At the joint: rad, rad/s and N·m, or m, m/s and N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OffCycleReport {
-    /// Its state: [`DriveState::OperationEnabled`] while it follows set-points.
+    /// Its state: [`DriveState::OperationEnabled`] while it follows set-points, [`DriveState::SwitchedOn`] while it is being enabled or
+    /// disabled, so that it may have torque.
     pub state: DriveState,
     /// The actual position.
     pub position: f64,

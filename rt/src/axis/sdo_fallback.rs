@@ -2,7 +2,7 @@
 
 use super::{Axis, CommandPdo, Exchange};
 use crate::bit_fields::{FieldTargets, LifeWish};
-use crate::cia402::controlword;
+use crate::cia402::{DriveState, controlword};
 use crate::frame::{Frame, Id};
 use crate::pdo::CommandSlot;
 use crate::watch::{NmtState, nmt_command, node_state};
@@ -192,7 +192,19 @@ impl Axis {
 
     /// Whether the drive has torque, as far as it can be known: an SDO confirmation is newer than the last statusword.
     pub fn has_torque(&self) -> bool {
-        self.drive_state().has_torque() && !self.sdo_fallback.is_switched_off()
+        self.may_have_torque() && !self.sdo_fallback.is_switched_off()
+    }
+
+    /// Whether the drive has torque by its last report, or may have got it since: what a drive of bit fields was told is newer than its
+    /// last reply, and one that is spoken to outside of the cycle is being enabled or disabled for a long time.
+    pub fn may_have_torque(&self) -> bool {
+        let state = self.drive_state();
+        state.has_torque()
+            || match self.parameters.exchange {
+                Exchange::Pdos(_) => false,
+                Exchange::BitFields(_) => self.field_drive.may_have_torque(),
+                Exchange::OffCycle { .. } => state == DriveState::SwitchedOn,
+            }
     }
 
     /// Takes the state in a boot-up message or heartbeat.

@@ -56,6 +56,18 @@ pub enum BesideTarget {
     },
 }
 
+impl BesideTarget {
+    /// Velocity and torque of a command: targets, what is fed forward, or limits. A drive that is not to run gets no limit to use.
+    const fn of(self, wish: LifeWish, targets: &FieldTargets) -> (f64, f64) {
+        let FieldTargets { velocity, torque, .. } = *targets;
+        match (self, wish) {
+            (Self::Limits { velocity, torque }, LifeWish::Run(FieldMode::Position)) => (velocity, torque),
+            (Self::Limits { torque, .. }, LifeWish::Run(FieldMode::Velocity)) => (velocity, torque),
+            _ => (velocity, torque),
+        }
+    }
+}
+
 /// The gains that a command carries to the position loop of a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FieldGains {
@@ -196,7 +208,7 @@ impl FieldDrive {
                 self.ways.last
             }
         };
-        let (velocity, torque) = self.beside(by, wish, &followed);
+        let (velocity, torque) = by.beside_target.of(wish, &followed);
         let (stiffness, damping) = match by.gains {
             FieldGains::Fixed { stiffness, damping } => (stiffness, damping),
             FieldGains::Commanded => (followed.stiffness, followed.damping),
@@ -223,18 +235,6 @@ impl FieldDrive {
         let own = by.set_up_again.as_ref()?.frames.get(usize::from(at))?;
         self.set_up = Some(at.saturating_add(1));
         Some(Frame::of(own.id, own.payload))
-    }
-
-    /// Velocity and torque of a command: targets, what is fed forward, or limits. A drive that is not to run gets no limit to use.
-    fn beside(&self, by: &FieldDriveParameters, wish: LifeWish, targets: &FieldTargets) -> (f64, f64) {
-        let FieldTargets { velocity, torque, .. } = *targets;
-        match (by.beside_target, wish) {
-            (BesideTarget::Limits { velocity, torque }, LifeWish::Run(FieldMode::Position)) => {
-                (velocity, torque)
-            }
-            (BesideTarget::Limits { torque, .. }, LifeWish::Run(FieldMode::Velocity)) => (velocity, torque),
-            _ => (velocity, torque),
-        }
     }
 
     /// Takes a reply.
@@ -299,12 +299,19 @@ impl FieldDrive {
         self.life.state()
     }
 
-    /// The same in the states of CiA 402, in which every drive is led. A drive that is told to stop may have torque.
+    /// Whether it may have torque, whatever its last reply shows: it is told to start, or is told to stop and has not shown for long enough
+    /// that it has.
+    pub const fn may_have_torque(&self) -> bool {
+        matches!(self.state(), LifeState::Starting(_) | LifeState::Running(_) | LifeState::Stopping)
+    }
+
+    /// The same in the states of CiA 402, in which every drive is led. A drive that is told to stop may have torque; that it has an error is
+    /// said by one reply, which may be corrupted.
     ///
     /// | drive | state of CiA 402 |
     /// | --- | --- |
-    /// | it replies with an error, and that it has torque | fault reaction active |
-    /// | it replies with an error | fault |
+    /// | it replies with an error, in Starting, Running and Stopping, or with torque | fault reaction active |
+    /// | it replies with an error, in any other | fault |
     /// | Stopping | quick stop active |
     /// | Stopped, Telling, Told | ready to switch on |
     /// | Choosing, Aligning, Starting | switched on |
@@ -312,6 +319,7 @@ impl FieldDrive {
     pub fn drive_state(&self, by: &FieldDriveParameters) -> DriveState {
         let has_error = self.reported(by, ReplyValue::Error).is_some_and(|error| error != 0.0);
         match self.life.state() {
+            _ if has_error && self.may_have_torque() => DriveState::FaultReactionActive,
             _ if has_error && self.shows_torque(by) == Some(true) => DriveState::FaultReactionActive,
             _ if has_error => DriveState::Fault,
             LifeState::Stopping => DriveState::QuickStopActive,

@@ -28,6 +28,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) places: Range<usize>,
     /// The buses that concern it.
     pub(super) buses: BitSet,
+    /// Those of them on which set-points are sent in the cycle.
+    pub(super) set_point_buses: BitSet,
     /// Whether the mode of any of its axes may be changed.
     pub(super) has_other_modes: bool,
     pub(super) state: GroupState<AXES>,
@@ -71,6 +73,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             motion: GroupTrajectory::new(places.clone()),
             places,
             buses,
+            set_point_buses: buses,
             has_other_modes: false,
             state: GroupState::Passive,
             stream: StreamSample::default(),

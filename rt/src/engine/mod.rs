@@ -250,6 +250,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             let mut group = Group::new(number, places, parameters.buses_of(&axes));
             let mut own = axes.iter().filter_map(|axis| parameters.axes.get(usize::from(*axis)));
             group.has_other_modes = own.any(|axis| !axis.mode_changes.laws.is_empty());
+            group.set_point_buses = parameters.set_point_buses_of(&axes);
             groups.push(group);
         }
         for (group, own) in groups.iter_mut().zip(&parameters.groups) {

@@ -356,6 +356,16 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         buses
     }
 
+    /// The buses on which a group sends set-points in the cycle: those with an axis of it that is spoken to there.
+    pub(super) fn set_point_buses_of(&self, axes: &[u8]) -> BitSet {
+        let mut buses = BitSet::default();
+        let own = axes.iter().filter_map(|axis| self.axes.get(usize::from(*axis)));
+        for axis in own.filter(|axis| !matches!(axis.exchange, Exchange::OffCycle { .. })) {
+            buses.insert(axis.bus.into());
+        }
+        buses
+    }
+
     fn validate_cycles(&self) -> Result<(), SetUpError> {
         let heartbeat = |cycles: fn(Heartbeat) -> u32| self.heartbeat.map_or(1, cycles);
         let counts = [

@@ -31,8 +31,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             let is_cut_off = is_always_late || behind_cycles > shared.not_transmitted_cycles;
             // Whether such a drive receives its PDOs is not known.
             let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
-            axis.is_pdo_unreachable()
-                || axis.drive_state().has_torque() && (is_cut_off || is_silent && is_overdue)
+            axis.is_pdo_unreachable() || axis.may_have_torque() && (is_cut_off || is_silent && is_overdue)
         };
         for axis in axes.iter_mut() {
             if has_power {

@@ -148,7 +148,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         for (place, axis) in self.axes.iter_mut().enumerate() {
             let is_asked_by_sync = axis.parameters().feedback_since == FeedbackSince::Sync;
             let to_report = if is_asked_by_sync { to_answer_sync } else { in_cycle };
-            if to_report.contains(axis.parameters().bus.into()) {
+            if to_report.contains(axis.parameters().bus.into()) && axis.is_due_to_report() {
                 let known_state = axis.drive_state();
                 if axis.begin_cycle(elapsed_s) {
                     let number = axis.number();
@@ -161,11 +161,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                         self.shared.emit(group_at(&self.groups, place), kind);
                     }
                 }
-                if !is_asked_by_sync {
-                    axis.expect_feedback(input.now_ns);
-                }
             } else {
                 axis.wait(elapsed_s)
+            }
+            if !is_asked_by_sync && in_cycle.contains(axis.parameters().bus.into()) {
+                axis.expect_feedback(input.now_ns);
             }
             axis.watch();
         }

@@ -79,7 +79,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             _ if must_wait => Commands::None,
             _ => Commands::Made,
         };
-        let on_time = own.without(behind);
+        let on_time = self.group.set_point_buses.without(behind);
         if must_wait || self.group.unsent.are_enough(&self.shared.buses, on_time) {
             // Drives may have obeyed what was said by SDO.
             return self.end_disabling();

@@ -304,16 +304,22 @@ fn bits(entry: &Entry<'_>) -> Option<FieldBits> {
         let (at, width) = (at.integer(0..128), width.integer(1..65));
         Some(BitRange { at: u16::try_from(at?).ok()?, width: u8::try_from(width?).ok()? })
     };
+    let allowed = "its first bit and its width: [0, 16]; or those of its higher and its lower part: [[48, 16], [8, 16]]";
+    let refuse = |entry: &Entry<'_>| {
+        entry.report_range("a list of something else".to_owned(), allowed.to_owned());
+    };
     let pair = |entry: &Entry<'_>| match entry.list()?.as_slice() {
         [at, width] => range(at, width),
-        _ => None,
+        _ => {
+            refuse(entry);
+            None
+        }
     };
     match list.as_slice() {
         [high, low] if high.is_list() && low.is_list() => Some(FieldBits::split(pair(high)?, pair(low)?)),
         [at, width] => Some(FieldBits { high: range(at, width)?, low: None }),
         _ => {
-            let allowed = "its first bit and its width: [0, 16]; or those of its higher and its lower part: [[48, 16], [8, 16]]";
-            entry.report_range("a list of something else".to_owned(), allowed.to_owned());
+            refuse(entry);
             None
         }
     }
@@ -327,9 +333,20 @@ fn amount(entry: &Entry<'_>, bounds: Bounds) -> Option<Amount> {
     entry.choice(&Setting::ALL).map(Amount::Setting)
 }
 
+/// The keys of the frames that lead a drive through its life.
+const OWN_FRAMES: [&str; 7] = ["start", "stop", "zero", "clear", "torque", "velocity", "position"];
+
 fn life_cycle(mut section: Section<'_>) -> Option<DescribedLifeCycle> {
     let by = section.require("by", "by what it is started and stopped: by = \"fields\" or \"frames\"");
-    let is_by_frames = by.and_then(|entry| entry.choice(&[("fields", false), ("frames", true)]))?;
+    let by = by.and_then(|entry| entry.choice(&[("fields", false), ("frames", true)]));
+    let Some(is_by_frames) = by else {
+        // What else is there belongs to one of the two.
+        for key in OWN_FRAMES {
+            let _ = section.get(key);
+        }
+        section.finish();
+        return None;
+    };
     if is_by_frames {
         let frames = frames(&mut section);
         section.finish();
@@ -350,8 +367,7 @@ fn frames(section: &mut Section<'_>) -> Option<DescribedFrames> {
     section.require("start", "the frame that gives torque: start = { id = \"motor\", bytes = […] }");
     section.require("stop", "the frame that takes the torque away: stop = { id = \"motor\", bytes = […] }");
     let mut frame = |key| section.get(key).is_some().then(|| fixed(section.section(key)));
-    let names = ["start", "stop", "zero", "clear", "torque", "velocity", "position"];
-    let [start, stop, zero, clear, torque, velocity, position] = names.map(&mut frame);
+    let [start, stop, zero, clear, torque, velocity, position] = OWN_FRAMES.map(&mut frame);
     let optional = |frame: Option<Option<FixedFrame>>| match frame {
         None => Some(None),
         Some(frame) => frame.map(Some),

@@ -16,7 +16,7 @@ use takt_rt::{
 
 use super::bring_up::{AxisSession, ProcessData};
 use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
-use super::{DataSheet, Family, SettingUp};
+use super::{DataSheet, Family, SettingUp, UNWATCHED_SHUT_DOWN_NS};
 use crate::config::bit_fields::{
     self, BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings,
 };
@@ -259,6 +259,10 @@ impl Family for BitFieldFamily {
 
     fn field_drive(&self, axis: &Axis) -> Option<FieldDriveParameters> {
         device(axis).compile(axis).ok()
+    }
+
+    fn least_shut_down_ns(&self, axis: &Axis) -> Nanoseconds {
+        if device(axis).description.has_watchdog { 0 } else { UNWATCHED_SHUT_DOWN_NS }
     }
 
     /// Sends the frames that set the drive up. Whether it is there, the cycle sees, which stops it first.

@@ -2,12 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::OperationMode;
+use takt_rt::{Nanoseconds, OperationMode};
 
 use crate::config::{
     DriveFacts, ErrorControl, ModeChangeRule, ModeSet, OwnIdentifiers, Plausible, Protocol, VelocityUnit,
 };
 use crate::erob_can::frame;
+
+/// From power-on until a drive can be enabled (cure of the errors 001F and 0056).
+pub const ENABLED_FROM_NS: Nanoseconds = 8_000_000_000;
 
 /// The facts.
 pub static FACTS: DriveFacts = DriveFacts {
@@ -28,6 +31,7 @@ pub static FACTS: DriveFacts = DriveFacts {
     error_control: ErrorControl::None,
     consumes_heartbeat: false,
     sends_emergencies: false,
+    enabled_from_ns: ENABLED_FROM_NS,
     plausible: Plausible {
         fastest_turns_per_s: 25.0,
         // The fastest module turns at 6.3 rad/s.

@@ -7,7 +7,8 @@
 //! ```
 //!
 //! The drive knows nothing of its controller, and goes on with the last set-point if it is gone. So the follower stops it in
-//! control as soon as the set-points are stale, and disables it at rest.
+//! control as soon as the set-points are stale, and disables it at rest. A reply says neither what it answers nor whether the drive is
+//! enabled: one that is not to be is told so again and again, and one that shows an error is disabled before that counts.
 
 use takt_rt::{DriveState, Frame, Nanoseconds, OffCycleReport};
 
@@ -29,6 +30,8 @@ const LOOK_NS: Nanoseconds = 1_000_000;
 const SILENCE_NS: Nanoseconds = 5_000_000;
 /// Requests from one report to the next: a set-point, the position, and one other reading.
 const REQUESTS_PER_ROUND: u64 = 3;
+/// A drive that is to be disabled is told so again after so many of them.
+const ROUNDS_TO_REPETITION: usize = 8;
 /// The set-points of a controller that is alive are never so old.
 const STALE_NS: Nanoseconds = 100_000_000;
 /// A drive that has not answered for so long is stopped as soon as it answers again.
@@ -105,6 +108,19 @@ enum Stage {
     Judging,
 }
 
+impl Stage {
+    const fn may_have_torque(self) -> bool {
+        match self {
+            Self::Enabling { .. }
+            | Self::Settling { .. }
+            | Self::Following
+            | Self::Stopping { .. }
+            | Self::Disabling { .. } => true,
+            Self::Off | Self::Preparing { .. } | Self::Barred | Self::Fault { .. } | Self::Judging => false,
+        }
+    }
+}
+
 /// What comes after the command to disable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Then {
@@ -112,6 +128,8 @@ enum Then {
     Barred,
     /// Its error is read again: disabling ends one whose cause is gone.
     Judging,
+    /// It had this error while it had torque. What was read may be the late or corrupted reply to another request.
+    Fault(u16),
 }
 
 /// A reading and its time.
@@ -193,7 +211,7 @@ impl Follower {
             Ok((request, answer)) => {
                 let was_lost = self.answered_ns.is_some_and(|at_ns| now_ns.saturating_sub(at_ns) > LOST_NS);
                 self.answered_ns = Some(now_ns);
-                if was_lost && self.has_torque() {
+                if was_lost && self.is_leading() {
                     self.stop(now_ns);
                 }
                 match answer {
@@ -253,11 +271,12 @@ impl Follower {
 
     fn take_error(&mut self, code: u16) {
         self.stage = match (self.stage, code) {
-            (Stage::Judging | Stage::Fault { .. }, 0) => Stage::Barred,
+            (Stage::Judging | Stage::Fault { is_tried: true, .. }, 0) => Stage::Barred,
             (Stage::Judging | Stage::Fault { is_tried: true, .. }, code) => {
                 Stage::Fault { code, is_tried: true }
             }
             (stage, 0) => stage,
+            (stage, code) if stage.may_have_torque() => Stage::Disabling { then: Then::Fault(code) },
             (_, code) => Stage::Fault { code, is_tried: false },
         };
     }
@@ -276,6 +295,7 @@ impl Follower {
                 Then::Off => Stage::Off,
                 Then::Barred => Stage::Barred,
                 Then::Judging => Stage::Judging,
+                Then::Fault(code) => Stage::Fault { code, is_tried: false },
             },
             stage => stage,
         };
@@ -296,7 +316,7 @@ impl Follower {
                 Stage::Enabling { from_ns: now_ns.saturating_add(AGAIN_NS) }
             }
             (Stage::Preparing { .. } | Stage::Enabling { .. }, code) => {
-                Stage::Fault { code: code.map_or(UNKNOWN_REFUSAL, |code| code.0), is_tried: false }
+                Stage::Disabling { then: Then::Fault(code.map_or(UNKNOWN_REFUSAL, |code| code.0)) }
             }
             (stage, _) => stage,
         };
@@ -309,7 +329,8 @@ impl Follower {
         self.stage = Stage::Stopping { is_told: false, until_ns };
     }
 
-    const fn has_torque(&self) -> bool {
+    /// Whether the drive is led to its set-points, or is about to be.
+    const fn is_leading(&self) -> bool {
         matches!(self.stage, Stage::Enabling { .. } | Stage::Settling { .. } | Stage::Following)
     }
 
@@ -368,6 +389,14 @@ impl Follower {
                 Request::Read(entries::ACTUAL_VELOCITY.address)
             }
             Stage::Disabling { .. } => write(&entries::MOTOR_ENABLE, 0),
+            // Again and again: nothing in a reply shows that it is one to this command.
+            Stage::Off | Stage::Barred | Stage::Fault { .. }
+                if target.wish != OffCycleWish::Observe
+                    && self.turn.is_multiple_of(REQUESTS_PER_ROUND as usize * ROUNDS_TO_REPETITION) =>
+            {
+                self.turn += 1;
+                write(&entries::MOTOR_ENABLE, 0)
+            }
             Stage::Judging => Request::Read(entries::ERROR_CODE.address),
             _ => self.reading(),
         }
@@ -406,14 +435,15 @@ impl Follower {
     fn report(&self) -> Option<OffCycleReport> {
         let (state, error_code) = match self.stage {
             Stage::Following => (DriveState::OperationEnabled, 0),
-            Stage::Disabling { then: Then::Off } => (DriveState::SwitchedOn, 0),
+            Stage::Enabling { .. } | Stage::Settling { .. } | Stage::Disabling { then: Then::Off } => {
+                (DriveState::SwitchedOn, 0)
+            }
+            Stage::Disabling { then: Then::Fault(code) } => (DriveState::FaultReactionActive, code),
             Stage::Stopping { .. } | Stage::Disabling { .. } => (DriveState::QuickStopActive, 0),
             Stage::Barred => (DriveState::SwitchOnDisabled, 0),
             Stage::Fault { code, .. } => (DriveState::Fault, code),
             Stage::Judging => (DriveState::FaultReactionActive, 0),
-            Stage::Off | Stage::Preparing { .. } | Stage::Enabling { .. } | Stage::Settling { .. } => {
-                (DriveState::ReadyToSwitchOn, 0)
-            }
+            Stage::Off | Stage::Preparing { .. } => (DriveState::ReadyToSwitchOn, 0),
         };
         let position = self.position?.value;
         Some(OffCycleReport {

@@ -21,10 +21,13 @@ mod simulated;
 
 pub use facts::FACTS;
 
-use takt_rt::{Frame, Id};
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
-use super::{Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol, SettingUp};
+use super::{
+    Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol, SettingUp,
+    UNWATCHED_SHUT_DOWN_NS,
+};
 use crate::canopen::function_code;
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::sdo::SdoRequest;
@@ -63,6 +66,10 @@ impl Family for ErobCan {
 
     fn off_cycle_budget(&self, axis: &Axis, config: &Config) -> Option<OffCycleBudget> {
         Some(follower::budget(config.cycle.period_ns, config.buses.get(axis.bus)?.bit_rate))
+    }
+
+    fn least_shut_down_ns(&self, _: &Axis) -> Nanoseconds {
+        UNWATCHED_SHUT_DOWN_NS
     }
 
     fn remarks(&self, _: &Axis) -> Vec<&'static str> {

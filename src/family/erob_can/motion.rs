@@ -8,6 +8,7 @@ use std::fmt;
 
 use takt_rt::Nanoseconds;
 
+use super::facts::ENABLED_FROM_NS;
 use super::reading::{self, STANDING};
 use crate::erob_can::client::{RequestError, RequestFailure};
 use crate::erob_can::entries::{self, Entry};
@@ -19,8 +20,6 @@ use crate::procedure::AxisReading;
 const READING_NS: Nanoseconds = 50_000_000;
 /// From enabling to the start of a motion, and to a set-point (eRob Modbus-RTU manual; this manual says nothing of it).
 const ENABLED_NS: Nanoseconds = 500_000_000;
-/// A drive can be enabled so long after power-on (cure of the errors 001F and 0056).
-const POWER_UP_NS: Nanoseconds = 8_000_000_000;
 /// From one attempt to enable to the next, while the drive starts.
 const AGAIN_NS: Nanoseconds = 500_000_000;
 /// A motion may take so much longer than its profile.
@@ -397,7 +396,7 @@ async fn set(session: &ErobCanSession, entry: &Entry, value: i32) -> Moving<()> 
 
 /// Enables the motor. A drive that was just switched on is given the time that it needs.
 async fn enable(session: &ErobCanSession) -> Moving<()> {
-    let end_ns = session.now_ns().saturating_add(POWER_UP_NS);
+    let end_ns = session.now_ns().saturating_add(ENABLED_FROM_NS);
     let mut is_told = false;
     loop {
         let Err(error) = session.write(&entries::MOTOR_ENABLE, 1).await else { return Ok(()) };

@@ -1,5 +1,6 @@
 //! The drive that stands in for an axis on a simulated bus, or on an interface by `takt sim`.
 
+use super::facts::ENABLED_FROM_NS;
 use crate::config::{Axis, FamilyKeys};
 use crate::family::simulated_joint::{encoder, mechanics};
 use crate::sim::Drive;
@@ -7,8 +8,6 @@ use crate::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
 
 /// From a request to its reply: up to 1 ms in the captures of the manual.
 const REPLY_NS: u64 = 500_000;
-/// Until a drive can be enabled after power-on (cure of the errors 001F and 0056).
-const READY_NS: u64 = 8_000_000_000;
 /// Torque of a turn of the field for one ampere where the axis says nothing of it: that of an eRob70 with a ratio of 100.
 const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
 
@@ -41,7 +40,7 @@ pub fn drive(axis: &Axis) -> Box<dyn Drive> {
         peak_torque: joint.peak_torque,
         torque_per_ampere: TORQUE_PER_AMPERE,
         highest_velocity: 1.5 * axis.limits.velocity,
-        ready_ns: axis.power_up_ns.min(READY_NS),
+        ready_ns: axis.power_up_ns.min(ENABLED_FROM_NS),
         reply_ns: REPLY_NS,
         has_battery: true,
         has_brake: true,

@@ -28,7 +28,10 @@ impl Phases {
         } else {
             (self.phase, self.cycles) = (phase, 0);
         }
-        match longest_s(phase, &self.axes) {
+        // Every group waits as long as the drive that needs the longest time after power-on.
+        let enabled_from_ns = seen.config.axes.iter().map(|axis| axis.drive.enabled_from_ns).max();
+        let enabled_from_s = enabled_from_ns.unwrap_or(0) as f64 * 1e-9;
+        match longest_s(phase, &self.axes, enabled_from_s) {
             Some(longest_s) if self.cycles > bounds::cycles(seen.config, longest_s) => {
                 Err(format!("group {}: {phase:?} for {} cycles: stuck", self.group, self.cycles))
             }
@@ -74,16 +77,16 @@ impl Phases {
 }
 
 /// How long a phase that must pass by itself may last.
-fn longest_s(phase: Phase, axes: &[Axis]) -> Option<f64> {
+fn longest_s(phase: Phase, axes: &[Axis], enabled_from_s: f64) -> Option<f64> {
     match phase {
         Phase::Passive | Phase::Disabled | Phase::Holding => None,
         // A velocity or a torque may be asked for again and again.
         Phase::Moving if axes.iter().any(|axis| axis.control.is_profile()) => None,
         Phase::Moving => Some(30.0),
         Phase::Streaming => Some(10.0),
-        Phase::Enabling => Some(5.2),
+        Phase::Enabling => Some(5.2 + enabled_from_s),
         Phase::Stopping => Some(2.0 * bounds::to_rest_s(axes) + 1.0),
-        Phase::Disabling => Some(5.2 + bounds::to_rest_s(axes)),
+        Phase::Disabling => Some(5.2 + enabled_from_s + bounds::to_rest_s(axes)),
     }
 }
 

@@ -1,0 +1,10 @@
+//! An eRob that is spoken to outside of the cycle, on a disturbed bus, given any bytes.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../subjects/mod.rs"]
+#[allow(dead_code, reason = "each target takes its own")]
+mod subjects;
+
+fuzz_target!(|bytes: &[u8]| subjects::erob_can::run(bytes));

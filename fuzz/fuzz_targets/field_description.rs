@@ -1,0 +1,10 @@
+//! Descriptions of bit fields, and drives that are led by them, given any bytes.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+#[path = "../subjects/mod.rs"]
+#[allow(dead_code, reason = "each target takes its own")]
+mod subjects;
+
+fuzz_target!(|bytes: &[u8]| subjects::field_description::run(bytes));
