@@ -161,7 +161,8 @@ mod tests {
         // 47 bits of SYNC, and at least 111 of eight bytes: the stuff bits come on top.
         let load = statistics.load().unwrap();
         assert!((0.158..0.2).contains(&load), "{load}");
-        assert!(statistics.busiest().unwrap() >= load);
+        // The whole is measured from the first frame to the last, which is a period less than the busiest second.
+        assert!(statistics.busiest().unwrap() >= load * 0.999);
     }
 
     #[test]

@@ -1,16 +1,16 @@
 //! A running controller, offered to other processes: see [`remote`](crate::remote) for what they see and send.
 //!
 //! ```text
-//! publisher ── after each cycle: events, state, lease ──▶ shared memory
-//! door      ── connections, stops, the end of clients (one thread, which never waits for the controller)
-//! worker    ── the commands of one client, one after another: decode, check the lease, call the controller, reply
+//! publisher   ── after each cycle: events, state, lease ──▶ shared memory
+//! connections ── connecting, stops, the end of clients (one thread, which never waits for the controller)
+//! worker      ── the commands of one client, one after another: decode, check the lease, call the controller, reply
 //! ```
 //!
 //! All of them are ordinary threads beside the real-time one, and call the controller as the own program's threads do. So nothing that a
 //! client does or leaves undone reaches the loop but by the checked calls of a handle. A worker that waits for the controller holds up
 //! its own client alone, and no stop.
 
-mod door;
+mod connections;
 mod lease;
 mod publisher;
 mod worker;
@@ -25,7 +25,7 @@ use std::time::Duration;
 
 use crate::command::RunningController;
 use crate::remote::{Description, Listener, NameError, Names, ShownWriter, SocketError};
-use door::Door;
+use connections::Connections;
 use lease::Lease;
 
 /// How a controller is served.
@@ -131,7 +131,7 @@ impl Served {
 /// controller goes on.
 pub struct Server {
     served: Arc<Served>,
-    /// To drop it wakes the thread of the door.
+    /// To drop it wakes the thread of the connections.
     waker: Option<OwnedFd>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -174,7 +174,7 @@ pub fn serve(
     let mut publisher = publisher::Publisher::new(Arc::clone(&served), shown);
     publisher.publish();
     server.spawn("takt-publish", move || publisher.run())?;
-    server.spawn("takt-door", move || Door::new(served, listener, memory, wake).run())?;
+    server.spawn("takt-connect", move || Connections::new(served, listener, memory, wake).run())?;
     Ok(server)
 }
 

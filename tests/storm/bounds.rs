@@ -5,6 +5,10 @@ use takt::config::{Axis, Config, Protocol};
 /// How far behind its set-point a joint may be that obeys.
 const LAG_S: f64 = 0.4;
 
+/// A round of requests to a drive that is spoken to beside the cycle: it follows by velocities, so it is told to correct what it has
+/// shown a round before, and does so in the next one.
+const ROUND_S: f64 = 0.05;
+
 /// The longest time after which a drive misses the heartbeat: a YZ-AIM whose communication has been reset has its factory setting.
 const WATCHDOG_AT_MOST_S: f64 = 2.2;
 
@@ -23,7 +27,8 @@ pub fn planned_s(axes: &[Axis]) -> f64 {
 
 /// From the reason of a stop of these axes to rest of every joint that obeys.
 pub fn to_rest_s(axes: &[Axis]) -> f64 {
-    planned_s(axes) + LAG_S
+    let has_rounds = axes.iter().any(|axis| axis.drive.protocol.own_identifiers().is_some());
+    planned_s(axes) + LAG_S + if has_rounds { 2.0 * ROUND_S } else { 0.0 }
 }
 
 /// How far a joint may travel until then: rad (m).

@@ -30,9 +30,9 @@ pub enum Action {
     },
     /// Release the brake without torque, until Ctrl-C: nothing holds the joint meanwhile (some drives)
     ReleaseBrake(Agreement),
-    /// Stop the joint in less than 50 ms, with a shock for its gear (eRob with Modbus-RTU)
+    /// Stop the joint in less than 50 ms, with a shock for its gear (some drives)
     EmergencyStop,
-    /// Set how long the drive waits for its master before it shows a fault, and read it back (eRob with Modbus-RTU)
+    /// Set how long the drive waits for its master before it shows a fault, and read it back (some drives)
     CommunicationTimeout {
         /// "500 ms"; "0 ms": for ever
         time: String,

@@ -26,7 +26,7 @@ const STOPS_AT_ONCE: usize = 16;
 const PAUSE: Duration = Duration::from_millis(10);
 
 /// One thread that never waits for the controller nor for a client.
-pub struct Door {
+pub struct Connections {
     served: Arc<Served>,
     listener: Listener,
     memory: Arc<Memory>,
@@ -53,8 +53,8 @@ enum Kind {
     Stops { taken: u64 },
 }
 
-impl Door {
-    /// The door of these sockets. It closes when the other end of `wake` is closed.
+impl Connections {
+    /// The connections of these sockets. It closes when the other end of `wake` is closed.
     pub fn new(served: Arc<Served>, listener: Listener, memory: Arc<Memory>, wake: OwnedFd) -> Self {
         let working = Arc::new(AtomicUsize::new(0));
         Self { served, listener, memory, wake, peers: vec![], workers: vec![], working, connections: 0 }
