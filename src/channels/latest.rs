@@ -146,12 +146,7 @@ impl<C: Cells> Reader<C> {
 /// The words of one value, in order.
 pub struct Words<'a>(slice::Iter<'a, AtomicU64>);
 
-impl<'a> Words<'a> {
-    /// These words, from the first one on.
-    pub fn of(cells: &'a [AtomicU64]) -> Self {
-        Self(cells.iter())
-    }
-
+impl Words<'_> {
     /// Stores the next word. Words beyond the last one are ignored.
     pub fn put(&mut self, word: u64) {
         if let Some(cell) = self.0.next() {

@@ -30,13 +30,6 @@ impl SerialSettings {
     pub const fn new(bit_rate: u32) -> Self {
         Self { bit_rate, parity: Parity::None, stop_bits: StopBits::One, direction: Direction::Adapter }
     }
-
-    /// The bits of a character, with start, parity and stop bits.
-    pub const fn character_bits(&self) -> u8 {
-        let parity = if matches!(self.parity, Parity::None) { 0 } else { 1 };
-        let stop = if matches!(self.stop_bits, StopBits::One) { 1 } else { 2 };
-        1 + 8 + parity + stop
-    }
 }
 
 /// The parity bit of a character.
@@ -386,10 +379,8 @@ mod tests {
     }
 
     #[test]
-    fn the_bits_of_a_character_are_counted_with_start_parity_and_stop_bits() {
-        assert_eq!(SETTINGS.character_bits(), 10);
+    fn the_settings_of_a_line_are_told_in_words() {
         let full = SerialSettings { parity: Parity::Even, stop_bits: StopBits::Two, ..SETTINGS };
-        assert_eq!(full.character_bits(), 12);
         assert_eq!(describe(&full), "115200 bit/s with even parity and two stop bits");
     }
 }

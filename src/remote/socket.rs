@@ -66,6 +66,10 @@ pub struct Names {
     "{name:?} is not a name to serve by: letters, digits, '.', '-' and '_', or the beginning of a path, of at most {} bytes",
     PATH_BYTES - ".command.new".len()
 )]
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unnameable_types, reason = "it becomes a ConnectError or a ServeError at once")
+)]
 pub struct NameError {
     name: String,
 }

@@ -44,7 +44,8 @@ impl SimulatedLine {
         Self { timing, gathering, drives, from_master, to_master, disturbance, disconnected: vec![], random }
     }
 
-    /// A drive, by its place.
+    /// A drive, by its place, for those who look into it.
+    #[cfg(any(test, feature = "internals"))]
     pub fn module(&mut self, place: usize) -> Option<&mut ErobModbusDrive> {
         self.drives.get_mut(place)
     }
