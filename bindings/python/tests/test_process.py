@@ -16,7 +16,10 @@ from conftest import ARM6, HOME
 def run(program):
     """Another Python that runs this program. Returns what it prints."""
     text = f"ARM6 = {str(ARM6)!r}\n" + textwrap.dedent(program)
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=300)
+    # A shell starts jobs in the background with SIGINT ignored, and what is ignored is inherited.
+    listening = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    command = [sys.executable, "-c", text]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, preexec_fn=listening)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
