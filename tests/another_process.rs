@@ -507,15 +507,26 @@ fn clients_that_are_killed_at_any_instant_leave_a_controller_that_takes_commands
         );
         next.stop(StopCategory::Two).unwrap();
         // It is handed to the loop then, which takes it in one of these cycles.
-        next.take_lease().unwrap();
+        insist(&next, || next.take_lease());
         next.next_cycle(LONG).unwrap();
         next.next_cycle(LONG).unwrap();
         next.wait_for(Phase::Holding, LONG).unwrap();
-        let motion = next.move_to(&[0.0; 6]).unwrap();
+        let motion = insist(&next, || next.move_to(&[0.0; 6]));
         assert_eq!(next.wait(motion, LONG), Ok(()), "round {round}");
         within_limits(&watching);
     }
     assert!(!served.controller.has_ended());
+}
+
+/// A command of a client that takes over again where it was taken over from. What a killed process has sent is whole, and may be carried
+/// out after its end, its take-over too.
+fn insist<T>(client: &Client, command: impl Fn() -> Result<T, CommandError>) -> T {
+    loop {
+        match command() {
+            Err(CommandError::Lease(LeaseError::TakenOver { .. })) => client.take_over().unwrap(),
+            done => return done.unwrap(),
+        }
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Makes the engine and the slot plan from a configuration.
 
 use std::fmt;
+use std::panic::resume_unwind;
+use std::thread::{self, ScopedJoinHandle};
 
 use arrayvec::ArrayVec;
 use takt_rt::{
@@ -76,6 +78,25 @@ pub fn slot_plan(config: &Config) -> SlotPlan {
 /// See [`AssembleError`]. A configuration that has passed its checks gives no error.
 pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
     config.validate()?;
+    let assembled = thread::scope(|scope| {
+        let assembling = || assembled_here(config);
+        let thread = thread::Builder::new().stack_size(ASSEMBLING_STACK_BYTES);
+        thread.spawn_scoped(scope, assembling).ok().map(ScopedJoinHandle::join)
+    });
+    match assembled {
+        Some(Ok(engine)) => engine,
+        Some(Err(panic)) => resume_unwind(panic),
+        // Without a thread of its own, the stack of the caller has to do.
+        None => assembled_here(config),
+    }
+}
+
+/// An engine and its parameters are passed on by value while they are made, which takes more than a megabyte of the stack in a debug
+/// build. The caller's thread may have two in all.
+const ASSEMBLING_STACK_BYTES: usize = 8 << 20;
+
+/// The engine of a configuration that has passed its checks, made on the stack of the caller.
+fn assembled_here(config: &Config) -> Result<Box<Engine>, AssembleError> {
     let period_ns = config.cycle.period_ns;
     let cycles = |ns: u64| u32::try_from(ns.div_ceil(period_ns.max(1))).unwrap_or(u32::MAX);
     let axes = config
