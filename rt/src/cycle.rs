@@ -6,6 +6,14 @@
 //! 0                           command phase                             all sent
 //! ```
 //!
+//! Drives without SYNC carry out a set-point when it arrives. With such drives the frames wait for the send phase, as SYNC waits
+//! for its slot, so that they leave at one moment of every slot, however long computing took:
+//!
+//! ```text
+//! |SYNC|  feedback arrives          |receive → compute| |set-points → services| |SYNC|
+//! 0                           command phase        send phase           all sent
+//! ```
+//!
 //! A late wake-up never bursts and never loses phase: slots that have passed are skipped and counted, and the
 //! trajectory goes on by one nominal period. Whether the deadline was met is decided after computing, by the clock, when
 //! the frames are about to leave. A thread that is always late goes on without SYNC and set-points: the engine then stops the
@@ -29,19 +37,23 @@ pub struct SlotPlan {
     pub latest_sync_ns: Nanoseconds,
     /// The beginning of the command phase.
     pub command_phase_ns: Nanoseconds,
+    /// The beginning of the send phase: frames that are ready earlier leave then, and others as soon as they are ready. `None`: each
+    /// as soon as it is ready. It lies between the command phase and [`SlotPlan::latest_set_points_ns`].
+    pub send_phase_ns: Option<Nanoseconds>,
     /// Set-points that are not ready by then are not sent: they would run into the next SYNC.
     pub latest_set_points_ns: Nanoseconds,
 }
 
 impl SlotPlan {
     /// The usual plan for a period: SYNC within a tenth of it, set-points ready no later than a quarter of it
-    /// after the command phase begins.
+    /// after the command phase begins, and no send phase.
     pub const fn usual(period_ns: Nanoseconds, command_phase_ns: Nanoseconds) -> Self {
         let quarter = command_phase_ns.saturating_add(period_ns / 4);
         let end = period_ns / 20 * 19;
         Self {
             latest_sync_ns: period_ns / 10,
             command_phase_ns,
+            send_phase_ns: None,
             latest_set_points_ns: if quarter < end { quarter } else { end },
         }
     }
@@ -110,8 +122,9 @@ impl Cycle {
         );
         let ready_ns = clock.now_ns();
         timing.compute_ns = ready_ns.saturating_sub(began_ns);
+        let leaving_ns = self.reach_send_phase(clock, timing.slot_start_ns, ready_ns);
         let deadline = match sync_deadline {
-            Deadline::Met if ready_ns <= timing.slot_start_ns + self.plan.latest_set_points_ns => {
+            Deadline::Met if leaving_ns <= timing.slot_start_ns + self.plan.latest_set_points_ns => {
                 Deadline::Met
             }
             _ => Deadline::Missed,
@@ -153,6 +166,21 @@ impl Cycle {
             }
         }
         (CycleTiming::default(), Deadline::Missed)
+    }
+
+    /// Waits for the send phase of a slot, unless it has begun when the frames are ready. Returns the present.
+    fn reach_send_phase(
+        &self,
+        clock: &mut impl Clock,
+        slot_start_ns: Nanoseconds,
+        ready_ns: Nanoseconds,
+    ) -> Nanoseconds {
+        match self.plan.send_phase_ns {
+            Some(send_phase_ns) if ready_ns < slot_start_ns + send_phase_ns => {
+                clock.wait_to_send(slot_start_ns + send_phase_ns).now_ns
+            }
+            _ => ready_ns,
+        }
     }
 
     const fn latest_sync_ns(&self, slot: u64) -> Nanoseconds {

@@ -3,7 +3,7 @@
 mod fixture;
 
 use fixture::{LIMITS, PERIOD_NS, Rig, parameters, scale};
-use takt_rt::{EngineParameters, Id, Origin, Phase, Request, Rule};
+use takt_rt::{DriveState, EngineParameters, Id, Origin, Phase, Request, Rule};
 
 /// Three axes on a bus with a cycle in every slot, three on one with a cycle in every second.
 fn two_rates() -> EngineParameters {
@@ -48,6 +48,34 @@ fn one_move_leads_the_axes_of_both_buses_to_their_targets_at_one_time() {
     }
     assert_eq!(rig.stops(), []);
     rig.assert_limits_kept();
+}
+
+/// A fault reset is an edge of bit 7: the bus must carry the controlword before and after it, however rare its cycles are.
+#[test]
+fn a_fault_on_a_bus_with_a_period_of_more_than_10_ms_is_reset_by_one_request() {
+    for divider in [11, 20, <EngineParameters>::LARGEST_DIVIDER] {
+        let mut own = parameters(6);
+        own.buses[1].divider = divider;
+        let mut rig = Rig::of(own);
+        let cycles = divider as usize;
+        rig.host.requests.extend([Request::Sync(true), Request::Activate]);
+        rig.run(10 * cycles);
+        rig.request(Request::Enable);
+        rig.run_until(Phase::Holding, 100 * cycles);
+        rig.drive(4).state = DriveState::Fault;
+        rig.run_until(Phase::Disabled, 100 * cycles);
+        assert_eq!(
+            rig.stops().iter().map(|stop| stop.rule()).collect::<Vec<_>>(),
+            [Rule::DriveFault],
+            "{divider}"
+        );
+        rig.request(Request::ResetFaults);
+        rig.run(4 * cycles);
+        assert_ne!(rig.drive(4).state, DriveState::Fault, "{divider}");
+        rig.request(Request::Enable);
+        rig.run_until(Phase::Holding, 100 * cycles);
+        assert_eq!(rig.host.snapshot.groups[0].stop, None, "{divider}");
+    }
 }
 
 /// Without that a path between axes with different limits would be bent.

@@ -4,10 +4,12 @@ mod fixture;
 
 use fixture::{PERIOD_NS, Rig};
 use proptest::prelude::*;
-use takt_rt::{EventKind, Frame, Id, Phase, Request};
+use takt_rt::{Cycle, EventKind, Frame, Grid, Id, Phase, Request, SlotPlan};
 
 const EPOCH_NS: u64 = 5 * PERIOD_NS;
 const COMMAND_PHASE_NS: u64 = 550_000;
+const SEND_PHASE_NS: u64 = 650_000;
+const LATEST_SET_POINTS_NS: u64 = 800_000;
 
 fn times_of(rig: &Rig, id: Id) -> Vec<u64> {
     rig.buses[0].sent.iter().filter(|(_, frame)| frame.id() == id).map(|(at, _)| *at).collect()
@@ -74,6 +76,69 @@ fn set_points_that_would_run_into_the_next_sync_are_not_sent_and_nothing_jumps()
     rig.run_until(Phase::Holding, 5_000);
     rig.assert_limits_kept();
     assert_eq!(rig.stops(), []);
+}
+
+/// Axes that hold, with a send phase.
+fn with_send_phase(axes: usize) -> Rig {
+    let mut rig = Rig::new(axes);
+    let usual = SlotPlan::usual(PERIOD_NS, COMMAND_PHASE_NS);
+    assert_eq!(usual.latest_set_points_ns, LATEST_SET_POINTS_NS);
+    let plan = SlotPlan { send_phase_ns: Some(SEND_PHASE_NS), ..usual };
+    rig.cycle = Cycle::new(Grid::new(EPOCH_NS, PERIOD_NS).unwrap(), plan);
+    rig.enable()
+}
+
+fn set_points(rig: &Rig) -> Vec<u64> {
+    times_of(rig, Id::canopen(0x200, 1)).iter().map(|at| (at - EPOCH_NS) % PERIOD_NS).collect()
+}
+
+#[test]
+fn with_a_send_phase_set_points_leave_at_its_beginning_however_long_computing_takes() {
+    let mut rig = with_send_phase(3);
+    rig.move_to(1.0);
+    for compute_ns in (0..=100_000).step_by(5_000) {
+        rig.clock.compute_ns = compute_ns;
+        rig.run(1);
+        assert_eq!(rig.host.records.last().unwrap().timing.compute_ns, compute_ns);
+    }
+    assert!(set_points(&rig).iter().all(|at| *at == SEND_PHASE_NS), "{:?}", set_points(&rig));
+    assert!(syncs(&rig).iter().all(|at| (at - EPOCH_NS).is_multiple_of(PERIOD_NS)));
+    assert_eq!(rig.host.snapshot.missed_slots, 0);
+}
+
+#[test]
+fn set_points_that_are_ready_after_the_send_phase_has_begun_leave_as_soon_as_they_are_ready() {
+    let mut rig = with_send_phase(3);
+    for (compute_ns, leaves_ns) in
+        [(100_001, 650_001), (250_000, LATEST_SET_POINTS_NS), (20_000, SEND_PHASE_NS)]
+    {
+        rig.clock.compute_ns = compute_ns;
+        rig.run(1);
+        assert_eq!(set_points(&rig).last(), Some(&leaves_ns));
+    }
+    let sent_before = set_points(&rig).len();
+    rig.clock.compute_ns = 250_001;
+    rig.run(1);
+    assert_eq!(set_points(&rig).len(), sent_before, "after the deadline");
+}
+
+#[test]
+fn the_deadline_is_met_by_the_clock_after_the_wait_for_the_send_phase() {
+    let mut rig = with_send_phase(3);
+    // The third wait of a cycle is the one for the send phase.
+    rig.clock.lateness_ns.extend([0, 0, LATEST_SET_POINTS_NS - SEND_PHASE_NS]);
+    rig.run(1);
+    assert_eq!(set_points(&rig).last(), Some(&LATEST_SET_POINTS_NS));
+    assert_eq!(rig.host.snapshot.missed_slots, 0);
+
+    let sent_before = rig.buses[0].sent.len();
+    rig.clock.lateness_ns.extend([0, 0, LATEST_SET_POINTS_NS - SEND_PHASE_NS + 1]);
+    rig.run(1);
+    let sent = rig.buses[0].sent[sent_before..].iter().map(|(_, frame)| frame.id()).collect::<Vec<_>>();
+    assert_eq!(sent, [Id::canopen(0x080, 0)], "SYNC, and nothing after the deadline");
+    assert_eq!(rig.host.snapshot.missed_slots, 1);
+    rig.run(10);
+    assert_eq!((rig.host.snapshot.missed_slots, rig.phase()), (1, Phase::Holding));
 }
 
 #[test]

@@ -7,7 +7,7 @@ mod plain_host;
 use fixture::{LIMITS, PERIOD_S, axis_in};
 use plain_host::{PlainHost, cycle, one_bus, slow_move};
 use takt_rt::{
-    AxisParameters, Command, ControlLaw, Deadline, DriveState, Engine, Exchange, FeedbackSince,
+    AxisParameters, Command, ControlLaw, Deadline, DriveState, Engine, Exchange, FeedbackSince, Frame, Id,
     OffCycleReport, Phase, Request, Rule,
 };
 
@@ -35,9 +35,14 @@ struct Rig {
     slot: u64,
 }
 
+/// What takes the torque of the drive.
+fn stop_frame() -> Frame {
+    Frame::of(Id::canopen(0x640, 1), [0x01, 0x00, 0, 0, 0, 0])
+}
+
 fn axis() -> AxisParameters {
     AxisParameters {
-        exchange: Exchange::OffCycle { report_cycles: 1 },
+        exchange: Exchange::OffCycle { report_cycles: 1, stop_frame: Some(stop_frame()) },
         feedback_since: FeedbackSince::CommandPhase,
         ..axis_in(ControlLaw::Position, 0, 1)
     }
@@ -80,7 +85,8 @@ impl Rig {
             _ => 0.0,
         };
         let Drive { state, position, velocity, error, .. } = *drive;
-        let report = OffCycleReport { state, position, velocity, torque: 0.0, error_code: error };
+        let report =
+            OffCycleReport { state, position, velocity, error_code: error, ..OffCycleReport::default() };
         self.host.reports.push_back((0, report));
     }
 
@@ -202,4 +208,20 @@ fn a_drive_that_is_being_enabled_is_waited_for_when_its_group_is_disabled() {
     rig.drive.is_silent = false;
     rig.run(50);
     assert_eq!(rig.host.phase, Phase::Disabled);
+}
+
+#[test]
+fn a_drive_whose_frames_do_not_get_out_is_told_to_stop_by_the_frame_that_takes_its_torque() {
+    let mut rig = Rig::new(4).enable();
+    rig.begin_move(-1.0);
+    rig.run(50);
+    let mut sent = vec![];
+    for _ in 0..3_000 {
+        // Whoever speaks to it is not heard any more, and does not hear it.
+        let batch = cycle(&mut rig.engine, &mut rig.host, rig.slot, Deadline::Missed);
+        rig.slot += 1;
+        sent.extend(batch);
+    }
+    assert!(sent.len() > 2, "{:?}", rig.host.phase);
+    assert!(sent.iter().all(|frame| *frame == stop_frame()), "{sent:?}");
 }

@@ -21,6 +21,7 @@ mod loading;
 mod messages;
 mod remedy;
 pub(crate) mod response_time;
+mod send_phase;
 mod slot;
 pub(crate) mod text;
 
@@ -36,6 +37,7 @@ pub(crate) use crate::frame_time::{BitRates, worst_case_bits};
 pub use command_phase::{NoCommandPhase, automatic_command_phase};
 pub use messages::MessageKind;
 pub use remedy::Remedy;
+pub use send_phase::send_phase_ns;
 pub use slot::Slot;
 
 /// The result of the analysis of one bus. Times are in ns.
@@ -108,7 +110,7 @@ impl EmergencyEffect {
         (transmission_ns > 0).then(|| Self {
             transmission_ns,
             feedback_late_ns: (slot.feedback_done_ns + transmission_ns).saturating_sub(command_phase_ns),
-            next_sync_late_ns: transmission_ns.saturating_sub(slot.set_points_reserve_ns),
+            next_sync_late_ns: (slot.held_ns + transmission_ns).saturating_sub(slot.set_points_reserve_ns),
         })
     }
 }
@@ -215,19 +217,10 @@ pub fn verify(config: &Config) -> Result<Vec<BusSchedule>, ScheduleError> {
 fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
     let bus = config.buses.get(index);
     let cycle = config.bus_cycle(index);
-    let cycles = bus.map_or(1, |bus| u64::from(bus.divider.max(1)));
-    let bit_rate = bus.map_or(0, |bus| bus.bit_rate);
-    let rates =
-        BitRates { nominal: bit_rate, data: bus.and_then(|bus| bus.data_bit_rate).unwrap_or(bit_rate) };
-    let allows_sdo = bus.is_some_and(|bus| bus.sdo_while_enabled);
+    let rates = bit_rates(config, index);
     let all = messages::messages(config, index);
-    let is_sent_while_enabled = |message: &BusMessage| allows_sdo || !message.kind.is_sdo();
-    let enabled: Vec<&BusMessage> = all.iter().filter(|message| is_sent_while_enabled(message)).collect();
-
-    let is_timed = |axis: &&Axis| axis.bus == index && axis.drive.protocol != Protocol::BitFields;
-    let on_bus = config.axes.iter().filter(is_timed);
-    let feedback_delay_ns = on_bus.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
-    let slot = slot::worst_slot(&enabled, feedback_delay_ns, cycle, cycles, rates);
+    let enabled = while_enabled(&all, config, index);
+    let slot = worst_slot(config, index, &enabled).held(send_phase::held_ns(config));
     let is_queue_empty_at_sync = slot.is_queue_empty_at_sync;
     let response_ns = |at: usize| {
         let (messages, place) = beside(&enabled, at);
@@ -257,7 +250,7 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
         .collect();
     BusSchedule {
         name: bus.map(|bus| bus.name.clone()).unwrap_or_default(),
-        bit_rate,
+        bit_rate: rates.nominal,
         period_ns: cycle.period_ns,
         command_phase_ns: cycle.command_phase_ns,
         load_percent: load_percent(&messages) + line_load_percent(config, index),
@@ -267,6 +260,27 @@ fn analyse_bus(config: &Config, index: usize) -> BusSchedule {
         emergency: EmergencyEffect::on(&slot, cycle.command_phase_ns),
         remedies: vec![],
     }
+}
+
+fn bit_rates(config: &Config, bus: usize) -> BitRates {
+    let bus = config.buses.get(bus);
+    let nominal = bus.map_or(0, |bus| bus.bit_rate);
+    BitRates { nominal, data: bus.and_then(|bus| bus.data_bit_rate).unwrap_or(nominal) }
+}
+
+/// Those of the messages of a bus that are sent while the axes are enabled.
+fn while_enabled<'a>(all: &'a [BusMessage], config: &Config, bus: usize) -> Vec<&'a BusMessage> {
+    let allows_sdo = config.buses.get(bus).is_some_and(|bus| bus.sdo_while_enabled);
+    all.iter().filter(|message| allows_sdo || !message.kind.is_sdo()).collect()
+}
+
+/// The worst slot of a bus with these messages, whose set-points leave as soon as they are made.
+fn worst_slot(config: &Config, bus: usize, enabled: &[&BusMessage]) -> Slot {
+    let cycles = config.buses.get(bus).map_or(1, |bus| u64::from(bus.divider.max(1)));
+    let is_timed = |axis: &&Axis| axis.bus == bus && axis.drive.protocol != Protocol::BitFields;
+    let timed = config.axes.iter().filter(is_timed);
+    let feedback_delay_ns = timed.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
+    slot::worst_slot(enabled, feedback_delay_ns, config.bus_cycle(bus), cycles, bit_rates(config, bus))
 }
 
 /// When a message has arrived in the slot, if it has a moment there, and when it must have.
@@ -285,7 +299,7 @@ fn in_slot(
             let counts = |kind| matches!(kind, MessageKind::SetPoint | MessageKind::Answer);
             let up_to = all.iter().filter(|other| counts(other.kind) && other.axis <= message.axis);
             let sent_ns: u64 = up_to.map(|other| rates.duration_ns(worst_case_bits(other.shape))).sum();
-            let done_ns = cycle.command_phase_ns + slot.wait_before_set_points_ns + sent_ns;
+            let done_ns = cycle.command_phase_ns + slot.held_ns + slot.wait_before_set_points_ns + sent_ns;
             (Some(done_ns), Some(cycle.period_ns))
         }
         MessageKind::Answer => (Some(slot.set_points_done_ns), Some(cycle.period_ns)),
@@ -304,7 +318,7 @@ fn load_percent(messages: &[MessageSchedule]) -> f64 {
 
 /// The share of the time that bytes are on a serial line; 0 for a CAN bus.
 fn line_load_percent(config: &Config, bus: usize) -> f64 {
-    let on_line = config.axes_of_bus(bus).filter(|axis| axis.drive.is_on_serial_line);
+    let on_line = config.axes_of_bus(bus).filter(|axis| axis.drive.protocol.is_of_serial_line());
     let budgets = on_line.filter_map(|axis| family::of(&axis.drive).off_cycle_budget(axis, config));
     100.0 * budgets.map(|budget| budget.bus_share).sum::<f64>()
 }

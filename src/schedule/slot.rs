@@ -38,6 +38,9 @@ pub struct Slot {
     pub feedback_ns: u64,
     /// When all feedback has arrived.
     pub feedback_done_ns: u64,
+    /// How long after the beginning of the command phase the set-points are held, so that they leave at the same moment of every slot; 0
+    /// where they leave as soon as they are made.
+    pub held_ns: u64,
     /// What the first set-point may have to wait for.
     pub wait_before_set_points_ns: u64,
     /// All set-point frames together.
@@ -58,8 +61,8 @@ pub struct Slot {
     /// How late SYNC may leave with the feedback still in time: for the latency of the first wake-up and for the
     /// SYNCs of other buses before it. 0 where the feedback is late anyway.
     pub sync_reserve_ns: u64,
-    /// How late the set-points may be handed over: for the latency of the second wake-up and for computing. 0 where
-    /// the set-points are late anyway.
+    /// How late after the command phase the set-points may be handed over: for the latency of the second wake-up and for
+    /// computing, which the time that they are held is a part of. 0 where the set-points are late anyway.
     pub set_points_reserve_ns: u64,
     /// The earliest command phase at which the feedback is in time.
     pub earliest_command_phase_ns: u64,
@@ -70,6 +73,14 @@ pub struct Slot {
     pub command_phases_ns: Option<(u64, u64)>,
     /// Whether everything that the controller has queued in a slot leaves before the next SYNC.
     pub is_queue_empty_at_sync: bool,
+}
+
+impl Slot {
+    /// The same slot with set-points that are held for so long.
+    pub(super) fn held(self, held_ns: u64) -> Self {
+        let replies_done_ns = if self.replies_ns > 0 { self.replies_done_ns + held_ns } else { 0 };
+        Self { held_ns, set_points_done_ns: self.set_points_done_ns + held_ns, replies_done_ns, ..self }
+    }
 }
 
 /// What is sent beside the process data within one slot, at the most.
@@ -224,6 +235,7 @@ pub(super) fn worst_slot(
         wait_before_feedback_ns: actual.before_feedback_ns,
         feedback_ns,
         feedback_done_ns: actual.earliest_ns,
+        held_ns: 0,
         wait_before_set_points_ns,
         set_points_ns,
         set_points_done_ns: phase_ns + set_points_rest_ns,

@@ -79,6 +79,7 @@ pub fn sums(bus: &BusSchedule) -> Vec<String> {
         us(slot.set_points_done_ns),
         sum(&[
             (bus.command_phase_ns, "command phase"),
+            (slot.held_ns, "held"),
             (slot.wait_before_set_points_ns, "wait"),
             (slot.set_points_ns, "set-points")
         ]),

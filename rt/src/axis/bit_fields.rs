@@ -90,7 +90,8 @@ impl Axis {
     pub fn temperature(&self) -> Option<f32> {
         match &self.parameters.exchange {
             Exchange::BitFields(by) => self.temperature_of_reply(by),
-            Exchange::Pdos(_) | Exchange::OffCycle { .. } => None,
+            Exchange::OffCycle { .. } => self.off_cycle_temperature,
+            Exchange::Pdos(_) => None,
         }
     }
 

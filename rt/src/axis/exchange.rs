@@ -26,6 +26,9 @@ pub enum Exchange {
         /// Cycles of the bus within which a report is expected; 0 counts as 1. What is counted in cycles of feedback elsewhere is counted in
         /// such times.
         report_cycles: u16,
+        /// The frame that takes its torque. It is sent in its bus' place for frames that stop drives, when the frames of whoever speaks to
+        /// the drive do not get out. `None`: there is none on this bus.
+        stop_frame: Option<Frame>,
     },
 }
 
@@ -53,7 +56,7 @@ impl Exchange {
     pub(super) const fn report_cycles(&self) -> u16 {
         match self {
             Self::Pdos(_) | Self::BitFields(_) => 1,
-            Self::OffCycle { report_cycles } => *report_cycles,
+            Self::OffCycle { report_cycles, .. } => *report_cycles,
         }
     }
 

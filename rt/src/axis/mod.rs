@@ -94,6 +94,8 @@ pub struct Axis {
     field_drive: FieldDrive,
     /// The frame of this cycle to such a drive.
     field_frame: Option<Frame>,
+    /// What a drive that is spoken to outside of the cycle has told of its temperature: °C.
+    off_cycle_temperature: Option<f32>,
     set_points: SetPoints,
     mode: Mode,
     /// What is done with a target beyond the limits, by what leads the axis now.
@@ -137,6 +139,7 @@ impl Axis {
             feedback: ProcessImage::default(),
             field_drive: FieldDrive::default(),
             field_frame: None,
+            off_cycle_temperature: None,
             set_points: SetPoints::default(),
             mode: Mode::default(),
             stream_rest: 0.0,

@@ -18,6 +18,8 @@ pub struct OffCycleReport {
     pub torque: f64,
     /// Its error; 0 for none.
     pub error_code: u16,
+    /// Its temperature (°C); `None` where it is not known.
+    pub temperature: Option<f32>,
 }
 
 impl OffCycleReport {
@@ -35,7 +37,7 @@ impl OffCycleReport {
 impl Axis {
     /// Takes a report of a drive that is spoken to outside of the cycle. One that carries no number changes nothing.
     pub fn receive_off_cycle(&mut self, report: &OffCycleReport) {
-        let OffCycleReport { state, position, velocity, torque, error_code } = *report;
+        let OffCycleReport { state, position, velocity, torque, error_code, temperature } = *report;
         let is_number = position.is_finite() && velocity.is_finite() && torque.is_finite();
         if !is_number || !self.is_off_cycle() {
             return;
@@ -47,6 +49,7 @@ impl Axis {
         self.feedback.take(FeedbackSlot::Velocity, scale.velocity_to_drive(velocity));
         self.feedback.take(FeedbackSlot::Torque, scale.torque_to_per_mille(torque));
         self.feedback.take(FeedbackSlot::ErrorCode, error_code.into());
+        self.off_cycle_temperature = temperature.filter(|temperature| temperature.is_finite());
         self.reception.note_arrival(0);
     }
 }

@@ -169,8 +169,7 @@ impl Axis {
             Exchange::BitFields(by) => {
                 Some(self.field_drive.step(by, LifeWish::Stop, &FieldTargets::default()))
             }
-            // Whoever speaks to it sees the controlword.
-            Exchange::OffCycle { .. } => None,
+            Exchange::OffCycle { stop_frame, .. } => *stop_frame,
         }
     }
 

@@ -29,8 +29,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let must_be_switched_off = |axis: &Axis| {
             let behind_cycles = shared.backlog.behind_cycles(axis.parameters().bus.into());
             let is_cut_off = is_always_late || behind_cycles > shared.not_transmitted_cycles;
-            // Whether such a drive receives its PDOs is not known.
-            let is_silent = axis.feedback_age() > axis.parameters().missed_feedback_cycles;
+            // Whether such a drive receives its PDOs is not known. Whoever speaks to a drive outside of the cycle goes on asking it.
+            let is_silent =
+                !axis.is_off_cycle() && axis.feedback_age() > axis.parameters().missed_feedback_cycles;
             axis.is_pdo_unreachable() || axis.may_have_torque() && (is_cut_off || is_silent && is_overdue)
         };
         for axis in axes.iter_mut() {

@@ -140,6 +140,20 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_positions_there_are_leave_only_numbers_behind() {
+        let limits = AxisLimits { deceleration: 10.0, ..LIMITS };
+        let mut sequence = PositionSequence::at_rest(0.0);
+        for position in [f64::MAX, f64::MIN, f64::MAX, 0.0, 0.0, f64::MIN, f64::MIN, 1e-3, 1e-3] {
+            let State { position, velocity, acceleration } = sequence.next(position, &limits, PERIOD_S);
+            assert!(
+                position.is_finite() && velocity.abs() <= 2.0 && acceleration.abs() <= 10.0,
+                "{position}"
+            );
+        }
+        assert_eq!(sequence.next(1e-3, &limits, PERIOD_S), State::rest(1e-3));
+    }
+
+    #[test]
     fn what_is_left_is_the_shorter_one_of_the_budget_and_of_the_time_until_the_set_points_are_due() {
         let cycle = CallbackCycle { budget_ns: 100, set_points_due_ns: 1_000, ..CallbackCycle::default() };
         assert_eq!([700, 950, 1_100].map(|now_ns| cycle.beginning_at(now_ns).time_left_ns), [100, 50, 0]);

@@ -231,6 +231,66 @@ pub(super) mod tests {
         }
     }
 
+    /// Any finite number, as a callback may say it.
+    fn any_finite() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            4 => -3.0f64..3.0,
+            1 => prop::sample::select(&[f64::MAX, f64::MIN, 1e300, -1e300, 1e10, -1e10, f64::MIN_POSITIVE][..]),
+            1 => any::<f64>().prop_filter("finite", |number| number.is_finite()),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(500))]
+
+        /// However far away a target is and however fast: the next set-point is a number within the limits, or there is none.
+        #[test]
+        fn any_finite_target_is_followed_by_finite_steps_or_refused(
+            targets in prop::collection::vec((any_finite(), any_finite(), any_finite(), 1usize..20), 1..20),
+            jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
+        ) {
+            let limits = AxisLimits {
+                position_min: -1.0,
+                position_max: 2.0,
+                velocity: 3.0,
+                acceleration: 8.0,
+                deceleration: 8.0,
+                jerk,
+                torque: 50.0,
+            };
+            let mut state = State::rest(0.0);
+            for (position, velocity, acceleration, cycles) in targets {
+                let target = State { position, velocity, acceleration };
+                for _ in 0..cycles {
+                    let next = follow(&state, &target, &limits, PERIOD_S).unwrap_or(state);
+                    let State { position, velocity, acceleration } = next;
+                    prop_assert!(position.is_finite() && velocity.is_finite() && acceleration.is_finite());
+                    prop_assert!((position - state.position).abs() <= limits.velocity * PERIOD_S * (1.0 + 1e-9));
+                    prop_assert!((-1.0 - 1e-3..=2.0 + 1e-3).contains(&position), "{next:?}");
+                    state = next;
+                }
+            }
+        }
+
+        #[test]
+        fn a_target_beyond_every_limit_is_never_refused_where_it_is_to_rest(far in any_finite()) {
+            let limits = AxisLimits {
+                position_min: -1.0,
+                position_max: 2.0,
+                velocity: 3.0,
+                acceleration: 8.0,
+                deceleration: 8.0,
+                jerk: 100.0,
+                torque: 50.0,
+            };
+            let mut state = State::rest(0.0);
+            for _ in 0..3_000 {
+                state = follow(&state, &State::rest(far), &limits, PERIOD_S).unwrap();
+            }
+            prop_assert!((state.position - far.clamp(-1.0, 2.0)).abs() < 1e-9, "{state:?}");
+        }
+    }
+
     #[test]
     fn what_is_no_number_is_an_error() {
         let limits = AxisLimits {

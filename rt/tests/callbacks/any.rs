@@ -17,15 +17,24 @@ enum Deed {
 }
 
 fn deeds() -> impl Strategy<Value = Vec<(Deed, usize)>> {
-    let numbers = prop_oneof![-4.0f64..4.0, -1e3f64..1e3, Just(f64::NAN), Just(f64::INFINITY), Just(1e300)];
+    let numbers = prop_oneof![
+        -4.0f64..4.0,
+        -1e3f64..1e3,
+        Just(f64::NAN),
+        Just(f64::INFINITY),
+        Just(1e300),
+        Just(f64::MIN),
+        Just(f64::MAX)
+    ];
     let likely = -2.5f64..2.5;
-    let state = (prop_oneof![9 => likely, 1 => numbers], -3.0f64..3.0, -20.0f64..20.0);
+    let rate = |usual: f64| prop_oneof![20 => -usual..usual, 1 => Just(1e300), 1 => Just(f64::MIN)];
+    let state = (prop_oneof![9 => likely, 1 => numbers], rate(3.0), rate(20.0));
     let commanded = state.prop_map(|(position, velocity, acceleration)| {
         Deed::Command(State { position, velocity, acceleration })
     });
     let deed = prop_oneof![
         8 => commanded,
-        2 => prop_oneof![-2.5f64..2.5, -1e3f64..1e3, Just(f64::NAN)].prop_map(Deed::Velocity),
+        2 => prop_oneof![-2.5f64..2.5, -1e3f64..1e3, Just(f64::NAN), Just(f64::MAX)].prop_map(Deed::Velocity),
         1 => (-50.0f64..50.0).prop_map(Deed::Torque),
         2 => Just(Deed::Nothing),
         1 => Just(Deed::Late),
@@ -62,7 +71,12 @@ proptest! {
             }
             COMMANDED
         });
-        rig.run(cycles + 3_000);
+        for _ in 0..cycles + 3_000 {
+            rig.run(1);
+            let axis = &rig.host.snapshot.axes[0];
+            let set = [axis.position_set, axis.velocity_set, axis.torque_set];
+            prop_assert!(set.iter().all(|number| number.is_finite()), "{set:?}");
+        }
         prop_assert!(matches!(rig.phase(), Phase::Holding), "{:?}", rig.phase());
         rig.assert_differences_kept(if follow == Follow::Smooth { jerk } else { f64::INFINITY });
     }

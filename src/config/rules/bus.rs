@@ -1,7 +1,7 @@
 //! The buses.
 
-use takt_rt::MAX_BUSES;
 use takt_rt::slcan::DataBitRate;
+use takt_rt::{EngineParameters, MAX_BUSES};
 
 use super::{Fields, name};
 use crate::config::bounds::Bounds;
@@ -91,10 +91,18 @@ fn interface(spot: &Spot<'_>, interface: &Interface) {
     }
 }
 
-/// A bus has one cycle in one or several of the controller's.
+/// A bus has one cycle in one or several of the controller's, in as many as the engine can wait.
 pub fn divider(spot: &Spot<'_>, divider: u32, cycle_ns: u64) -> Option<u32> {
     let period_ns = cycle_ns.saturating_mul(divider.into());
     let cycle_s = cycle_ns as f64 / 1e9;
+    let most = <EngineParameters>::LARGEST_DIVIDER;
+    if divider > most {
+        let show = |ns: u64| Quantity::DURATION.show(ns as f64 / 1e9);
+        let longest_ns = cycle_ns.saturating_mul(most.into());
+        let allowed = format!("{} to {}: {most} cycles at most", show(cycle_ns), show(longest_ns));
+        spot.report_range(show(period_ns), allowed);
+        return None;
+    }
     spot.duration(period_ns, cycle_s..=ranges::BUS_PERIOD_AT_MOST_S.max(cycle_s)).map(|_| divider)
 }
 

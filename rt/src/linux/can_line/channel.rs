@@ -188,9 +188,9 @@ impl<L: ByteLine, C: LineCodec> Channel<L, C> {
 
     /// Asks the adapter to leave the bus. One attempt: a line that is full or gone is left as it is.
     pub(super) fn close(&mut self) {
-        let farewell = self.codec.farewell();
-        if self.send_rest() && !farewell.is_empty() {
-            let _ = self.line.write(&farewell);
+        let closing = self.codec.closing_line();
+        if self.send_rest() && !closing.is_empty() {
+            let _ = self.line.write(&closing);
         }
     }
 }

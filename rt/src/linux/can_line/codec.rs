@@ -22,7 +22,7 @@ pub trait LineCodec {
     fn push(&mut self, byte: u8) -> Option<Arrival>;
     /// What is said before the line is left.
     #[doc(hidden)]
-    fn farewell(&self) -> ArrayVec<u8, LINE_BYTES>;
+    fn closing_line(&self) -> ArrayVec<u8, LINE_BYTES>;
 }
 
 /// What has arrived.
@@ -65,7 +65,7 @@ impl LineCodec for SlcanCodec {
         }
     }
 
-    fn farewell(&self) -> FrameBytes {
+    fn closing_line(&self) -> FrameBytes {
         Command::Close.text().iter().copied().collect()
     }
 }
@@ -102,7 +102,7 @@ impl LineCodec for TransparentCodec {
         is_new.then_some(Arrival::Disturbed)
     }
 
-    fn farewell(&self) -> FrameBytes {
+    fn closing_line(&self) -> FrameBytes {
         FrameBytes::new()
     }
 }
