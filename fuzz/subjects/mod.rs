@@ -8,6 +8,7 @@ pub mod engine;
 pub mod erob_can;
 pub mod field_description;
 mod input;
+pub mod journal;
 pub mod lines;
 pub mod modbus;
 pub mod packets;

@@ -1,6 +1,6 @@
 //! Fuzzes both sides of the packets between a controller and clients in other processes.
 
-use takt::internals::remote::{Demand, Reply, Role, StopRequest};
+use takt::internals::remote::{Answer, Demand, Reply, Role, StopRequest};
 use takt::telemetry::Machine;
 
 /// What is decoded is encoded to words that are decoded to the same. Nothing asks for more memory than the packet has.
@@ -33,13 +33,13 @@ fn demand(words: &[u64]) {
 fn reply(words: &[u64]) {
     let machine =
         Machine { name: "arm".to_owned(), cycle_ns: 1_000_000, axes: vec![], buses: vec![], groups: vec![] };
-    let Ok((number, reply)) = Reply::of(words, &machine) else { return };
-    let encoded = reply.words(number);
-    let (_, again) = Reply::of(&encoded, &machine).expect("it was encoded here");
-    assert_eq!(again.words(number), encoded);
+    let Ok(answer) = Answer::of(words, &machine) else { return };
+    let encoded = answer.words();
+    let again = Answer::of(&encoded, &machine).expect("it was encoded here");
+    assert_eq!(again.words(), encoded);
     // Every refusal has words.
-    let text = match reply {
-        Reply::Done | Reply::Motion(_) => return,
+    let text = match answer.reply {
+        Reply::Done | Reply::Motion(_) | Reply::Progress(_) => return,
         Reply::Refused(error) => error.to_string(),
         Reply::NotTaken(error) => error.to_string(),
     };

@@ -261,7 +261,9 @@ impl TakenRequests {
 
 impl Shared {
     fn stop(&self, target: RequestTarget, end: MotionEnd) -> Option<&StopWord> {
-        self.stops.get(place_of(target) * MotionEnd::ALL.len() + end.number())
+        let is_only_group = self.stops.len() == MotionEnd::ALL.len();
+        let place = if is_only_group { 0 } else { place_of(target) };
+        self.stops.get(place * MotionEnd::ALL.len() + end.number())
     }
 }
 

@@ -17,6 +17,11 @@ impl GroupAxes {
         Self { places, are_own }
     }
 
+    /// Their numbers in the controller.
+    pub fn places(&self) -> &[usize] {
+        &self.places
+    }
+
     /// How many axes the group has.
     #[cfg(feature = "internals")]
     pub fn count(&self) -> usize {

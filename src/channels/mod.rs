@@ -17,6 +17,7 @@ mod callbacks;
 mod client_requests;
 mod event_words;
 mod group_axes;
+mod journal;
 mod latest;
 mod lending;
 mod motion_words;
@@ -39,6 +40,7 @@ use takt_rt::{
 
 use callbacks::CallbackTaker;
 use client_requests::{TakenRequests, client_requests};
+use journal::JournalWriter;
 use latest::{Reader, Writer};
 use observed_events::observed_events;
 use records::{RecordConsumer, RecordProducer};
@@ -53,13 +55,16 @@ pub use callbacks::{
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
 pub(crate) use event_words::EVENT_WORDS;
 pub use group_axes::GroupAxes;
-pub(crate) use latest::{Attempt, Cells, Reader as LatestReader, Writer as LatestWriter};
+pub use journal::{HostInput, JournalEntry, JournalReader};
+pub(crate) use latest::{
+    Allocated, Attempt, Cells, Reader as LatestReader, Words, Writer as LatestWriter, latest,
+};
 pub use observed_events::EventReader;
 pub(crate) use observed_events::EventWriter;
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 pub use stream::{GroupStream, Streamer, chunk};
-pub use trajectories::{GivenTrajectory, TrajectoryGiver};
+pub use trajectories::{GivenTrajectory, NumberedTrajectory, TrajectoryGiver};
 pub(crate) use words::{put_snapshot, snapshot_words, take_snapshot};
 
 /// The capacity of each channel.
@@ -107,8 +112,7 @@ const REPORTS_OF_AXIS: usize = 4;
 pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
     let (request_in, request_out) = ring(sizes.requests);
     let (streamer, streams) = stream_channels(&sizes.groups);
-    let (snapshot_in, snapshot_out) =
-        latest::latest(snapshot_words(sizes.groups.len(), sizes.axes, sizes.buses));
+    let (snapshot_in, snapshot_out) = latest(snapshot_words(sizes.groups.len(), sizes.axes, sizes.buses));
     let (service_in, service_out) = (0..sizes.buses).map(|_| ring(sizes.service_out)).unzip();
     let (received_in, received_out) = ring(sizes.service_in);
     let (record_in, record_out) = records::record_ring(sizes.records);
@@ -133,6 +137,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         events: event_in,
         observed: observed_in,
         snapshot: snapshot_in,
+        journal: None,
     };
     rt.publish(&snapshot_before_first_cycle(sizes));
     let host = HostSide {
@@ -178,9 +183,17 @@ pub struct RtSide {
     events: Producer<Event>,
     observed: EventWriter,
     snapshot: Writer,
+    /// Notes what is taken, for a replay.
+    journal: Option<JournalWriter>,
 }
 
 impl RtSide {
+    fn note(&mut self, input: impl FnOnce() -> HostInput) {
+        if let Some(journal) = &mut self.journal {
+            journal.note(input());
+        }
+    }
+
     /// From now on the calls of callbacks are measured so.
     pub fn measure_callbacks_by(&mut self, clock: CallbackClock) {
         self.callbacks.measure_by(clock);
@@ -190,15 +203,19 @@ impl RtSide {
 impl HostInterface for RtSide {
     fn request(&mut self) -> Option<RequestEnvelope> {
         self.is_client_next = !self.is_client_next;
-        if self.is_client_next {
+        let request = if self.is_client_next {
             self.requests.pop().or_else(|| self.clients.take())
         } else {
             self.clients.take().or_else(|| self.requests.pop())
-        }
+        }?;
+        self.note(|| HostInput::Request(request));
+        Some(request)
     }
 
     fn off_cycle_report(&mut self) -> Option<(u8, OffCycleReport)> {
-        self.off_cycle_reports.pop()
+        let (axis, report) = self.off_cycle_reports.pop()?;
+        self.note(|| HostInput::OffCycleReport { axis, report });
+        Some((axis, report))
     }
 
     fn begin_stream(&mut self, group: u8) {
@@ -208,8 +225,13 @@ impl HostInterface for RtSide {
     }
 
     fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
-        let stream = self.streams.get_mut(usize::from(group));
-        stream.map_or_else(StreamSample::default, |stream| stream.sample(slot_start_ns))
+        let Self { streams, journal, .. } = self;
+        let Some(stream) = streams.get_mut(usize::from(group)) else { return StreamSample::default() };
+        stream.sample(slot_start_ns, |point| {
+            if let Some(journal) = journal {
+                journal.note(HostInput::Point { group, point: *point });
+            }
+        })
     }
 
     fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
@@ -221,7 +243,9 @@ impl HostInterface for RtSide {
     }
 
     fn take_callback(&mut self, group: u8, callback: CallbackId) -> bool {
-        self.callbacks.take(group, callback)
+        let is_there = self.callbacks.take(group, callback);
+        self.note(|| HostInput::CallbackTaken { is_there });
+        is_there
     }
 
     fn callback(
@@ -232,7 +256,9 @@ impl HostInterface for RtSide {
         axes: &[AxisSnapshot; MAX_AXES],
         targets: &mut [Option<AxisTarget>; MAX_AXES],
     ) -> CallbackReturn {
-        self.callbacks.call(group, callback, cycle, axes, targets)
+        let returned = self.callbacks.call(group, callback, cycle, axes, targets);
+        self.note(|| HostInput::Called { returned, targets: *targets });
+        returned
     }
 
     fn keep_callback(&mut self, group: u8, needed: Option<CallbackId>) {
@@ -240,7 +266,9 @@ impl HostInterface for RtSide {
     }
 
     fn service_frame(&mut self, bus: usize) -> Option<Frame> {
-        self.service.get_mut(bus)?.pop()
+        let frame = self.service.get_mut(bus)?.pop()?;
+        self.note(|| HostInput::ServiceFrame { bus: bus as u8, frame });
+        Some(frame)
     }
 
     fn received(&mut self, bus: usize, frame: &Received) -> bool {
@@ -258,7 +286,18 @@ impl HostInterface for RtSide {
 
     fn publish(&mut self, snapshot: &Snapshot) {
         self.snapshot.write(|words| put_snapshot(snapshot, words));
+        if let Some(journal) = &mut self.journal {
+            journal.end_cycle();
+        }
     }
+}
+
+/// Notes from now on everything that the real-time thread takes from the host, for a replay. Call it before the first cycle.
+pub fn journal(rt: &mut RtSide, host: &mut HostSide) -> JournalReader {
+    let (writer, reader) = journal::journal();
+    rt.journal = Some(writer);
+    host.trajectories.note_in(reader.trajectories());
+    reader
 }
 
 /// The side of the program that commands the controller.

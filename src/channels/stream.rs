@@ -129,11 +129,12 @@ impl StreamReceiver {
         self.look_ahead.begin();
     }
 
-    /// What the stream wants of the axes of the controller in the slot that begins at this time. Nothing here allocates, locks or
-    /// waits.
-    pub fn sample(&mut self, slot_start_ns: Nanoseconds) -> StreamSample {
+    /// What the stream wants of the axes of the controller in the slot that begins at this time. `note` is told of each point that is
+    /// taken. Nothing here allocates, locks or waits.
+    pub fn sample(&mut self, slot_start_ns: Nanoseconds, mut note: impl FnMut(&StreamPoint)) -> StreamSample {
         for _ in 0..POINTS_PER_CYCLE {
             let Some(point) = self.waiting.pop() else { break };
+            note(&point);
             // A point that is of no use is counted.
             let _ = self.look_ahead.insert(&point, slot_start_ns);
         }
@@ -182,7 +183,7 @@ mod tests {
     #[test]
     fn points_of_any_thread_are_wanted_at_their_time() {
         let (streamer, mut receiver) = channel();
-        assert_eq!(receiver.sample(MILLISECOND_NS).wish, StreamWish::Awaited);
+        assert_eq!(receiver.sample(MILLISECOND_NS, |_| {}).wish, StreamWish::Awaited);
         let chunk = positions(|number| 0.01 * f64::from(number), 20);
         let threads: Vec<_> = (0..2)
             .map(|half| {
@@ -200,12 +201,12 @@ mod tests {
         threads.into_iter().for_each(|thread| thread.join().unwrap());
         // One thread may have been first with all of its points, and a cycle takes only some of them.
         for at_ms in 2..4 {
-            receiver.sample(at_ms * MILLISECOND_NS);
+            receiver.sample(at_ms * MILLISECOND_NS, |_| {});
         }
-        assert_eq!(wanted(&receiver.sample(4 * MILLISECOND_NS)), 0.0);
+        assert_eq!(wanted(&receiver.sample(4 * MILLISECOND_NS, |_| {})), 0.0);
         for at_ms in 60..150 {
             let expected = 0.001 * (at_ms - 10) as f64;
-            let wanted = wanted(&receiver.sample(at_ms * MILLISECOND_NS));
+            let wanted = wanted(&receiver.sample(at_ms * MILLISECOND_NS, |_| {}));
             assert!((wanted - expected).abs() < 1e-9, "{wanted} for {expected}");
         }
     }
@@ -215,10 +216,10 @@ mod tests {
         let (streamer, mut receiver) = channel();
         let chunk = chunk(0, MILLISECOND_NS, &positions(|_| 1.0, 300));
         assert_eq!(streamer.push(&chunk), Err(ChannelError::Full));
-        assert_eq!(receiver.sample(MILLISECOND_NS).wish, StreamWish::Awaited);
+        assert_eq!(receiver.sample(MILLISECOND_NS, |_| {}).wish, StreamWish::Awaited);
         streamer.push(&chunk[..256]).unwrap();
         assert_eq!(streamer.push(&chunk[..1]), Err(ChannelError::Full));
-        receiver.sample(2 * MILLISECOND_NS);
+        receiver.sample(2 * MILLISECOND_NS, |_| {});
         assert_eq!(receiver.look_ahead.counts().points, POINTS_PER_CYCLE as u64);
         streamer.push(&chunk[..POINTS_PER_CYCLE]).unwrap();
     }
@@ -227,7 +228,9 @@ mod tests {
     fn each_group_gets_the_points_of_its_own_axes_in_its_own_order() {
         let (streamer, mut receivers) = stream_channels(&[group(&[2, 0]), group(&[1])]);
         let wanted = |receiver: &mut StreamReceiver, axis: usize| {
-            let StreamWish::Targets(targets) = receiver.sample(20 * MILLISECOND_NS).wish else { panic!() };
+            let StreamWish::Targets(targets) = receiver.sample(20 * MILLISECOND_NS, |_| {}).wish else {
+                panic!()
+            };
             let AxisTarget::Position { state, .. } = targets[axis] else { panic!("{targets:?}") };
             state.position
         };

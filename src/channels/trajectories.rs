@@ -1,6 +1,6 @@
 //! Checked trajectories on their way to the real-time thread, and back: the loop borrows them, and never frees one.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use takt_rt::{TrajectoryId, TrajectorySample};
 
@@ -29,6 +29,17 @@ impl GivenTrajectory {
         &self.trajectory
     }
 
+    /// What it wants of the axes of the controller so many seconds after its beginning.
+    pub fn sample(&self, at_s: f64) -> TrajectorySample {
+        let sample = self.trajectory.sample(at_s);
+        TrajectorySample { states: self.axes.spread(sample.states), ..sample }
+    }
+
+    /// Its axes.
+    pub fn axes(&self) -> &GroupAxes {
+        &self.axes
+    }
+
     /// The time of the newest cycle, in seconds after the beginning; 0 before it has begun.
     pub fn at_s(&self) -> f64 {
         f64::from_bits(self.at_s.load(Ordering::Relaxed))
@@ -46,29 +57,46 @@ struct Handed {
 /// The two ends of the way there and back.
 pub(super) fn trajectories() -> (TrajectoryGiver, TrajectoryTaker) {
     let (lender, borrower) = lending(LENT_AT_MOST);
-    (TrajectoryGiver(lender), TrajectoryTaker(borrower))
+    (TrajectoryGiver { lender, journal: None }, TrajectoryTaker(borrower))
 }
+
+/// A trajectory under the number that the real-time thread knows it by, with its group.
+pub type NumberedTrajectory = (TrajectoryId, u8, Arc<GivenTrajectory>);
 
 /// The end that gives trajectories, and frees those that come back. Clone it for every thread.
 #[derive(Clone)]
-pub struct TrajectoryGiver(Lender<Handed>);
+pub struct TrajectoryGiver {
+    lender: Lender<Handed>,
+    /// Where each of them is noted for the journal.
+    journal: Option<Arc<Mutex<Vec<NumberedTrajectory>>>>,
+}
 
 impl TrajectoryGiver {
     /// Gives a trajectory for a group, and returns its number. `None` if too many are with the real-time thread.
     pub fn give(&self, group: u8, given: &Arc<GivenTrajectory>) -> Option<TrajectoryId> {
         self.release();
         let handed = Handed { group, given: Arc::clone(given), asked_s: 0.0 };
-        self.0.lend(Box::new(handed)).ok().map(TrajectoryId)
+        let id = self.lender.lend(Box::new(handed)).ok().map(TrajectoryId)?;
+        if let Some(journal) = &self.journal {
+            let mut noted = journal.lock().unwrap_or_else(PoisonError::into_inner);
+            noted.push((id, group, Arc::clone(given)));
+        }
+        Some(id)
+    }
+
+    /// From now on what this end and its clones give is noted in the journal, too.
+    pub(super) fn note_in(&mut self, journal: Arc<Mutex<Vec<NumberedTrajectory>>>) {
+        self.journal = Some(journal);
     }
 
     /// Takes a trajectory back for which the real-time thread will not ask: its request was not submitted, or was discarded.
     pub fn take_back(&self, TrajectoryId(id): TrajectoryId) {
-        drop(self.0.take_back(id));
+        drop(self.lender.take_back(id));
     }
 
     /// Frees what has come back.
     pub fn release(&self) {
-        self.0.collect(drop);
+        self.lender.collect(drop);
     }
 }
 
@@ -85,9 +113,7 @@ impl TrajectoryTaker {
     ) -> Option<TrajectorySample> {
         let handed = self.0.borrow(id).filter(|handed| handed.group == group)?;
         handed.asked_s = at_s;
-        let GivenTrajectory { trajectory, axes, .. } = &*handed.given;
-        let sample = trajectory.sample(at_s);
-        Some(TrajectorySample { states: axes.spread(sample.states), ..sample })
+        Some(handed.given.sample(at_s))
     }
 
     /// See [`takt_rt::HostInterface::keep_trajectories`].

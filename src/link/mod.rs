@@ -39,4 +39,4 @@ pub use serial_line::SerialLineError;
 pub use slcan::SlcanError;
 pub use socketcan::SocketCanError;
 pub(crate) use socketcan::SocketCanOptions;
-pub use trace::{Trace, TracedFrame, TracedHealth, TracedPort};
+pub use trace::{PortAnswer, PortMark, Trace, Traced, TracedFrame, TracedHealth, TracedPort};

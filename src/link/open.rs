@@ -67,6 +67,19 @@ pub enum OpenError {
     },
 }
 
+#[cfg(feature = "cli")]
+impl OpenError {
+    /// Whether another program has the serial line.
+    pub(crate) const fn is_line_taken(&self) -> bool {
+        matches!(
+            self,
+            Self::Slcan { error: SlcanError::Line(SerialLineError::Busy { .. }), .. }
+                | Self::Converter { error: ConverterError::Line(SerialLineError::Busy { .. }), .. }
+                | Self::Line { error: SerialLineError::Busy { .. }, .. }
+        )
+    }
+}
+
 /// Prepares an interface and opens a port on it, for the bus of this name.
 ///
 /// # Errors

@@ -5,7 +5,9 @@
 //! several pieces.
 
 use arrayvec::ArrayVec;
-use takt_rt::{BusHealth, BusPort, Frame, FrameKind, Id, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
+use takt_rt::{
+    BusHealth, BusPort, BusState, Frame, FrameKind, Id, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch,
+};
 
 use crate::channels::{Consumer, Producer, ring};
 
@@ -29,7 +31,50 @@ pub struct TracedHealth {
     pub health: BusHealth,
 }
 
-/// Up to eight bytes of a frame, with the header that is needed to put the frame together again.
+/// What a port has answered beside its frames, as far as it is out of the ordinary. A replay needs it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PortMark {
+    /// The time for which the port was asked.
+    pub at_ns: Nanoseconds,
+    /// What it has answered.
+    pub answer: PortAnswer,
+}
+
+/// An answer of a port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PortAnswer {
+    /// The frames behind this mark were handed over at this time, up to the next mark.
+    Received,
+    /// So many own frames had not been seen on the wire.
+    Unconfirmed(u64),
+    /// It took only so many of the frames that it was given.
+    Taken(u64),
+    /// The state of the bus was this from now on.
+    State(BusState),
+}
+
+/// What comes out of a [`Trace`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Traced {
+    /// A frame.
+    Frame(TracedFrame),
+    /// A mark between frames.
+    Mark(PortMark),
+}
+
+/// What a piece is of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum PieceOf {
+    Sent,
+    Received,
+    /// Marks: the number is in the bytes.
+    Delivery,
+    Unconfirmed,
+    Taken,
+    State,
+}
+
+/// Up to eight bytes of a frame, with the header that is needed to put the frame together again; or a mark.
 #[derive(Clone, Copy)]
 struct Piece {
     at_ns: Nanoseconds,
@@ -39,7 +84,7 @@ struct Piece {
     length: u8,
     /// Counted from 0.
     number: u8,
-    is_sent: bool,
+    of: PieceOf,
 }
 
 const PIECE_BYTES: usize = size_of::<u64>();
@@ -53,6 +98,8 @@ pub struct TracedPort<P> {
     pieces: Producer<Piece>,
     changes: Producer<TracedHealth>,
     told: BusHealth,
+    /// The state that the last mark has told.
+    marked: BusState,
     now_ns: Nanoseconds,
 }
 
@@ -73,8 +120,14 @@ pub fn traced<P: BusPort>(port: P, name: &str, capacity: usize) -> (TracedPort<P
     let (piece_in, piece_out) = ring(capacity);
     let (change_in, change_out) = ring(HEALTH_CHANGES);
     let name = name.split_whitespace().collect::<Vec<_>>().join("_");
-    let port =
-        TracedPort { port, pieces: piece_in, changes: change_in, told: BusHealth::default(), now_ns: 0 };
+    let port = TracedPort {
+        port,
+        pieces: piece_in,
+        changes: change_in,
+        told: BusHealth::default(),
+        marked: BusState::default(),
+        now_ns: 0,
+    };
     let payload = [0; Frame::MAX_BYTES];
     (port, Trace { name, pieces: piece_out, changes: change_out, begun: None, payload, broken: 0 })
 }
@@ -85,12 +138,31 @@ impl Trace {
         &self.name
     }
 
-    /// Takes the oldest frame.
+    /// Takes the oldest frame, and passes over the marks before it.
     pub fn take(&mut self) -> Option<TracedFrame> {
         loop {
+            if let Traced::Frame(frame) = self.take_any()? {
+                return Some(frame);
+            }
+        }
+    }
+
+    /// Takes the oldest frame or mark.
+    pub fn take_any(&mut self) -> Option<Traced> {
+        loop {
             let piece = self.pieces.pop()?;
+            let at_ns = piece.at_ns;
+            let mark = |answer| Some(Traced::Mark(PortMark { at_ns, answer }));
+            let is_sent = match piece.of {
+                PieceOf::Sent => true,
+                PieceOf::Received => false,
+                PieceOf::Delivery => return mark(PortAnswer::Received),
+                PieceOf::Unconfirmed => return mark(PortAnswer::Unconfirmed(piece.bytes)),
+                PieceOf::Taken => return mark(PortAnswer::Taken(piece.bytes)),
+                PieceOf::State => return mark(PortAnswer::State(state_of(piece.bytes))),
+            };
             if let Some(frame) = self.put_together(&piece) {
-                return Some(TracedFrame { at_ns: piece.at_ns, is_sent: piece.is_sent, frame });
+                return Some(Traced::Frame(TracedFrame { at_ns, is_sent, frame }));
             }
         }
     }
@@ -135,8 +207,26 @@ impl Trace {
     }
 }
 
+/// The state with this number.
+fn state_of(number: u64) -> BusState {
+    let states = [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
+    states.into_iter().find(|state| *state as u64 == number).unwrap_or_default()
+}
+
 impl<P> TracedPort<P> {
-    fn trace(&mut self, at_ns: Nanoseconds, is_sent: bool, frame: &Frame) {
+    fn mark(&mut self, at_ns: Nanoseconds, of: PieceOf, bytes: u64) -> bool {
+        self.pieces.push(Piece {
+            at_ns,
+            bytes,
+            id: Id::canopen(0, 0),
+            kind: FrameKind::Data,
+            length: 0,
+            number: 0,
+            of,
+        })
+    }
+
+    fn trace(&mut self, at_ns: Nanoseconds, of: PieceOf, frame: &Frame) {
         let mut piece = Piece {
             at_ns,
             bytes: frame.first_word(),
@@ -144,7 +234,7 @@ impl<P> TracedPort<P> {
             kind: frame.kind(),
             length: frame.length() as u8,
             number: 0,
-            is_sent,
+            of,
         };
         if !self.pieces.push(piece) || frame.length() <= PIECE_BYTES {
             return;
@@ -162,6 +252,15 @@ impl<P> TracedPort<P> {
 }
 
 impl<P> TracedPort<P> {
+    fn trace_sent(&mut self, now_ns: Nanoseconds, frames: &[Frame], taken: usize) {
+        for frame in frames.iter().take(taken) {
+            self.trace(now_ns, PieceOf::Sent, frame);
+        }
+        if taken < frames.len() {
+            self.mark(now_ns, PieceOf::Taken, taken as u64);
+        }
+    }
+
     /// The port within.
     pub fn inner_mut(&mut self) -> &mut P {
         &mut self.port
@@ -171,9 +270,7 @@ impl<P> TracedPort<P> {
 impl<P: BusPort> BusPort for TracedPort<P> {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
         let taken = self.port.send(now_ns, frames);
-        for frame in frames.iter().take(taken) {
-            self.trace(now_ns, true, frame);
-        }
+        self.trace_sent(now_ns, frames, taken);
         taken
     }
 
@@ -185,9 +282,7 @@ impl<P: BusPort> BusPort for TracedPort<P> {
         });
         P::send_together(now_ns, &mut within.take(MAX_BUSES).collect::<ArrayVec<_, MAX_BUSES>>());
         for entry in outgoing {
-            for frame in entry.frames.iter().take(*entry.taken) {
-                entry.port.trace(now_ns, true, frame);
-            }
+            entry.port.trace_sent(now_ns, entry.frames, *entry.taken);
         }
     }
 
@@ -195,17 +290,27 @@ impl<P: BusPort> BusPort for TracedPort<P> {
         let before = batch.len();
         self.port.receive(now_ns, batch);
         self.now_ns = now_ns;
+        if batch.len() > before {
+            self.mark(now_ns, PieceOf::Delivery, 0);
+        }
         for received in batch.iter().skip(before) {
-            self.trace(received.at_ns, false, &received.frame);
+            self.trace(received.at_ns, PieceOf::Received, &received.frame);
         }
     }
 
     fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
-        self.port.unconfirmed(now_ns)
+        let unconfirmed = self.port.unconfirmed(now_ns);
+        if unconfirmed > 0 {
+            self.mark(now_ns, PieceOf::Unconfirmed, unconfirmed as u64);
+        }
+        unconfirmed
     }
 
     fn health(&mut self) -> BusHealth {
         let health = self.port.health();
+        if health.state != self.marked && self.mark(self.now_ns, PieceOf::State, health.state as u64) {
+            self.marked = health.state;
+        }
         let of_interest =
             |health: &BusHealth| (health.state, health.errors, health.tx_overruns, health.rx_overruns);
         if of_interest(&health) != of_interest(&self.told)
@@ -220,7 +325,7 @@ impl<P: BusPort> BusPort for TracedPort<P> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_rt::{BusState, Id, Received};
+    use takt_rt::Received;
 
     /// Takes two frames at a time, and has received one frame at each instant.
     struct Narrow;

@@ -13,14 +13,18 @@ use super::black_box::{BlackBox, BlackBoxOptions, Incident, reason};
 use super::candump::CandumpLog;
 use super::destination::RecordingDestination;
 use super::history::OnBus;
+use super::journal_keeper::JournalKeeper;
 use super::listener::{Listener, Notify};
+use super::loop_timing::ShownTimingWriter;
 use super::machine::Machine;
 use super::recording::Recording;
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use super::words;
 use crate::channels::LogSide;
-use crate::link::trace::Trace;
+use crate::config::ConfigSources;
+use crate::journal::RunJournal;
+use crate::link::trace::{Trace, Traced};
 use crate::printable::printable_path;
 
 /// What is to be done with the record of each cycle.
@@ -100,7 +104,9 @@ pub struct Logger {
     candump: Option<CandumpLog>,
     black_box: Option<BlackBox>,
     each_cycle: Option<EachCycle>,
+    timing: Option<ShownTimingWriter>,
     traces: Vec<Trace>,
+    journal: Option<JournalKeeper>,
     paths: [Option<PathBuf>; 2],
     not_written: Vec<String>,
     listener: Listener,
@@ -122,7 +128,9 @@ impl Logger {
             candump: None,
             black_box,
             each_cycle: None,
+            timing: None,
             traces,
+            journal: None,
             paths: [None, None],
             not_written: Vec::new(),
             listener: Listener::new(notify),
@@ -147,6 +155,29 @@ impl Logger {
     #[must_use]
     pub(crate) fn with_each_cycle(self, each_cycle: Option<EachCycle>) -> Self {
         Self { each_cycle, ..self }
+    }
+
+    /// Also writes the journal of the run into the recording, if there is one, and the files of its configuration.
+    #[must_use]
+    pub(crate) fn with_journal(mut self, journal: Option<RunJournal>, sources: &ConfigSources) -> Self {
+        let written = match &mut self.recording {
+            None => return self,
+            Some(recording) => recording.begin_journal(sources),
+        };
+        match written {
+            Ok(()) => self.journal = journal.map(JournalKeeper::new),
+            Err(error) => {
+                let failure = self.recording.take().map(|recording| (recording.label, error));
+                self.end_recording(failure);
+            }
+        }
+        self
+    }
+
+    /// Also counts the times of each cycle, and shows the counts.
+    #[must_use]
+    pub(crate) fn with_timing(self, timing: ShownTimingWriter) -> Self {
+        Self { timing: Some(timing), ..self }
     }
 
     fn begin_recording(&mut self, destination: RecordingDestination, stem: &str, wall_clock: WallClock) {
@@ -181,6 +212,7 @@ impl Logger {
     pub fn drain(&mut self) -> usize {
         self.drain_traces();
         let taken = self.drain_records() + self.drain_events();
+        self.drain_journal();
         if let Some(message) = self.black_box.as_mut().and_then(BlackBox::take_failure) {
             self.report_failure(message);
         }
@@ -192,6 +224,9 @@ impl Logger {
         let mut failure = None;
         while let Some(written) = self.source.next_record(|record| {
             self.statistics.add(record);
+            if let Some(timing) = &mut self.timing {
+                timing.add(&record.timing);
+            }
             if let Some(each_cycle) = &mut self.each_cycle {
                 each_cycle(record);
             }
@@ -204,6 +239,9 @@ impl Logger {
             if let Err(error) = written {
                 failure = self.recording.take().map(|recording| (recording.label, error));
             }
+        }
+        if let Some(timing) = self.timing.as_mut().filter(|_| taken > 0) {
+            timing.show();
         }
         self.end_recording(failure);
         taken
@@ -251,7 +289,11 @@ impl Logger {
 
     fn drain_traces(&mut self) {
         for (bus, trace) in self.traces.iter_mut().enumerate() {
-            while let Some(what) = trace.take() {
+            while let Some(traced) = trace.take_any() {
+                if let Some(journal) = &mut self.journal {
+                    journal.port(bus, &traced);
+                }
+                let Traced::Frame(what) = traced else { continue };
                 let frame = OnBus { bus, what };
                 if let Some(black_box) = &mut self.black_box {
                     black_box.frame(&frame);
@@ -275,12 +317,25 @@ impl Logger {
         }
     }
 
+    fn drain_journal(&mut self) {
+        let (Some(journal), Some(recording)) = (&mut self.journal, &mut self.recording) else { return };
+        let Some(block) = journal.drain() else { return };
+        if let Err(error) = recording.journal(&block) {
+            let failure = self.recording.take().map(|recording| (recording.label, error));
+            self.end_recording(failure);
+        }
+    }
+
     /// Processes the rest and closes the files.
     pub fn finish(mut self) -> LogSummary {
         self.drain();
         if let Some(recording) = self.recording.take() {
             let label = recording.label.clone();
-            match recording.finish() {
+            let lost = self
+                .journal
+                .as_ref()
+                .map(|journal| journal.dropped() + self.traces.iter().map(Trace::dropped).sum::<u64>());
+            match recording.finish_with(lost) {
                 Ok(()) => announce::closed("recording", &label),
                 Err(error) => self.report_failure(format!(
                     "the recording is incomplete: cannot write {label}: {}",

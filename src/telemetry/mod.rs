@@ -15,8 +15,10 @@ mod candump;
 mod cdr;
 mod destination;
 mod history;
+mod journal_keeper;
 mod listener;
 mod logger;
+mod loop_timing;
 mod machine;
 mod messages;
 mod own_errors;
@@ -25,6 +27,8 @@ mod recorded;
 mod recording;
 mod recording_report;
 pub(crate) mod render;
+#[cfg(feature = "cli")]
+mod replay_recording;
 mod report;
 mod statistics;
 pub(crate) mod thread;
@@ -33,18 +37,25 @@ pub(crate) mod words;
 
 pub use crate::channels::LogSide;
 pub use black_box::{BlackBoxOptions, Incident};
+pub use cdr::{CdrDecoder, CdrEncoder};
 pub use destination::RecordingDestination;
 pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
+pub(crate) use loop_timing::{LOOP_TIMING_WORDS, ShownTiming, newest_timing, shown_timing};
+pub use loop_timing::{LoopTiming, TIME_BOUNDS_NS, TimeCounts};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use recorded::frames as recorded_frames;
 pub use recorded::{
     Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, RecordedFrame, RecordedFrames, WalkError,
 };
+#[cfg(feature = "cli")]
+pub(crate) use recorded::{RecordedJournal, journal as recorded_journal};
 pub use recording_report::{
     AxisCycle, AxisCycles, AxisSummary, BusChange, GroupSummary, RecordingReport, ReportedEvent,
 };
 pub use render::Emphasis;
+#[cfg(feature = "cli")]
+pub(crate) use replay_recording::ReplayRecording;
 pub use report::{
     AxisReport, BusReport, GroupReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport,
     SetPointParts, StopReport, TelemetryReport,

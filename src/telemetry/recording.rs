@@ -18,6 +18,7 @@ use super::machine::Machine;
 use super::messages::{self, MessageType};
 use super::own_errors;
 use super::wall_clock::WallClock;
+use crate::config::ConfigSources;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
 /// A chunk is written to the file as a whole. It holds a third of a second of six axes at 1 ms. A crash of the computer
@@ -26,6 +27,19 @@ const CHUNK_BYTES: u64 = 256 * 1024;
 
 /// The name of the metadata record that describes the machine.
 pub const METADATA: &str = "takt";
+
+/// The version of the format of the journal, in the metadata of its channel.
+pub const JOURNAL_VERSION: &str = "1";
+/// The metadata record at the end of a journal.
+pub const JOURNAL_END: &str = "journal end";
+/// The metadata record that names the file of the configuration, and the interfaces that replace those of the file.
+pub const CONFIGURATION: &str = "configuration";
+/// Its key for the file.
+pub const MAIN_FILE: &str = "file";
+/// What is before the name of a bus in its keys for interfaces.
+pub const INTERFACE_OF: &str = "interface of ";
+/// The metadata record with the files of the configuration.
+pub const CONFIGURATION_FILES: &str = "configuration files";
 
 /// The name of the group of all axes, where no groups are configured.
 const ONLY_GROUP: &str = "all";
@@ -42,6 +56,9 @@ pub struct Recording {
     group_channels: Vec<u16>,
     axis_channels: Vec<u16>,
     bus_channels: Vec<BusChannels>,
+    journal_channel: Option<u16>,
+    /// The time of the last message.
+    last_time: u64,
     /// Whether a group was stopping in the last cycle.
     was_stopping: bool,
 }
@@ -113,8 +130,36 @@ impl Recording {
             group_channels,
             axis_channels,
             bus_channels: Vec::new(),
+            journal_channel: None,
+            last_time: 0,
             was_stopping: false,
         })
+    }
+
+    /// Adds the channel of the journal, and the files that the configuration was made of.
+    pub fn begin_journal(&mut self, sources: &ConfigSources) -> McapResult<()> {
+        let metadata = BTreeMap::from([("journal".to_owned(), JOURNAL_VERSION.to_owned())]);
+        self.journal_channel = Some(self.writer.add_channel(0, "/journal", "takt-journal", &metadata)?);
+        if let Some(main) = &sources.main {
+            let overrides = sources
+                .interfaces
+                .iter()
+                .map(|(bus, interface)| (format!("{INTERFACE_OF}{bus}"), interface.clone()));
+            let main = (MAIN_FILE.to_owned(), main.display().to_string());
+            self.metadata(CONFIGURATION, overrides.chain([main]).collect())?;
+            let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+            let files = sources.files.iter().map(|(path, bytes)| (path.display().to_string(), text(bytes)));
+            self.metadata(CONFIGURATION_FILES, files.collect())?;
+        }
+        self.writer.flush()
+    }
+
+    /// Writes a block of the journal.
+    pub fn journal(&mut self, block: &[u8]) -> McapResult<()> {
+        let Some(channel_id) = self.journal_channel else { return Ok(()) };
+        let time = self.last_time;
+        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
+        self.writer.write_to_known_channel(&header, block)
     }
 
     /// Adds the channels of the buses.
@@ -191,8 +236,17 @@ impl Recording {
 
     fn write(&mut self, channel_id: u16, slot: u64, at_ns: u64) -> McapResult<()> {
         let time = self.wall_clock.unix_ns(at_ns);
+        self.last_time = time;
         let header = MessageHeader { channel_id, sequence: slot as u32, log_time: time, publish_time: time };
         self.writer.write_to_known_channel(&header, self.encoder.bytes())
+    }
+
+    /// Writes the end of a recording with a journal, of which so many entries were lost.
+    pub fn finish_with(mut self, lost: Option<u64>) -> McapResult<()> {
+        if let Some(lost) = lost {
+            self.metadata(JOURNAL_END, BTreeMap::from([("lost".to_owned(), lost.to_string())]))?;
+        }
+        self.finish()
     }
 
     /// Writes the end: statistics and index.

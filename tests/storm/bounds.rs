@@ -2,6 +2,8 @@
 
 use takt::config::{Axis, Config, Protocol};
 
+use crate::off_cycle::is_beside_the_cycle;
+
 /// How far behind its set-point a joint may be that obeys.
 const LAG_S: f64 = 0.4;
 
@@ -27,7 +29,7 @@ pub fn planned_s(axes: &[Axis]) -> f64 {
 
 /// From the reason of a stop of these axes to rest of every joint that obeys.
 pub fn to_rest_s(axes: &[Axis]) -> f64 {
-    let has_rounds = axes.iter().any(|axis| axis.drive.protocol.own_identifiers().is_some());
+    let has_rounds = axes.iter().any(is_beside_the_cycle);
     planned_s(axes) + LAG_S + if has_rounds { 2.0 * ROUND_S } else { 0.0 }
 }
 

@@ -7,7 +7,7 @@ use takt::faults::Scenario;
 use crate::dice::Dice;
 use crate::machine;
 use crate::overload::Overload;
-use crate::weather::{KINDS, NEEDS_EROB, fault, fault_of_own_protocol, when};
+use crate::weather::{KINDS, NEEDS_EROB, fault, fault_of_own_protocol, fault_on_a_line, when};
 
 pub struct Case {
     pub config: Config,
@@ -131,6 +131,22 @@ impl Case {
         for _ in 0..dice.pick(&[0, 1, 1, 2, 3]) {
             let when = when(&mut dice, length_ms);
             case.text.push_str(&fault_of_own_protocol(&mut dice, &case.config, &when));
+        }
+        case.scenario = scenario(&case.text, &case.config);
+        if dice.chance(0.5) {
+            case.harden(&mut dice);
+        }
+        case
+    }
+
+    /// One on a machine with a drive on a serial line.
+    pub fn on_a_line(seed: u64) -> Self {
+        let mut dice = Dice::new(seed).split(u64::MAX - 9);
+        let mut case = Self::with(seed, Some(machine::on_a_line()));
+        let length_ms = (case.length * case.config.cycle.period_ns / 1_000_000) as usize;
+        for _ in 0..dice.pick(&[0, 1, 1, 2, 3]) {
+            let when = when(&mut dice, length_ms);
+            case.text.push_str(&fault_on_a_line(&mut dice, &case.config, &when));
         }
         case.scenario = scenario(&case.text, &case.config);
         if dice.chance(0.5) {

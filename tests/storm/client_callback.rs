@@ -4,6 +4,7 @@ use takt::VirtualRun;
 use takt::config::{Axis, Compliance, Config, Control};
 use takt::internals::RunInside;
 use takt::internals::channels::GivenCallback;
+use takt::internals::link::trace::TracedPort;
 use takt::{CallbackCommand, CallbackCycle, CallbackState};
 use takt_rt::{AxisLimits, CallbackId, CallbackRun, Follow, Phase, Snapshot};
 
@@ -24,7 +25,7 @@ impl CallbackClient {
     }
 
     /// Asks for a callback now and then, mostly when it can begin, and says how long calls take in the next cycle.
-    pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<Tap>) {
+    pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<TracedPort<Tap>>) {
         let spent_ns = if self.dice.chance(0.002) { 2 * BUDGET_NS } else { BUDGET_NS };
         run.take_for_callbacks(spent_ns);
         let group = self.dice.below(snapshot.groups().len());

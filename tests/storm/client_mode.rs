@@ -3,6 +3,7 @@
 use takt::VirtualRun;
 use takt::config::{Axis, Config, Control};
 use takt::internals::RunInside;
+use takt::internals::link::trace::TracedPort;
 use takt_rt::{MAX_AXES, ModeChange, OperationMode, Phase, Request, RequestTarget, Snapshot};
 
 use crate::dice::Dice;
@@ -45,7 +46,7 @@ impl ModeClient {
         Self { dice }
     }
 
-    pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<Tap>) {
+    pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<TracedPort<Tap>>) {
         let group = self.dice.below(config.groups.len().max(1));
         let target =
             if config.groups.is_empty() { RequestTarget::All } else { RequestTarget::Group(group as u8) };

@@ -7,6 +7,7 @@ use takt::VirtualRun;
 use takt::config::{Axis, Config};
 use takt::internals::RunInside;
 use takt::internals::channels::{GivenTrajectory, GroupAxes};
+use takt::internals::link::trace::TracedPort;
 use takt::trajectory::{Trajectory, TrajectoryConditions, TrajectoryPoint};
 use takt_rt::plan::State;
 use takt_rt::{
@@ -41,7 +42,7 @@ impl TrajectoryClient {
     }
 
     /// Asks for a trajectory now and then, mostly when it can begin.
-    pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<Tap>) {
+    pub fn act(&mut self, config: &Config, snapshot: &Snapshot, run: &mut VirtualRun<TracedPort<Tap>>) {
         let answers = &snapshot.answers;
         self.begun +=
             self.awaited.iter().filter(|request| answers.of(**request) == Answer::Granted).count() as u64;

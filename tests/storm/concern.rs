@@ -11,6 +11,7 @@ use takt::schedule::analyse;
 use takt::sim::Defect;
 
 use crate::heartbeat::MissedHeartbeat;
+use crate::off_cycle::is_beside_the_cycle;
 
 /// What can no longer be expected of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -103,8 +104,7 @@ impl Concerns {
         // What a controller that is alive keeps to: see the budget of the family.
         const PUNCTUAL_CYCLES: u64 = 2;
         for (concern, axis) in self.by_axis.iter_mut().zip(&config.axes) {
-            concern.is_neglected =
-                cycles > PUNCTUAL_CYCLES && axis.drive.protocol.own_identifiers().is_some();
+            concern.is_neglected = cycles > PUNCTUAL_CYCLES && is_beside_the_cycle(axis);
         }
     }
 
@@ -167,7 +167,9 @@ impl Concerns {
 
 /// What cannot be expected of a joint from the first.
 fn without_fault(axis: &Axis) -> Concern {
-    Concern { is_unwatched: !axis.drive.consumes_heartbeat, ..Concern::default() }
+    // A drive on a line has a communication time-out of its own.
+    let is_watched = axis.drive.consumes_heartbeat || axis.drive.protocol.is_of_serial_line();
+    Concern { is_unwatched: !is_watched, ..Concern::default() }
 }
 
 fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {

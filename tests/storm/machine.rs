@@ -33,6 +33,8 @@ const SHIPPED: [&str; 15] = [
 const OF_BIT_FIELDS: [&str; 3] = ["damiao-arm", "hollow-leg-fd", "hollow-arm"];
 /// One drive that is spoken to outside of the cycle.
 const TURNTABLE: &str = "turntable-erob-can";
+/// One on a serial line, beside an arm on a CAN bus.
+const ON_A_LINE: &str = "turntable-modbus";
 /// Drives that are spoken to outside of the cycle, beside one that is spoken to in it.
 const TURNTABLES: &str = r#"
 name = "turntables"
@@ -101,7 +103,7 @@ pub fn load(name: &str) -> Config {
         SHIPPED
             .into_iter()
             .chain(OF_BIT_FIELDS)
-            .chain([CROWD, TURNTABLE])
+            .chain([CROWD, TURNTABLE, ON_A_LINE])
             .map(|name| (name, read(name)))
             .collect()
     };
@@ -143,6 +145,11 @@ pub fn of_off_cycle(dice: &mut Dice) -> Config {
         }
     }
     config
+}
+
+/// One with a drive on a serial line.
+pub fn on_a_line() -> Config {
+    load(ON_A_LINE)
 }
 
 /// One whose drives are spoken to by bit fields.

@@ -21,7 +21,9 @@ mod invariants;
 mod machine;
 mod off_cycle;
 mod overload;
+mod recorder;
 mod regressions;
+mod replay;
 mod run;
 mod table;
 mod tap;
@@ -57,6 +59,8 @@ const BIT_FIELD_CASES: u64 = 600;
 const OVERLOADED_BIT_FIELD_CASES: u64 = 200;
 /// Of storms over drives that are spoken to outside of the cycle.
 const OFF_CYCLE_CASES: u64 = 300;
+/// Of storms over a drive on a serial line.
+const LINE_CASES: u64 = 200;
 /// A shard ends after so many failures.
 const FAILURES_AT_MOST: usize = 5;
 
@@ -181,6 +185,11 @@ fn the_invariants_hold_for_drives_of_bit_fields_on_a_machine_with_too_little_tim
 #[test]
 fn the_invariants_hold_for_off_cycle_drives() {
     play_all("off cycle", OFF_CYCLE_CASES, Case::of_off_cycle);
+}
+
+#[test]
+fn the_invariants_hold_for_a_drive_on_a_serial_line() {
+    play_all("on a line", LINE_CASES, Case::on_a_line);
 }
 
 #[test]

@@ -1,11 +1,17 @@
 //! What is sent to drives that are spoken to outside of the cycle.
 
-use takt::config::Config;
+use takt::config::{Axis, Config};
 use takt::internals::erob_can::entries;
 use takt::internals::erob_can::frame::ReceivedRequest;
 use takt_rt::Frame;
 
-/// Every such drive: its bus, its node, and the highest velocity that it may be told, in counts/s.
+/// Whether the drive of an axis is spoken to outside of the cycle.
+pub fn is_beside_the_cycle(axis: &Axis) -> bool {
+    let protocol = axis.drive.protocol;
+    protocol.own_identifiers().is_some() || protocol.is_of_serial_line()
+}
+
+/// Every such drive on a CAN bus: its bus, its node, and the highest velocity that it may be told, in counts/s.
 pub struct OffCycle {
     drives: Vec<(usize, u8, f64)>,
 }

@@ -4,6 +4,7 @@
 use takt::VirtualRun;
 use takt::config::Config;
 use takt::internals::RunInside;
+use takt::internals::link::trace::TracedPort;
 
 use crate::concern::Concerns;
 use crate::dice::Dice;
@@ -105,7 +106,13 @@ impl Overload {
     }
 
     /// What lies ahead of the next cycle.
-    pub fn act(&self, cycle: u64, dice: &mut Dice, run: &mut VirtualRun<Tap>, concerns: &mut Concerns) {
+    pub fn act(
+        &self,
+        cycle: u64,
+        dice: &mut Dice,
+        run: &mut VirtualRun<TracedPort<Tap>>,
+        concerns: &mut Concerns,
+    ) {
         if let Some(ns) = self.computing.draw(dice) {
             run.clock().compute_for(ns);
         }
@@ -124,7 +131,7 @@ impl Overload {
             concerns.clog(clog.bus, now_ns, clog.cycles == FOR_EVER);
         }
         for (bus, port) in run.ports().iter_mut().enumerate() {
-            port.is_clogged = self.clogs.iter().any(|clog| clog.bus == bus && clog.is_on(cycle));
+            port.inner_mut().is_clogged = self.clogs.iter().any(|clog| clog.bus == bus && clog.is_on(cycle));
         }
     }
 }

@@ -313,6 +313,18 @@ const FAILED_WITH_BIT_FIELDS: [(u64, &str); 7] = [
     (4_000_594, "A joint without a brake coasted after its run, which the storm had not watched for so long"),
 ];
 
+/// Seeds of storms over drives that are spoken to outside of the cycle that have failed.
+const FAILED_OFF_CYCLE: [(u64, &str); 1] =
+    [(2_000_080, "A bus that was behind for good kept the command to disable from the drive")];
+
+#[test]
+fn storms_that_have_failed_with_off_cycle_drives_pass() {
+    for (seed, what) in FAILED_OFF_CYCLE {
+        let played = play(&Case::of_off_cycle(seed));
+        assert!(played.is_ok(), "{seed}, {what}: {played:?}");
+    }
+}
+
 #[test]
 fn storms_that_have_failed_with_bit_fields_pass() {
     for (seed, what) in FAILED_WITH_BIT_FIELDS {

@@ -1,18 +1,20 @@
 //! One case from power-up to the end.
 
+use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use takt::Port;
 use takt::config::{Axis, Config};
 use takt::faults::{FaultInjector, Scenario, ScenarioFault};
 use takt::internals::RunInside;
 use takt::internals::channels::LogSide;
-use takt::sim::{Observation, SimulatedBus};
+use takt::internals::journal::Journal;
+use takt::internals::link::trace::{Trace, TracedPort, traced};
+use takt::sim::Observation;
 use takt::{Outcome, VirtualRun};
 use takt_rt::{
-    Answer, BusPort, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request, RequestId,
-    RequestTarget, Rule, Snapshot, StreamState,
+    Answer, BusPort, CycleRecord, DriveState, Event, EventKind, Frame, Phase, ReceiveBatch, Request,
+    RequestId, RequestTarget, Rule, Snapshot, StreamState,
 };
 
 use crate::case::Case;
@@ -26,9 +28,12 @@ use crate::fingerprint::Fingerprint;
 use crate::heartbeat::Heartbeats;
 use crate::invariants::{Invariants, REST, Seen};
 use crate::off_cycle::OffCycle;
+use crate::recorder::Recorder;
 use crate::tap::Tap;
 use crate::wire::Wire;
 
+/// What passes a port in one cycle, and more. What nobody takes is dropped.
+const TRACED_PIECES: usize = 1 << 12;
 /// Bring-up, shutdown and all time-outs of the life cycle together.
 const END_AT_MOST_S: f64 = 45.0;
 /// A YZ-AIM whose communication has been reset watches the controller for its factory setting of 2 s; then it stops.
@@ -38,7 +43,10 @@ const RESET_CYCLES: u64 = 60;
 
 /// A controller in virtual time of which everything is seen.
 pub struct World {
-    pub run: VirtualRun<Tap>,
+    pub run: VirtualRun<TracedPort<Tap>>,
+    /// Writes the journal of the run, if it is to be replayed.
+    recorder: Option<Recorder>,
+    traces: Vec<Trace>,
     pub log: LogSide,
     pub fault_injector: Arc<FaultInjector>,
     pub snapshot: Snapshot,
@@ -56,15 +64,33 @@ impl World {
 
     fn with(config: &Config, scenario: &Scenario, is_serving: bool) -> Self {
         let fault_injector = Arc::new(FaultInjector::new(scenario.clone()));
-        let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
-        let ports =
-            (0..config.buses.len()).map(|bus| Tap::new(fault_injector.wrap(bus, simulated(bus)))).collect();
-        let made =
-            if is_serving { VirtualRun::serving(config, ports) } else { VirtualRun::new(config, ports) };
-        let (run, log) = made.unwrap();
+        let traces = RefCell::new(vec![]);
+        let tapped = |port| {
+            let (port, trace) = traced(Tap::new(port), "bus", TRACED_PIECES);
+            traces.borrow_mut().push(trace);
+            port
+        };
+        let (run, log) = <VirtualRun<TracedPort<Tap>> as RunInside<TracedPort<Tap>>>::faulty(
+            config,
+            &fault_injector,
+            is_serving,
+            tapped,
+        )
+        .unwrap();
+        let traces = traces.into_inner();
         let snapshot = run.snapshot();
         let sent = vec![vec![]; config.buses.len()];
-        Self { run, log, fault_injector, snapshot, sent, truth: vec![], events: vec![] }
+        Self {
+            run,
+            recorder: None,
+            traces,
+            log,
+            fault_injector,
+            snapshot,
+            sent,
+            truth: vec![],
+            events: vec![],
+        }
     }
 
     /// One cycle. Returns whether the run goes on.
@@ -75,16 +101,41 @@ impl World {
         let ports = self.run.ports();
         for (sent, port) in self.sent.iter_mut().zip(ports.iter_mut()) {
             sent.clear();
-            std::mem::swap(sent, &mut port.sent);
+            std::mem::swap(sent, &mut port.inner_mut().sent);
         }
         self.truth.clear();
-        let at_ns = self.snapshot.at_ns;
-        self.truth.extend(config.axes.iter().map(|axis| ports[axis.bus].observe(at_ns, axis.node)));
+        for axis in &config.axes {
+            let truth = self.observe(axis, self.snapshot.at_ns);
+            self.truth.push(truth);
+        }
         self.events.clear();
         while let Some(event) = self.log.take_event() {
             self.events.push(event);
         }
+        if let Some(recorder) = &mut self.recorder {
+            recorder.drain(&mut self.traces);
+        }
         goes_on
+    }
+
+    /// The truth about the drive of an axis at this time.
+    fn observe(&mut self, axis: &Axis, at_ns: u64) -> Observation {
+        match self.run.line(axis.bus) {
+            Some(line) => line.lock().observe(axis.node).unwrap(),
+            None => self.run.ports()[axis.bus].inner_mut().observe(at_ns, axis.node),
+        }
+    }
+
+    /// Lets the drives go on to this time, though nobody speaks to them.
+    fn leave_alone_until(&mut self, now_ns: u64) {
+        let mut batch = ReceiveBatch::new();
+        for port in self.run.ports() {
+            batch.clear();
+            port.receive(now_ns, &mut batch);
+        }
+        for line in (0..self.sent.len()).filter_map(|bus| self.run.line(bus)) {
+            line.lock().receive(now_ns);
+        }
     }
 }
 
@@ -127,8 +178,26 @@ pub struct Done {
 /// # Errors
 /// The invariant that does not hold, and when.
 pub fn play(case: &Case) -> Result<Done, String> {
+    play_in(&mut World::with(&case.config, &case.scenario, case.is_serving), case)
+}
+
+/// Plays a case, and returns its journal and its records.
+///
+/// # Errors
+/// As [`play`].
+pub fn record(case: &Case) -> Result<(Journal, Vec<CycleRecord>), String> {
+    let mut world = World::with(&case.config, &case.scenario, case.is_serving);
+    world.recorder = Some(Recorder::new(world.run.journal()));
+    play_in(&mut world, case)?;
+    let recorder = world.recorder.ok_or("the recorder is there from the beginning")?;
+    match recorder.lost {
+        0 => Ok((recorder.journal, recorder.records)),
+        lost => Err(format!("{lost} entries of the journal were lost")),
+    }
+}
+
+fn play_in(world: &mut World, case: &Case) -> Result<Done, String> {
     let config = &case.config;
-    let mut world = World::with(config, &case.scenario, case.is_serving);
     let fault_injector = Arc::clone(&world.fault_injector);
     let mut invariants = Invariants::new(config);
     let off_cycle = OffCycle::new(config);
@@ -186,10 +255,13 @@ pub fn play(case: &Case) -> Result<Done, String> {
         }));
         clients.note_answers(&world.snapshot);
         changed_cycles += u64::from(moves_in_other_mode(config, &world.snapshot));
-        fingerprint.take_cycle(&world);
-        let World { log, snapshot, truth, events, .. } = &mut world;
+        fingerprint.take_cycle(world);
+        let World { log, snapshot, truth, events, recorder, .. } = &mut *world;
         let mut look = |record: &_| {
             fingerprint.take_record(record);
+            if let Some(recorder) = recorder {
+                recorder.records.push(*record);
+            }
             invariants.check(&Seen {
                 config,
                 groups: &groups,
@@ -220,14 +292,14 @@ pub fn play(case: &Case) -> Result<Done, String> {
         }
         let is_raging = enabled.is_some_and(|enabled| cycles < enabled + case.length);
         let is_open = is_raging || enabled.is_some() && case.hardship.are_clients_stubborn;
-        clients.act(case, &mut world, is_open);
+        clients.act(case, world, is_open);
         case.overload.act(cycles, &mut overload_dice, &mut world.run, &mut concerns);
         for (_, late_ns) in case.hardship.stalls.iter().filter(|(cycle, _)| *cycle == cycles) {
             concerns.pause();
             world.run.clock().stall(*late_ns);
         }
     }
-    at_rest(case, &mut concerns, &mut world, &was_stopped)?;
+    at_rest(case, &mut concerns, world, &was_stopped)?;
     let is_bring_up_failed = matches!(world.run.supervisor().outcome(), Some(Outcome::BringUpFailed(_)));
     let trajectories = clients.trajectories.map_or(0, |client| client.begun);
     let fingerprint = fingerprint.value();
@@ -380,17 +452,13 @@ fn at_rest(
         .map(|axis| was_stopped[axis] && concerns.is_misled_now(&world.fault_injector, axis))
         .collect();
     let rest_ns = end_ns + WATCHDOG_MS * 1_000_000;
-    let mut batch = ReceiveBatch::new();
-    for now_ns in (1..=WATCHDOG_MS).map(|passed_ms| end_ns + passed_ms * 1_000_000) {
-        for port in world.run.ports() {
-            batch.clear();
-            port.receive(now_ns, &mut batch);
-        }
+    for passed_ms in 1..=WATCHDOG_MS {
+        world.leave_alone_until(end_ns + passed_ms * 1_000_000);
     }
     // A fault may have begun in that time.
     concerns.observe(&world.fault_injector, |_| ());
     for ((axis, concern), is_restarted) in case.config.axes.iter().zip(&concerns.by_axis).zip(is_restarted) {
-        let truth = world.run.ports()[axis.bus].observe(rest_ns, axis.node);
+        let truth = world.observe(axis, rest_ns);
         // Set-points of another master enable a drive again whose node somebody has started.
         let is_driven = truth.state == DriveState::OperationEnabled && !concern.is_driven_by_others;
         // Nothing stops a drive that has no watchdog any more and that no frame ever reaches again as it was sent.

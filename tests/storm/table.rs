@@ -20,8 +20,13 @@ use crate::run::World;
 use crate::weather::{KINDS, fault};
 
 /// The machines on which reactions are measured, one of each family and kind, and how many kinds of fault stop each at least.
-const MACHINES: [(&str, usize); 4] =
-    [("arm6-erob", 20), ("gantry-yz-aim", 10), ("damiao-arm", 8), ("turntable-erob-can", 8)];
+const MACHINES: [(&str, usize); 5] = [
+    ("arm6-erob", 20),
+    ("gantry-yz-aim", 10),
+    ("damiao-arm", 8),
+    ("turntable-erob-can", 8),
+    ("turntable-modbus", 8),
+];
 /// Slower than this fraction of its velocity limit is rest.
 const REST: f64 = 0.004;
 /// Six seconds of motion, and the end.

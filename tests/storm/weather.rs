@@ -84,13 +84,24 @@ pub fn fault(dice: &mut Dice, config: &Config, kind: &str, when: &str) -> String
     format!("[[fault]]\nkind = \"{kind}\"\n{place}\n{keys}\n{when}\n{lasts}\n")
 }
 
-/// One fault that concerns a drive with a protocol of its own: the pre-defined connection set has no functions for its frames, and what it
-/// is asked and replies may be later than a few cycles.
+/// One fault that concerns a drive with a protocol of its own: the pre-defined connection set has no functions for its frames.
 pub fn fault_of_own_protocol(dice: &mut Dice, config: &Config, when: &str) -> String {
-    let own: Vec<&Axis> =
-        config.axes.iter().filter(|axis| axis.drive.protocol.own_identifiers().is_some()).collect();
+    const KINDS: [&str; 7] = ["drop", "delay", "duplicate", "corrupt", "reboot", "torque-off", "stuck-sdo"];
+    let own = config.axes.iter().filter(|axis| axis.drive.protocol.own_identifiers().is_some()).collect();
+    fault_beside_the_cycle(dice, own, &KINDS, when)
+}
+
+/// One fault that concerns a drive on a serial line.
+pub fn fault_on_a_line(dice: &mut Dice, config: &Config, when: &str) -> String {
+    const KINDS: [&str; 6] = ["drop", "delay", "corrupt", "reboot", "torque-off", "stuck-sdo"];
+    let own = config.axes.iter().filter(|axis| axis.drive.protocol.is_of_serial_line()).collect();
+    fault_beside_the_cycle(dice, own, &KINDS, when)
+}
+
+/// One fault of these kinds of one of these axes. What its drive is asked and replies may be later than a few cycles.
+fn fault_beside_the_cycle(dice: &mut Dice, own: Vec<&Axis>, kinds: &[&str], when: &str) -> String {
     let axis = &own[dice.below(own.len())].name;
-    let kind = dice.pick(&["drop", "delay", "duplicate", "corrupt", "reboot", "torque-off", "stuck-sdo"]);
+    let kind = dice.pick(kinds);
     let mut keys = vec![format!("kind = \"{kind}\"\naxis = \"{axis}\"\n{when}")];
     let is_event = matches!(kind, "reboot" | "torque-off");
     if matches!(kind, "drop" | "delay" | "duplicate" | "corrupt") {

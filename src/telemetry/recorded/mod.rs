@@ -2,6 +2,8 @@
 
 mod cause;
 mod frames;
+#[cfg(feature = "cli")]
+mod journal;
 mod records;
 mod walk;
 
@@ -30,6 +32,8 @@ use records::Record;
 
 pub use cause::Cause;
 pub use frames::{RecordedFrame, RecordedFrames, frames};
+#[cfg(feature = "cli")]
+pub use journal::{RecordedJournal, journal};
 pub use walk::WalkError;
 
 /// Why a file cannot be read.
@@ -183,6 +187,20 @@ impl Recorded {
             }
         })?;
         Ok(cycles)
+    }
+
+    /// Passes every cycle to `visit`, in the order of the file.
+    ///
+    /// # Errors
+    /// See [`RecordedError`].
+    pub fn each_cycle(&self, mut visit: impl FnMut(&CycleRecord)) -> Result<(), RecordedError> {
+        let mut copy = Self { warnings: Vec::new(), ..self.clone() };
+        copy.read(|_, item| {
+            if let Item::Cycle { record, .. } = item {
+                visit(record);
+            }
+        })?;
+        Ok(())
     }
 
     fn take(&mut self, item: Item<'_>) {

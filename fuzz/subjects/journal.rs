@@ -1,0 +1,28 @@
+//! Fuzzes the journal of a recording, and the engine on it.
+
+use std::sync::OnceLock;
+
+use takt::config::Config;
+use takt::internals::journal::Journal;
+use takt::internals::replay::Replay;
+
+/// More cycles than that show nothing new.
+const CYCLES: usize = 300;
+
+/// A journal is read or refused. What is read can be replayed.
+pub fn run(bytes: &[u8]) {
+    static CONFIG: OnceLock<Config> = OnceLock::new();
+    let config = CONFIG.get_or_init(|| {
+        Config::parse("first", include_str!("../../configs/first.toml")).expect("a shipped file")
+    });
+    let mut journal = Journal::default();
+    if journal.add_block(bytes).is_err() {
+        return;
+    }
+    let Ok(mut replay) = Replay::new(config, journal) else { return };
+    for _ in 0..CYCLES {
+        if replay.step().is_none() {
+            return;
+        }
+    }
+}

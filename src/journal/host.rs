@@ -1,0 +1,139 @@
+//! The host of a run, replayed.
+
+use std::collections::{HashMap, VecDeque};
+
+use takt_rt::{
+    AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CycleRecord, Event,
+    Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport, RequestEnvelope, StreamSample, TrajectoryId,
+    TrajectorySample,
+};
+
+use super::pop_front_if;
+use crate::channels::{ChannelSizes, GivenTrajectory, HostInput, HostSide, JournalEntry, RtSide, channels};
+
+/// A host that gives what it gave, cycle by cycle.
+pub struct ReplayHost {
+    /// The streams are those of every run: points wait, are looked ahead, and become set-points.
+    rt: RtSide,
+    host: HostSide,
+    entries: VecDeque<JournalEntry>,
+    trajectories: HashMap<TrajectoryId, (u8, GivenTrajectory)>,
+    now: Inputs,
+    cycle: u64,
+    /// The record of the last cycle.
+    pub record: Box<CycleRecord>,
+    /// The events since the last look.
+    pub events: Vec<Event>,
+}
+
+/// What the present cycle takes.
+#[derive(Default)]
+struct Inputs {
+    requests: VecDeque<RequestEnvelope>,
+    reports: VecDeque<(u8, OffCycleReport)>,
+    service_frames: VecDeque<(usize, Frame)>,
+    callbacks_taken: VecDeque<bool>,
+    calls: VecDeque<(CallbackReturn, Box<[Option<AxisTarget>; MAX_AXES]>)>,
+}
+
+impl ReplayHost {
+    /// A host with this journal, for a controller with such channels.
+    pub fn new(
+        sizes: &ChannelSizes,
+        entries: VecDeque<JournalEntry>,
+        trajectories: HashMap<TrajectoryId, (u8, GivenTrajectory)>,
+    ) -> Self {
+        let (rt, host, _log) = channels(sizes);
+        Self {
+            rt,
+            host,
+            entries,
+            trajectories,
+            now: Inputs::default(),
+            cycle: 0,
+            record: Box::default(),
+            events: Vec::new(),
+        }
+    }
+
+    /// Lays out what the next cycle takes. What the one before has left is gone.
+    pub fn begin_cycle(&mut self) {
+        self.now = Inputs::default();
+        while let Some(JournalEntry { input, .. }) =
+            pop_front_if(&mut self.entries, |entry| entry.cycle <= self.cycle)
+        {
+            match input {
+                HostInput::Request(request) => self.now.requests.push_back(request),
+                HostInput::OffCycleReport { axis, report } => self.now.reports.push_back((axis, report)),
+                // A stream that takes no points any more has no room after some time.
+                HostInput::Point { group, point } => drop(self.host.streamer().push_to(group, &[point])),
+                HostInput::CallbackTaken { is_there } => self.now.callbacks_taken.push_back(is_there),
+                HostInput::Called { returned, targets } => {
+                    self.now.calls.push_back((returned, Box::new(targets)))
+                }
+                HostInput::ServiceFrame { bus, frame } => {
+                    self.now.service_frames.push_back((bus.into(), frame));
+                }
+            }
+        }
+        self.cycle += 1;
+    }
+}
+
+impl HostInterface for ReplayHost {
+    fn request(&mut self) -> Option<RequestEnvelope> {
+        self.now.requests.pop_front()
+    }
+
+    fn off_cycle_report(&mut self) -> Option<(u8, OffCycleReport)> {
+        self.now.reports.pop_front()
+    }
+
+    fn begin_stream(&mut self, group: u8) {
+        self.rt.begin_stream(group);
+    }
+
+    fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
+        self.rt.stream(group, slot_start_ns)
+    }
+
+    fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
+        let (of_group, given) = self.trajectories.get(&trajectory)?;
+        (*of_group == group).then(|| given.sample(at_s))
+    }
+
+    fn take_callback(&mut self, _group: u8, _callback: CallbackId) -> bool {
+        self.now.callbacks_taken.pop_front().unwrap_or(false)
+    }
+
+    /// A call that was not made in the run commands nothing: the axes hold.
+    fn callback(
+        &mut self,
+        _group: u8,
+        _callback: CallbackId,
+        _cycle: &CallbackCycle,
+        _axes: &[AxisSnapshot; MAX_AXES],
+        targets: &mut [Option<AxisTarget>; MAX_AXES],
+    ) -> CallbackReturn {
+        let Some((returned, wanted)) = self.now.calls.pop_front() else {
+            return CallbackReturn { outcome: CallbackOutcome::Commanded, spent_ns: 0 };
+        };
+        *targets = *wanted;
+        returned
+    }
+
+    fn service_frame(&mut self, bus: usize) -> Option<Frame> {
+        let place = self.now.service_frames.iter().position(|(of_bus, _)| *of_bus == bus)?;
+        self.now.service_frames.remove(place).map(|(_, frame)| frame)
+    }
+
+    fn record(&mut self, record: &CycleRecord) -> bool {
+        *self.record = *record;
+        true
+    }
+
+    fn event(&mut self, event: &Event) -> bool {
+        self.events.push(*event);
+        true
+    }
+}

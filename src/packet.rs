@@ -1,0 +1,183 @@
+//! The words of a packet, one after another. What is taken from a packet of another process is checked word by word.
+
+use std::time::Duration;
+
+use takt_rt::{AxisPoint, MAX_GROUPS, OperationMode, PositionPoint, RequestTarget, StopCategory};
+
+/// A packet does not say what a packet can say. Its sender is no client of takt, or its memory is damaged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Malformed;
+
+/// Puts the words of a packet.
+#[derive(Clone, Debug, Default)]
+pub struct Put(pub Vec<u64>);
+
+impl Put {
+    /// A word.
+    pub fn word(&mut self, word: u64) -> &mut Self {
+        self.0.push(word);
+        self
+    }
+
+    /// A count or an index.
+    pub fn index(&mut self, index: usize) -> &mut Self {
+        self.word(index as u64)
+    }
+
+    /// A number by its bits.
+    pub fn number(&mut self, number: f64) -> &mut Self {
+        self.word(number.to_bits())
+    }
+
+    /// Numbers behind their count.
+    pub fn numbers(&mut self, numbers: &[f64]) -> &mut Self {
+        self.index(numbers.len());
+        self.0.extend(numbers.iter().map(|number| number.to_bits()));
+        self
+    }
+
+    /// A duration, as whole nanoseconds.
+    pub fn duration(&mut self, duration: Duration) -> &mut Self {
+        self.word(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX))
+    }
+
+    /// A text behind its length in bytes.
+    pub fn text(&mut self, text: &str) -> &mut Self {
+        self.index(text.len());
+        for bytes in text.as_bytes().chunks(size_of::<u64>()) {
+            let mut whole = [0; size_of::<u64>()];
+            whole.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+            self.word(u64::from_ne_bytes(whole));
+        }
+        self
+    }
+
+    /// All axes, or a group.
+    pub fn target(&mut self, target: RequestTarget) -> &mut Self {
+        self.word(match target {
+            RequestTarget::All => 0,
+            RequestTarget::Group(group) => 1 + u64::from(group),
+        })
+    }
+
+    /// What a point says of an axis.
+    pub fn axis_point(&mut self, point: &AxisPoint) -> &mut Self {
+        let (kind, motion, [stiffness, damping, torque]) = match *point {
+            AxisPoint::Position { motion, torque } => (0, motion, [0.0, 0.0, torque]),
+            AxisPoint::Impedance { motion, stiffness, damping, torque } => {
+                (1, motion, [stiffness, damping, torque])
+            }
+            AxisPoint::Velocity(velocity) => {
+                (2, PositionPoint { velocity: Some(velocity), ..PositionPoint::default() }, [0.0; 3])
+            }
+            AxisPoint::Torque(torque) => (3, PositionPoint::default(), [0.0, 0.0, torque]),
+        };
+        let given = u64::from(motion.velocity.is_some()) << 8 | u64::from(motion.acceleration.is_some()) << 9;
+        self.word(kind | given).number(motion.position);
+        self.number(motion.velocity.unwrap_or_default()).number(motion.acceleration.unwrap_or_default());
+        self.number(stiffness).number(damping).number(torque)
+    }
+}
+
+/// The words of an axis of a point.
+pub const AXIS_POINT_WORDS: usize = 7;
+
+/// Takes the words of a packet.
+#[derive(Clone, Copy, Debug)]
+pub struct Take<'a>(pub &'a [u64]);
+
+impl Take<'_> {
+    /// The next word.
+    pub fn word(&mut self) -> Result<u64, Malformed> {
+        let (first, rest) = self.0.split_first().ok_or(Malformed)?;
+        self.0 = rest;
+        Ok(*first)
+    }
+
+    /// The next word, as an index or a count, whatever it counts.
+    pub fn index(&mut self) -> Result<usize, Malformed> {
+        usize::try_from(self.word()?).map_err(|_| Malformed)
+    }
+
+    /// A count of things of so many words each, which the packet has.
+    pub fn count_of(&mut self, words_each: usize) -> Result<usize, Malformed> {
+        let count = self.index()?;
+        let needed = count.checked_mul(words_each).ok_or(Malformed)?;
+        if needed <= self.0.len() { Ok(count) } else { Err(Malformed) }
+    }
+
+    /// The next number. It may be infinite or none: the controller refuses that with the words for it.
+    pub fn number(&mut self) -> Result<f64, Malformed> {
+        self.word().map(f64::from_bits)
+    }
+
+    /// Numbers behind their count.
+    pub fn numbers(&mut self) -> Result<Vec<f64>, Malformed> {
+        let count = self.count_of(1)?;
+        (0..count).map(|_| self.number()).collect()
+    }
+
+    /// A duration.
+    pub fn duration(&mut self) -> Result<Duration, Malformed> {
+        self.word().map(Duration::from_nanos)
+    }
+
+    /// A text.
+    pub fn text(&mut self) -> Result<String, Malformed> {
+        let bytes = self.index()?;
+        let words = bytes.div_ceil(size_of::<u64>());
+        let (text, rest) = self.0.split_at_checked(words).ok_or(Malformed)?;
+        self.0 = rest;
+        let text: Vec<u8> = text.iter().flat_map(|word| word.to_ne_bytes()).take(bytes).collect();
+        String::from_utf8(text).map_err(|_| Malformed)
+    }
+
+    /// All axes, or a group. Whether there is such a group, the controller knows.
+    pub fn target(&mut self) -> Result<RequestTarget, Malformed> {
+        match self.word()? {
+            0 => Ok(RequestTarget::All),
+            group @ 1..=GROUPS => Ok(RequestTarget::Group((group - 1) as u8)),
+            _ => Err(Malformed),
+        }
+    }
+
+    /// The category of a stop.
+    pub fn category(&mut self) -> Result<StopCategory, Malformed> {
+        match self.word()? {
+            0 => Ok(StopCategory::Zero),
+            1 => Ok(StopCategory::One),
+            2 => Ok(StopCategory::Two),
+            _ => Err(Malformed),
+        }
+    }
+
+    /// A mode of operation.
+    pub fn mode(&mut self) -> Result<OperationMode, Malformed> {
+        let number = i8::try_from(self.word()?).map_err(|_| Malformed)?;
+        OperationMode::from_number(number).ok_or(Malformed)
+    }
+
+    /// What a point says of an axis.
+    pub fn axis_point(&mut self) -> Result<AxisPoint, Malformed> {
+        let (head, position) = (self.word()?, self.number()?);
+        let (velocity, acceleration) = (self.number()?, self.number()?);
+        let (stiffness, damping, torque) = (self.number()?, self.number()?, self.number()?);
+        let given = |bit: u32, value: f64| (head >> bit & 1 == 1).then_some(value);
+        let motion =
+            PositionPoint { position, velocity: given(8, velocity), acceleration: given(9, acceleration) };
+        match head & !(3 << 8) {
+            0 => Ok(AxisPoint::Position { motion, torque }),
+            1 => Ok(AxisPoint::Impedance { motion, stiffness, damping, torque }),
+            2 => Ok(AxisPoint::Velocity(velocity)),
+            3 => Ok(AxisPoint::Torque(torque)),
+            _ => Err(Malformed),
+        }
+    }
+
+    /// The packet has no more words.
+    pub fn end(self) -> Result<(), Malformed> {
+        if self.0.is_empty() { Ok(()) } else { Err(Malformed) }
+    }
+}
+
+const GROUPS: u64 = MAX_GROUPS as u64;

@@ -1,0 +1,81 @@
+//! The journal of a recording, and the files of its configuration.
+
+use std::collections::{BTreeMap, HashSet};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use super::records::{self, Record};
+use super::{RecordedError, walk};
+use crate::config::ConfigSources;
+use crate::journal::{Journal, JournalDefect};
+use crate::telemetry::recording;
+
+/// What a recording has for a replay.
+#[derive(Debug, Default)]
+pub struct RecordedJournal {
+    /// The journal; `None` if the recording has none.
+    pub journal: Option<Journal>,
+    /// The files of the configuration.
+    pub sources: ConfigSources,
+    /// Entries that were lost while it was written; `None` if the file does not say so, because it was cut off.
+    pub lost: Option<u64>,
+    /// The first defect.
+    pub defect: Option<JournalDefect>,
+    /// Whether this version of takt can read the journal.
+    pub is_of_other_version: bool,
+}
+
+/// Reads the journal of a recording.
+///
+/// # Errors
+/// See [`RecordedError`].
+pub fn journal(path: &Path) -> Result<RecordedJournal, RecordedError> {
+    let unreadable = |error| RecordedError::Unreadable { path: path.to_owned(), error };
+    let file = File::open(path).map_err(|error| unreadable(error.into()))?;
+    let mut found = RecordedJournal::default();
+    let mut channels = HashSet::new();
+    walk::walk(BufReader::new(file), |opcode, body| match records::parse(opcode, body) {
+        Some(Ok(Record::Channel { id, metadata, .. })) => {
+            if let Some(version) = metadata.get("journal") {
+                found.is_of_other_version |= version != recording::JOURNAL_VERSION;
+                channels.insert(id);
+            }
+        }
+        Some(Ok(Record::Message { channel, data, .. })) if channels.contains(&channel) => {
+            let added = found.journal.get_or_insert_default().add_block(data);
+            found.defect = found.defect.or(added.err());
+        }
+        Some(Ok(Record::Metadata { name, entries })) => found.metadata(&name, entries),
+        _ => {}
+    })
+    .map_err(unreadable)?;
+    Ok(found)
+}
+
+impl RecordedJournal {
+    fn metadata(&mut self, name: &str, entries: BTreeMap<String, String>) {
+        match name {
+            recording::JOURNAL_END => {
+                self.lost = entries.get("lost").and_then(|lost| lost.parse().ok());
+            }
+            recording::CONFIGURATION => {
+                self.sources.main = entries.get(recording::MAIN_FILE).map(PathBuf::from);
+                self.sources.interfaces = entries
+                    .into_iter()
+                    .filter_map(|(key, interface)| {
+                        let bus = key.strip_prefix(recording::INTERFACE_OF)?.to_owned();
+                        Some((bus, interface))
+                    })
+                    .collect();
+            }
+            recording::CONFIGURATION_FILES => {
+                self.sources.files = entries
+                    .into_iter()
+                    .map(|(path, text)| (PathBuf::from(path), text.into_bytes()))
+                    .collect();
+            }
+            _ => {}
+        }
+    }
+}

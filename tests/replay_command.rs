@@ -1,0 +1,133 @@
+//! `takt replay` as a user meets it: a recording in, the run again out.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A run of one joint, recorded once for all tests.
+struct Recorded {
+    folder: TempDir,
+    run: PathBuf,
+}
+
+fn takt(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_takt"))
+        .args(arguments)
+        .current_dir(folder)
+        .env("COLUMNS", "80")
+        .stdin(Stdio::null())
+        .output()
+        .unwrap()
+}
+
+fn recorded() -> &'static Recorded {
+    static RECORDED: OnceLock<Recorded> = OnceLock::new();
+    RECORDED.get_or_init(|| {
+        let folder = tempfile::tempdir().unwrap();
+        let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/first.toml");
+        fs::copy(config, folder.path().join("first.toml")).unwrap();
+        let output = takt(folder.path(), &["run", "first.toml", "--record", "run.mcap"]);
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        // The recording has it.
+        fs::remove_file(folder.path().join("first.toml")).unwrap();
+        Recorded { run: folder.path().join("run.mcap"), folder }
+    })
+}
+
+fn replay(arguments: &[&str]) -> Output {
+    let Recorded { folder, run } = recorded();
+    takt(folder.path(), &[&["replay", run.to_str().unwrap()], arguments].concat())
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+fn refused(output: &Output) -> String {
+    assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{output:?}");
+    text(&output.stderr)
+}
+
+#[test]
+fn the_replay_of_a_run_in_real_time_is_identical_without_the_file_of_its_configuration() {
+    let output = replay(&["--json"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let count = |key: &str| result[key].as_u64().unwrap();
+    assert!(result["identical"].as_bool().unwrap(), "{result}");
+    assert!(count("compared") > 1000 && count("cycles") >= count("compared"), "{result}");
+    assert_eq!((count("differing"), count("missing")), (0, 0));
+    assert!(text(&replay(&[]).stdout).contains("all are identical, bit for bit"));
+}
+
+#[test]
+fn a_changed_configuration_shows_what_it_would_have_done_and_its_replay_can_be_reported() {
+    let arguments = ["--set", "axes.joint.limits.velocity=20 deg/s", "--record", "slower.mcap", "--json"];
+    let output = replay(&arguments);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(!result["identical"].as_bool().unwrap());
+    let velocity = &result["axes"][0]["velocity"];
+    let [recorded, replayed] = ["recorded", "replayed"].map(|which| velocity[which].as_f64().unwrap());
+    assert!(replayed <= 20_f64.to_radians() + 1e-9 && recorded > replayed, "{velocity}");
+    let report = takt(recorded_folder(), &["report", "slower.mcap"]);
+    assert_eq!(report.status.code(), Some(0), "{report:?}");
+}
+
+fn recorded_folder() -> &'static Path {
+    recorded().folder.path()
+}
+
+#[test]
+fn what_differs_is_told_within_the_columns_of_the_terminal() {
+    let output = replay(&["--set", "axes.joint.limits.velocity=20 deg/s"]);
+    let shown = text(&output.stdout);
+    assert!(shown.contains("the first is slot ") && shown.contains("position set-point"), "{shown}");
+    assert!(shown.contains("The drives followed the recorded set-points"), "{shown}");
+    let rows = shown.lines().skip_while(|line| !line.contains("distance")).take(2);
+    assert!(rows.clone().count() == 2 && rows.clone().all(|row| row.chars().count() <= 80), "{shown}");
+}
+
+#[test]
+fn a_value_that_there_is_not_or_that_is_wrong_is_refused() {
+    let error = refused(&replay(&["--set", "axes.elbow.limits.jerk=200"]));
+    assert!(error.contains("there is no \"elbow\" here; there is: joint"), "{error}");
+    let error = refused(&replay(&["--set", "axes.joint.limits.velocity=-1"]));
+    assert!(error.contains("velocity"), "{error}");
+    let error = refused(&replay(&["--set", "axes.joint.limits.speed=1"]));
+    assert!(error.contains("speed"), "{error}");
+    let output = replay(&["--set", "jerk"]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+}
+
+#[test]
+fn a_recording_that_was_cut_off_is_replayed_to_its_end() {
+    let bytes = fs::read(&recorded().run).unwrap();
+    let cut = recorded_folder().join("cut.mcap");
+    fs::write(&cut, &bytes[..bytes.len() * 2 / 3]).unwrap();
+    let output = takt(recorded_folder(), &["replay", "cut.mcap", "--json"]);
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(result["differing"].as_u64(), Some(0), "{result}");
+    assert!(result["compared"].as_u64().unwrap() > 100, "{result}");
+}
+
+#[test]
+fn what_has_no_journal_is_refused_with_the_reason() {
+    let replay_of_replay = replay(&["--record", "again.mcap"]);
+    assert_eq!(replay_of_replay.status.code(), Some(0), "{replay_of_replay:?}");
+    let error = refused(&takt(recorded_folder(), &["replay", "again.mcap"]));
+    assert!(error.contains("this has no journal"), "{error}");
+    let error = refused(&takt(recorded_folder(), &["replay", "nothing.mcap"]));
+    assert!(error.contains("nothing.mcap"), "{error}");
+}
+
+#[test]
+fn a_recording_that_cannot_be_written_is_an_error_after_the_result() {
+    let output = replay(&["--record", "run.mcap/replay.mcap"]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+    assert!(text(&output.stderr).contains("cannot write"), "{output:?}");
+}

@@ -1,0 +1,35 @@
+//! The journal of a storm, by the way that it takes in a recording.
+
+use takt::internals::journal::{Encoder, Journal, RunJournal};
+use takt::internals::link::trace::Trace;
+use takt_rt::CycleRecord;
+
+/// Keeps the journal and the records of a run.
+pub struct Recorder {
+    run: RunJournal,
+    encoder: Encoder,
+    pub journal: Journal,
+    pub records: Vec<CycleRecord>,
+    /// Entries that have found no room up to the last cycle.
+    pub lost: u64,
+}
+
+impl Recorder {
+    pub fn new(run: RunJournal) -> Self {
+        Self { run, encoder: Encoder::default(), journal: Journal::default(), records: vec![], lost: 0 }
+    }
+
+    /// Takes what has been noted: as bytes, and read again.
+    pub fn drain(&mut self, traces: &mut [Trace]) {
+        for (bus, trace) in traces.iter_mut().enumerate() {
+            while let Some(traced) = trace.take_any() {
+                self.encoder.port(bus, &traced);
+            }
+        }
+        self.run.drain(&mut self.encoder);
+        if let Some(block) = self.encoder.take_block() {
+            self.journal.add_block(&block).unwrap();
+        }
+        self.lost = self.run.dropped() + traces.iter().map(Trace::dropped).sum::<u64>();
+    }
+}
