@@ -106,6 +106,7 @@ const CASES: &[Case] = &[
     ),
     ("no cycle", |c| bus(c).divider = 0, &[BUS, "`bus.period` cannot be 0 s"]),
     ("endless cycle", |c| bus(c).divider = u32::MAX, &[BUS, "`bus.period` cannot be"]),
+    ("33 cycles", |c| bus(c).divider = 33, &[BUS, "`bus.period` cannot be 33 ms", "32 cycles at most"]),
     ("bit rate 0", |c| bus(c).bit_rate = 0, &[BUS, "`bus.bit_rate` cannot be 0 bit/s"]),
     ("bit rate", |c| bus(c).bit_rate = 999_999, &[BUS, "`bus.bit_rate` cannot be"]),
     ("bit rate of eRobs", |c| bus(c).bit_rate = 500_000, &["axes[3]", "the one bit rate of the eRobs"]),

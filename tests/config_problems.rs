@@ -433,6 +433,26 @@ fn a_period_that_cannot_be_is_told_once_and_not_also_of_the_axes_on_its_bus() {
     assert_eq!(said, ["`bus.period` cannot be 1.5 ms"]);
 }
 
+#[test]
+fn a_bus_whose_cycle_has_more_cycles_than_the_engine_can_wait_is_refused_at_its_line() {
+    let with = |period: &str| {
+        include_str!("../configs/single-erob.toml").replacen("[[bus]]\n", &format!("[[bus]]\n{period}\n"), 1)
+    };
+    let text = with("period = \"33 ms\"");
+    let error = error_of(&text);
+    let [problem] = error.problems() else { panic!("{error:?}") };
+    assert_eq!(problem.to_string(), "`bus.period` cannot be 33 ms");
+    assert!(problem.kind.help().contains("1 ms to 32 ms: 32 cycles at most"), "{}", problem.kind.help());
+    assert_eq!(
+        error.line(problem),
+        text.lines().position(|line| line.starts_with("period")).map(|line| 1 + line)
+    );
+    // The longest one can be set up.
+    let config = Config::parse("longest.toml", &with("period = \"32 ms\""));
+    let config = config.unwrap_or_else(|error| panic!("{error:?}"));
+    takt::internals::controller::assemble::engine(&config).unwrap_or_else(|error| panic!("{error:?}"));
+}
+
 fn rendered(error: &ConfigError) -> String {
     let mut text = String::new();
     GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor())

@@ -78,8 +78,6 @@ pub struct DriveFacts {
     pub node_axis: u8,
     /// How the drives are spoken to.
     pub protocol: Protocol,
-    /// Whether the drives are on a serial line, and not on a CAN bus.
-    pub is_on_serial_line: bool,
     /// How the drives show that they live, beside their feedback.
     pub error_control: ErrorControl,
     /// Whether the drives can watch the heartbeat of the controller (object 1016).
@@ -107,6 +105,8 @@ pub enum Protocol {
     BitFields,
     /// By a protocol of their own with these identifiers, one request at a time.
     Own(OwnIdentifiers),
+    /// By requests and replies on a serial line, which is no CAN bus.
+    SerialLine,
 }
 
 impl Protocol {
@@ -114,8 +114,13 @@ impl Protocol {
     pub const fn own_identifiers(self) -> Option<OwnIdentifiers> {
         match self {
             Self::Own(own) => Some(own),
-            Self::Canopen | Self::BitFields => None,
+            Self::Canopen | Self::BitFields | Self::SerialLine => None,
         }
+    }
+
+    /// Whether the drives are on a serial line, and not on a CAN bus.
+    pub const fn is_of_serial_line(self) -> bool {
+        matches!(self, Self::SerialLine)
     }
 }
 
@@ -253,7 +258,6 @@ impl DriveFacts {
             may_ignore_sync: false,
             node_axis: 1,
             protocol: Protocol::Canopen,
-            is_on_serial_line: false,
             error_control: ErrorControl::Heartbeat { fixed_ms: None },
             consumes_heartbeat: true,
             sends_emergencies: true,
@@ -266,13 +270,14 @@ impl DriveFacts {
     }
 
     /// Every identifier between a drive with this node ID and its master: those of its own protocol, or those that CANopen gives to
-    /// its node (CiA 301, 7.3.3).
+    /// its node (CiA 301, 7.3.3). On a serial line there are none.
     pub(crate) fn identifiers(&self, node: u8) -> Vec<Id> {
         match self.protocol {
             Protocol::Own(own) => vec![own.request_id(node), own.reply_id(node)],
             Protocol::Canopen | Protocol::BitFields => {
                 (1..=0xE).map(|function| Id::canopen(function << 7, node)).collect()
             }
+            Protocol::SerialLine => vec![],
         }
     }
 

@@ -148,6 +148,7 @@ impl Axis {
             reversed: false,
             zero_counts: 0,
             limits,
+            urdf: None,
             shown_in: PositionUnit::of(travel),
             compliance: defaults::compliance(&[control]),
             feed_forward: FeedForward::default(),

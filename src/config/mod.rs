@@ -26,9 +26,11 @@ mod ranges;
 pub(crate) mod read;
 mod rules;
 mod scale;
+mod sources;
 mod spelling;
 pub(crate) mod spot;
 mod supervision;
+pub(crate) mod urdf;
 
 use std::fmt;
 use std::path::Path;
@@ -45,7 +47,9 @@ pub use position_unit::PositionUnit;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
 pub(crate) use read::{Knowledge, PhaseChoice, parse};
+pub use sources::{ConfigSources, SourcesError};
 pub use supervision::{ErrorControl, Supervision};
+pub use urdf::{LimitOrigin, Urdf, UrdfError, UrdfJoint, UrdfLimits};
 
 use thiserror::Error;
 

@@ -15,6 +15,7 @@ pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::drive_family::DriveFamily;
 use super::position_unit::PositionUnit;
+use super::urdf::UrdfLimits;
 use crate::canopen::dcf::DeviceConfiguration;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
@@ -88,7 +89,7 @@ impl Config {
         match self.buses.get(bus).map(|bus| &bus.interface) {
             Some(Interface::Serial(_)) => true,
             Some(Interface::Simulated) => {
-                self.axes.iter().any(|axis| axis.bus == bus && axis.drive.is_on_serial_line)
+                self.axes.iter().any(|axis| axis.bus == bus && axis.drive.protocol.is_of_serial_line())
             }
             Some(Interface::SocketCan(_) | Interface::Slcan(_) | Interface::Converter(_)) | None => false,
         }
@@ -261,6 +262,8 @@ pub struct Axis {
     pub zero_counts: i32,
     /// What may never be exceeded.
     pub limits: Limits,
+    /// Which limits a robot description has, and which the configuration. Default: there is none.
+    pub urdf: Option<UrdfLimits>,
     /// The unit in which its positions are shown to people. Default: that in which the file has the limits of its position.
     pub shown_in: PositionUnit,
     /// What a source may ask of the torque loop. Default: no more than the gains of the axis' own loop.

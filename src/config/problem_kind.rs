@@ -8,6 +8,7 @@ use crate::canopen::dcf::DcfError;
 
 use super::interface::InterfaceError;
 use super::quantity::{self, Quantity};
+use super::urdf::UrdfError;
 
 /// The kinds of problems. `key` is the whole path of a key, as in `axis.limits.velocity`.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -281,6 +282,26 @@ pub enum ProblemKind {
         /// Why.
         reason: DcfError,
     },
+    /// A robot description that cannot be used, or a joint of it.
+    #[error("{reason}")]
+    Urdf {
+        /// Why.
+        reason: UrdfError,
+    },
+    /// A limit that is wider than that of the joint in the robot description.
+    #[error("`{key}` is {value}, and the joint {joint:?} of {file} allows {allowed}")]
+    WiderThanUrdf {
+        /// The key.
+        key: String,
+        /// The value.
+        value: String,
+        /// What the robot description allows.
+        allowed: String,
+        /// The joint.
+        joint: String,
+        /// The file.
+        file: String,
+    },
     /// `command_phase = "auto"` where none is possible.
     #[error("no command phase suits every bus")]
     NoCommandPhase {
@@ -381,6 +402,10 @@ impl ProblemKind {
             Self::EmptyRange { .. } => "the lowest position comes first".into(),
             Self::BeyondCounts { .. } => "check counts_per_turn, gear_ratio, lead and zero_counts".into(),
             Self::Dcf { reason } => reason.help().into(),
+            Self::Urdf { reason } => reason.help(),
+            Self::WiderThanUrdf { .. } => {
+                "a limit may be narrower than that of the robot description, not wider: leave it out to take that one".into()
+            }
             Self::NoCommandPhase { cause } => cause.clone(),
             Self::TooMany { .. } => "divide the machine between several controllers".into(),
         }
@@ -397,6 +422,7 @@ impl ProblemKind {
             Self::WrongType { .. } => "wrong type",
             Self::UnknownUnit { .. } | Self::WrongUnit { .. } => "wrong unit",
             Self::NotAQuantity { .. } => "no number",
+            Self::WiderThanUrdf { .. } => "wider",
             Self::MissingUnit { .. } => "no unit",
             Self::DuplicateName { .. }
             | Self::DuplicateNode { .. }

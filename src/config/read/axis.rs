@@ -7,10 +7,11 @@ use takt_rt::MAX_AXES;
 use super::bus::ReadBus;
 use super::control::modes;
 use super::entry::Entry;
-use super::limits::{following_error, limits};
+use super::limits::{ReadLimits, following_error, limits};
 use super::machine::{boolean, heartbeat, node};
 use super::section::Section;
 use super::travel::{counting, travel};
+use super::urdf::{DescribedJoint, Description};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
@@ -62,6 +63,8 @@ pub struct Machine<'a> {
     pub master_node: u8,
     /// The families that a drive may be of.
     pub families: &'a [&'static dyn ConfiguredFamily],
+    /// The robot description.
+    pub urdf: &'a Description,
 }
 
 impl Machine<'_> {
@@ -112,7 +115,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         family.and_then(|family| family.read(&mut FamilyKeys::of(&mut section, &mut simulated_section)));
     let drive = family_drive.as_deref();
     let node = node_entry.as_ref().and_then(|entry| match drive {
-        Some(drive) if drive.is_on_serial_line => {
+        Some(drive) if drive.protocol.is_of_serial_line() => {
             entry.integer(ranges::LINE_ADDRESS).and_then(|address| u8::try_from(address).ok())
         }
         _ => node(entry),
@@ -121,7 +124,8 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         let name = read.name.as_deref().unwrap_or_default();
         rules::line::place(&section.spot("drive"), &section.spot("bus"), drive, name, read.is_line);
         let mut on_line = earlier.iter().filter(|other| other.place.map(|(bus, _)| bus) == bus);
-        let first = on_line.find_map(|other| other.drive.as_deref().filter(|first| first.is_on_serial_line));
+        let first = on_line
+            .find_map(|other| other.drive.as_deref().filter(|first| first.protocol.is_of_serial_line()));
         if let Some(first) = first {
             rules::line::one_protocol(&section.spot("drive"), drive, first);
         }
@@ -138,8 +142,10 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let travel = travel(&mut section);
     let q = Quantities::of(travel.unwrap_or(Travel::Rotary));
     let counting = counting(&mut section, drive, travel);
-    let (limits, shown_in) =
-        limits(section.section("limits"), q, travel.unwrap_or(Travel::Rotary), counting.as_ref());
+    let described = DescribedJoint::of(&mut section, machine.urdf, name.as_deref(), travel);
+    let limits_section = section.section("limits");
+    let ReadLimits { limits, shown_in, urdf } =
+        limits(limits_section, q, travel.unwrap_or(Travel::Rotary), counting.as_ref(), &described);
     let following_error = following_error(section.section("following_error"), q, travel);
     let power_up = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
     let mut joint_section = section.section("joint");
@@ -206,6 +212,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             reversed: counting.reversed,
             zero_counts: counting.zero_counts,
             limits: limits?,
+            urdf,
             shown_in,
             compliance: modes.compliance,
             feed_forward,
@@ -285,7 +292,7 @@ fn check_node(
     };
     if let Some(first) = earlier.iter().filter(|axis| axis.place == Some((bus, node))).find(is_other) {
         entry.spot.report_against(kind, &first.header);
-    } else if node == machine.master_node && !drive.is_some_and(|drive| drive.is_on_serial_line) {
+    } else if node == machine.master_node && !drive.is_some_and(|drive| drive.protocol.is_of_serial_line()) {
         entry.report(kind);
     }
 }

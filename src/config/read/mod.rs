@@ -15,6 +15,7 @@ mod program;
 pub(crate) mod section;
 mod stops;
 mod travel;
+mod urdf;
 
 use toml::de::DeTable;
 
@@ -24,6 +25,7 @@ use super::model::{CommandFrames, Config};
 use super::problem_kind::ProblemKind;
 use super::spot::Problems;
 use section::Section;
+use urdf::Description;
 
 /// Which command phases count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -82,6 +84,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowl
     let mut root = Section::new("", 0..0, document, problems);
     let name =
         root.require("name", "the name of the machine: name = \"arm6\"").and_then(|entry| entry.name());
+    let urdf = Description::read(root.get("urdf"));
     let mut cycle = root.section("cycle");
     let missed_slots = stops::missed_slots(cycle.section("missed_slots"));
     let (cycle, automatic_phase) = machine::cycle(cycle);
@@ -107,6 +110,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowl
         cycle_ns: cycle.period_ns,
         master_node: master.node,
         families: knowledge.families,
+        urdf: &urdf,
     };
     let axes = axis::axes(axes, &machine);
 

@@ -61,7 +61,7 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
         return;
     };
     let spot = fields.at("node");
-    let is_on_line = axis.drive.is_on_serial_line;
+    let is_on_line = axis.drive.protocol.is_of_serial_line();
     let nodes = if is_on_line { ranges::LINE_ADDRESS } else { ranges::NODE_ID };
     if spot.integer(axis.node, &nodes).is_some() {
         if axis.node == config.master.node && !is_on_line {
@@ -104,6 +104,7 @@ pub fn shared_identifier(
         (Protocol::Canopen, Protocol::Canopen) | (Protocol::BitFields, _) | (_, Protocol::BitFields) => {
             return None;
         }
+        (Protocol::SerialLine, _) | (_, Protocol::SerialLine) => return None,
         (Protocol::Own(_), _) | (_, Protocol::Own(_)) => {}
     }
     let theirs = other.identifiers(other_node);

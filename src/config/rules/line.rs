@@ -49,7 +49,7 @@ pub fn two_bit_rates(spot: &Spot<'_>, of_bus: u32, of_device: u32) {
 
 /// A drive on a serial line and a bus that is one belong together.
 pub fn place(drive_spot: &Spot<'_>, bus_spot: &Spot<'_>, drive: &DriveFacts, bus_name: &str, is_line: bool) {
-    match (drive.is_on_serial_line, is_line) {
+    match (drive.protocol.is_of_serial_line(), is_line) {
         (true, false) => drive_spot.report_range(
             format!("{:?} on the CAN bus `{bus_name}`", drive.word),
             "a drive of a CAN bus; this one needs a serial line: a [[bus]] of its own with interface = \
@@ -66,7 +66,7 @@ pub fn place(drive_spot: &Spot<'_>, bus_spot: &Spot<'_>, drive: &DriveFacts, bus
 
 /// The drives of a line speak one protocol.
 pub fn one_protocol(spot: &Spot<'_>, drive: &DriveFacts, first: &DriveFacts) {
-    if drive.is_on_serial_line && first.is_on_serial_line && drive.word != first.word {
+    if drive.protocol.is_of_serial_line() && first.protocol.is_of_serial_line() && drive.word != first.word {
         spot.report_range(
             format!("{:?} beside {:?}", drive.word, first.word),
             "the same family for every axis of a serial line: they speak one protocol".to_owned(),
@@ -83,7 +83,7 @@ pub fn validate_place(config: &Config, index: usize, fields: &Fields<'_>) {
     let is_line = config.is_serial_line(axis.bus);
     place(&fields.at("drive"), &fields.at("bus"), &axis.drive, &bus.name, is_line);
     let mut earlier = config.axes.iter().take(index).filter(|other| other.bus == axis.bus);
-    if let Some(first) = earlier.find(|other| other.drive.is_on_serial_line) {
+    if let Some(first) = earlier.find(|other| other.drive.protocol.is_of_serial_line()) {
         one_protocol(&fields.at("drive"), &axis.drive, &first.drive);
     }
 }

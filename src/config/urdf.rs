@@ -1,0 +1,337 @@
+//! The limits of joints from a robot description (URDF).
+//!
+//! Units are those of the format: rad and N·m for joints that turn, m and N for those that slide. `urdf-rs` reads the file, and cannot tell
+//! an attribute that is absent from one that is 0. No joint can be moved within a limit of 0, so that 0 is taken as not said.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use thiserror::Error;
+use urdf_rs::{Joint, JointType, Robot};
+
+use super::model::{Axis, Config, Travel};
+use super::quantities::Quantities;
+use super::quantity::Quantity;
+use super::spelling;
+use crate::printable::{excerpt, printable_path};
+
+/// A robot description.
+pub struct Urdf {
+    path: PathBuf,
+    robot: Robot,
+}
+
+/// What a robot description says of a joint that an axis moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct UrdfJoint {
+    /// Its name.
+    pub name: String,
+    /// The file.
+    pub file: PathBuf,
+    /// Whether it slides.
+    pub is_linear: bool,
+    /// Lowest and highest position: rad (m), and where they are from; `None` for a joint that turns without end.
+    pub position: Option<([f64; 2], LimitOrigin)>,
+    /// rad/s (m/s); `None` where the file does not say it.
+    pub velocity: Option<f64>,
+    /// N·m (N); `None` where the file does not say it.
+    pub effort: Option<f64>,
+}
+
+/// Which limits of an axis come from a robot description.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UrdfLimits {
+    /// The file.
+    pub file: PathBuf,
+    /// The joint there.
+    pub joint: String,
+    /// Where the limits of the position are from.
+    pub position: LimitOrigin,
+    /// Where the limit of the velocity is from.
+    pub velocity: LimitOrigin,
+    /// Where the limit of the torque is from.
+    pub torque: LimitOrigin,
+}
+
+/// Where a limit is from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitOrigin {
+    /// The configuration, which may be narrower than the robot description.
+    Configuration,
+    /// `<limit>` of the joint.
+    Limit,
+    /// The soft limits in `<safety_controller>` of the joint, which are narrower.
+    SafetyController,
+}
+
+/// Why a robot description cannot be used.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum UrdfError {
+    /// The file cannot be read.
+    #[error("{file} cannot be read: {reason}")]
+    Unreadable {
+        /// The file.
+        file: String,
+        /// Why.
+        reason: String,
+    },
+    /// It is no URDF.
+    #[error("{file} is no URDF: {reason}")]
+    NotUrdf {
+        /// The file.
+        file: String,
+        /// What the parser said.
+        reason: String,
+    },
+    /// There is no such joint.
+    #[error("{file} has no joint {joint:?}")]
+    UnknownJoint {
+        /// The file.
+        file: String,
+        /// The name.
+        joint: String,
+        /// What was probably meant.
+        nearest: Option<String>,
+        /// The joints that move.
+        known: Vec<String>,
+    },
+    /// The joint is of a type that no axis moves.
+    #[error("the joint {joint:?} of {file} is {kind}: no axis moves it")]
+    NotMoved {
+        /// The file.
+        file: String,
+        /// The joint.
+        joint: String,
+        /// Its type, in words.
+        kind: &'static str,
+    },
+    /// The joint mimics another one.
+    #[error("the joint {joint:?} of {file} mimics {mimicked:?}: it has no drive of its own")]
+    Mimics {
+        /// The file.
+        file: String,
+        /// The joint.
+        joint: String,
+        /// The joint that it follows.
+        mimicked: String,
+    },
+    /// The axis turns and the joint slides, or the other way round.
+    #[error("the joint {joint:?} of {file} is {kind}, and the axis is {travel}")]
+    OtherTravel {
+        /// The file.
+        file: String,
+        /// The joint.
+        joint: String,
+        /// What the joint is.
+        kind: &'static str,
+        /// What the axis is.
+        travel: &'static str,
+    },
+    /// An axis may do more than the joint of its name.
+    #[error(
+        "the axis {axis:?} has a {limit} of {value}, and the joint of that name in {file} allows {allowed}"
+    )]
+    Wider {
+        /// The file.
+        file: String,
+        /// The axis.
+        axis: String,
+        /// `position`, `velocity` or `torque`.
+        limit: &'static str,
+        /// What the axis may do.
+        value: String,
+        /// What the joint may do.
+        allowed: String,
+    },
+    /// The limits of the position leave no room, or are not finite.
+    #[error("the joint {joint:?} of {file} has no room between {low} and {high}{}", if *.are_soft { ", its soft limits" } else { "" })]
+    NoRoom {
+        /// The file.
+        file: String,
+        /// The joint.
+        joint: String,
+        /// Its lowest position: rad (m).
+        low: f64,
+        /// Its highest position: rad (m).
+        high: f64,
+        /// Whether its soft limits are the cause.
+        are_soft: bool,
+    },
+}
+
+impl UrdfError {
+    /// What to do about it.
+    pub fn help(&self) -> String {
+        match self {
+            Self::Unreadable { .. } => {
+                "give the path of a URDF, from the folder of the configuration; of a xacro file, what xacro makes of it".into()
+            }
+            Self::NotUrdf { .. } => "check_urdf of ROS shows what is wrong with it; a xacro file must be expanded first".into(),
+            Self::UnknownJoint { nearest: Some(nearest), .. } => {
+                format!("did you mean urdf_joint = {nearest:?}? An axis that is no joint of the file has urdf_joint = \"off\"")
+            }
+            Self::UnknownJoint { known, .. } => {
+                format!("urdf_joint names the joint of the axis, or is \"off\"; the joints that move are: {}", known.join(", "))
+            }
+            Self::NotMoved { .. } => "name another joint by urdf_joint, or write urdf_joint = \"off\"".into(),
+            Self::Mimics { mimicked, .. } => format!(
+                "leave it to the mechanism, and configure {mimicked:?}; an axis with a drive of its own has urdf_joint = \"off\" and limits here"
+            ),
+            Self::OtherTravel { kind, .. } if *kind == SLIDES => "write travel = \"linear\", and the lead".into(),
+            Self::OtherTravel { .. } => "leave travel out, or name another joint by urdf_joint".into(),
+            Self::Wider { .. } => "narrow the limit of the configuration, or correct the robot description".into(),
+            Self::NoRoom { are_soft: true, .. } => "check soft_lower_limit and soft_upper_limit of its <safety_controller>".into(),
+            Self::NoRoom { .. } => {
+                "check lower and upper of its <limit>: rad or m, finite, the lower one first; a joint that turns without end is of type continuous"
+                    .into()
+            }
+        }
+    }
+}
+
+const SLIDES: &str = "prismatic";
+
+impl Urdf {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// It cannot be read, or is no URDF.
+    pub fn load(path: &Path) -> Result<Self, UrdfError> {
+        let unreadable =
+            |reason: String| UrdfError::Unreadable { file: printable_path(path), reason: excerpt(&reason) };
+        let bytes = crate::text_file::read(path).map_err(|error| unreadable(error.to_string()))?;
+        let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not text in UTF-8".to_owned()))?;
+        Self::parse(path, &text)
+    }
+
+    /// Reads a text. `path` is what messages call it.
+    ///
+    /// # Errors
+    /// It is no URDF.
+    pub fn parse(path: &Path, text: &str) -> Result<Self, UrdfError> {
+        let robot = urdf_rs::read_from_string(text).map_err(|error| UrdfError::NotUrdf {
+            file: printable_path(path),
+            reason: excerpt(&error.to_string()),
+        })?;
+        Ok(Self { path: path.to_owned(), robot })
+    }
+
+    /// Whether there is a joint of this name.
+    pub fn has_joint(&self, name: &str) -> bool {
+        self.robot.joints.iter().any(|joint| joint.name == name)
+    }
+
+    /// What it says of the joint of an axis.
+    ///
+    /// # Errors
+    /// There is no such joint, or no axis of this travel can move it, or its limits leave no room.
+    pub fn joint(&self, name: &str, travel: Travel) -> Result<UrdfJoint, UrdfError> {
+        let file = printable_path(&self.path);
+        let Some(joint) = self.robot.joints.iter().find(|joint| joint.name == name) else {
+            return Err(self.unknown(file, name));
+        };
+        let name = excerpt(name);
+        let kind = match joint.joint_type {
+            JointType::Revolute => "revolute",
+            JointType::Continuous => "continuous",
+            JointType::Prismatic => SLIDES,
+            JointType::Fixed => return Err(UrdfError::NotMoved { file, joint: name, kind: "fixed" }),
+            JointType::Floating => return Err(UrdfError::NotMoved { file, joint: name, kind: "floating" }),
+            JointType::Planar => return Err(UrdfError::NotMoved { file, joint: name, kind: "planar" }),
+            JointType::Spherical => return Err(UrdfError::NotMoved { file, joint: name, kind: "spherical" }),
+        };
+        if let Some(mimic) = &joint.mimic {
+            return Err(UrdfError::Mimics { file, joint: name, mimicked: excerpt(&mimic.joint) });
+        }
+        let is_linear = kind == SLIDES;
+        if is_linear != (travel != Travel::Rotary) {
+            let travel = if is_linear { "rotary" } else { "linear" };
+            return Err(UrdfError::OtherTravel { file, joint: name, kind, travel });
+        }
+        let said = |value: f64| Some(value).filter(|value| *value != 0.0 && *value != f64::INFINITY);
+        let position = match joint.joint_type {
+            JointType::Continuous => None,
+            _ => Some(position(joint, file, name.clone())?),
+        };
+        let (velocity, effort) = (said(joint.limit.velocity), said(joint.limit.effort));
+        Ok(UrdfJoint { name, file: self.path.clone(), is_linear, position, velocity, effort })
+    }
+
+    /// In what axes may do more than the joints of their names; empty where nothing contradicts the description. An axis without a joint
+    /// of its name is none of it.
+    pub fn contradictions(&self, config: &Config) -> Vec<UrdfError> {
+        config
+            .axes
+            .iter()
+            .filter(|axis| self.has_joint(&axis.name))
+            .flat_map(|axis| self.wider(axis))
+            .collect()
+    }
+
+    fn wider(&self, axis: &Axis) -> Vec<UrdfError> {
+        let joint = match self.joint(&axis.name, axis.travel) {
+            Ok(joint) => joint,
+            Err(error) => return vec![error],
+        };
+        let (q, limits) = (Quantities::of(axis.travel), &axis.limits);
+        let wider = |limit, value, allowed| {
+            let (file, axis) = (printable_path(&self.path), axis.name.clone());
+            UrdfError::Wider { file, axis, limit, value, allowed }
+        };
+        let magnitude = |limit, quantity: Quantity, value: f64, most: Option<f64>| {
+            let most = most.filter(|most| exceeds(value, *most, *most))?;
+            Some(wider(limit, quantity.show(value), quantity.show(most)))
+        };
+        let range = limits.position_max - limits.position_min;
+        let position = joint.position.filter(|([low, high], _)| {
+            exceeds(*low, limits.position_min, range) || exceeds(limits.position_max, *high, range)
+        });
+        let show = |[low, high]: [f64; 2]| format!("{} to {}", q.position.show(low), q.position.show(high));
+        let position = position.map(|(allowed, _)| {
+            wider("position", show([limits.position_min, limits.position_max]), show(allowed))
+        });
+        let velocity = magnitude("velocity", q.velocity, limits.velocity, joint.velocity);
+        let torque = magnitude("torque", q.effort, limits.torque, joint.effort);
+        [position, velocity, torque].into_iter().flatten().collect()
+    }
+
+    fn unknown(&self, file: String, name: &str) -> UrdfError {
+        let moves = |joint: &&Joint| {
+            let kind = &joint.joint_type;
+            matches!(kind, JointType::Revolute | JointType::Continuous | JointType::Prismatic)
+        };
+        let known: Vec<&str> =
+            self.robot.joints.iter().filter(moves).map(|joint| joint.name.as_str()).collect();
+        let nearest = spelling::nearest(name, known.iter().copied()).map(excerpt);
+        let known = known.into_iter().map(excerpt).collect();
+        UrdfError::UnknownJoint { file, joint: excerpt(name), nearest, known }
+    }
+}
+
+/// Whether a value is above another one, by more than the rounding of a unit.
+pub fn exceeds(value: f64, most: f64, scale: f64) -> bool {
+    value - most > 1e-9 * scale.abs()
+}
+
+/// The limits of the position: the narrower ones of `<limit>` and `<safety_controller>`.
+fn position(joint: &Joint, file: String, name: String) -> Result<([f64; 2], LimitOrigin), UrdfError> {
+    let (low, high) = (joint.limit.lower, joint.limit.upper);
+    // A comparison with NaN is false.
+    if !(low.is_finite() && high.is_finite() && low < high) {
+        return Err(UrdfError::NoRoom { file, joint: name, low, high, are_soft: false });
+    }
+    // Both are 0 where the file does not say them.
+    let soft = joint.safety_controller.as_ref().filter(|soft| {
+        (soft.soft_lower_limit, soft.soft_upper_limit) != (0.0, 0.0)
+            && (soft.soft_lower_limit > low || soft.soft_upper_limit < high)
+    });
+    let Some(soft) = soft else { return Ok(([low, high], LimitOrigin::Limit)) };
+    let (low, high) = (low.max(soft.soft_lower_limit), high.min(soft.soft_upper_limit));
+    if low < high {
+        Ok(([low, high], LimitOrigin::SafetyController))
+    } else {
+        Err(UrdfError::NoRoom { file, joint: name, low, high, are_soft: true })
+    }
+}
