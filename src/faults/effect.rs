@@ -14,6 +14,8 @@ pub enum Effect {
     Interface(InterfaceEffect),
     /// Frames from a foreign station.
     Foreign(ForeignFrames),
+    /// On a serial line, or on the selected requests and replies there.
+    Line(LineEffect),
     /// On a simulated drive.
     Drive {
         /// The node ID.
@@ -63,6 +65,28 @@ impl FrameEffect {
     }
 }
 
+/// The effect on a serial line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum LineEffect {
+    /// The request, or the reply, is lost.
+    Drop,
+    /// It is late; the next request may overtake it.
+    Delay {
+        /// The delay.
+        by_ns: Nanoseconds,
+    },
+    /// Some bits are inverted on the wire, behind the check sum.
+    Corrupt {
+        /// Number of bits.
+        bits: u8,
+        /// The part of the request, or of the reply.
+        part: Part,
+    },
+    /// The line is gone, like that of an adapter that is pulled out: nothing is sent or received.
+    Gone,
+}
+
 /// Where a received frame is delayed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DelayPlace {
@@ -72,12 +96,12 @@ pub enum DelayPlace {
     Bus,
 }
 
-/// A part of a frame.
+/// A part of a frame, or of a request or reply on a serial line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
-    /// The data.
+    /// The data. On a serial line: everything behind the address, the check sum too.
     Payload,
-    /// The identifier.
+    /// The identifier. On a serial line: the address, which is the first byte.
     Identifier,
 }
 

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds, Snapshot};
 
+use super::effect::Effect;
 use super::injectable::Injectable;
+use super::line::{LineFault, LineFaults};
 use super::port::FaultyPort;
 use super::scenario::{Scenario, ScenarioFault};
 use super::trigger::{Trigger, TriggerTimes};
@@ -26,13 +28,27 @@ impl FaultInjector {
         Self { scenario, trigger_times: Arc::default(), progress }
     }
 
-    /// Wraps the port of a bus in all of its faults. The first one of the file is nearest to the wire.
+    /// Wraps the port of a bus in all of its faults. The first one of the file is nearest to the wire. What a serial line
+    /// has beside is in [`FaultInjector::of_line`].
     pub fn wrap<P: Injectable + From<FaultyPort<P>>>(&self, bus: usize, port: P) -> P {
-        let own = self.progress().filter(|(fault, _)| fault.bus == bus);
+        let is_of_port = |fault: &ScenarioFault| fault.bus == bus && !matches!(fault.effect, Effect::Line(_));
+        let own = self.progress().filter(|(fault, _)| is_of_port(fault));
         own.fold(port, |port, (fault, progress)| {
             let trigger_times = Arc::clone(&self.trigger_times);
             FaultyPort::new(port, fault, trigger_times, Arc::clone(progress)).into()
         })
+    }
+
+    /// The faults of the requests and replies on a serial line. A CAN bus has none.
+    pub fn of_line(&self, bus: usize) -> LineFaults {
+        let faults = self.progress().filter(|(fault, _)| fault.bus == bus);
+        let of_line = faults.filter_map(|(fault, progress)| {
+            let Effect::Line(effect) = fault.effect else { return None };
+            let trigger_times = Arc::clone(&self.trigger_times);
+            let (window, selection) = (fault.window, fault.selection.clone());
+            Some(LineFault::new(effect, window, selection, trigger_times, Arc::clone(progress)))
+        });
+        LineFaults::new(of_line.collect())
     }
 
     /// Takes the snapshot of a cycle, for the triggers.
@@ -113,13 +129,17 @@ impl fmt::Display for FaultEvent<'_> {
             Some(seconds) => write!(f, "{seconds:.4} s after enabling: ")?,
             None => write!(f, "before enabling: ")?,
         }
-        let ScenarioFault { kind, location, line, .. } = self.fault;
+        let ScenarioFault { kind, location, line, effect, .. } = self.fault;
+        let (one, many) = match effect {
+            Effect::Line(_) => ("request or reply", "requests and replies"),
+            _ => ("frame", "frames"),
+        };
         write!(f, "fault `{kind}` on {location} (line {line}) ")?;
         match self.transition {
             Transition::Began => write!(f, "has begun"),
             Transition::Ended { frames: 0 } => write!(f, "has ended"),
-            Transition::Ended { frames: 1 } => write!(f, "has ended; it affected 1 frame"),
-            Transition::Ended { frames } => write!(f, "has ended; it affected {frames} frames"),
+            Transition::Ended { frames: 1 } => write!(f, "has ended; it affected 1 {one}"),
+            Transition::Ended { frames } => write!(f, "has ended; it affected {frames} {many}"),
             Transition::Impossible => write!(f, "is not possible here"),
         }
     }

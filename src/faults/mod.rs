@@ -10,6 +10,8 @@
 //!                        the state of the group; which faults have begun and ended
 //! ```
 //!
+//! A serial line has no frames. Its requests and replies pass through `LineFaults`, between its master and its port.
+//!
 //! Every fault is one wrapper around a port, so faults compose. A wrapper allocates no memory after its construction
 //! and reads no clock. The same seed gives the same faults in every run. Frames can be changed on any port, drives only
 //! where they are simulated.
@@ -18,6 +20,7 @@ mod effect;
 mod foreign;
 mod injectable;
 mod injector;
+mod line;
 mod port;
 mod read;
 mod scenario;
@@ -25,9 +28,10 @@ mod selection;
 mod trigger;
 mod window;
 
-pub use effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
+pub use effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, LineEffect, Part};
 pub use injectable::{Delivery, DriveEffect, InjectError, Injectable};
 pub use injector::{FaultEvent, FaultEvents, FaultInjector, Transition};
+pub use line::LineFaults;
 pub use port::FaultyPort;
 pub use read::ScenarioError;
 pub use scenario::{Scenario, ScenarioFault};

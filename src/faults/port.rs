@@ -130,7 +130,8 @@ impl<P: Injectable> FaultyPort<P> {
                     foreign_station.begin(now_ns);
                 }
             }
-            Effect::Frames(_) => {}
+            // Those of a serial line are between its master and the wire: see `LineFaults`.
+            Effect::Frames(_) | Effect::Line(_) => {}
         }
     }
 

@@ -24,7 +24,7 @@ pub struct ScenarioFault {
     pub bus: usize,
     /// When it is active.
     pub window: Window,
-    /// The selected frames. Only for [`Effect::Frames`], except for the seed.
+    /// The selected frames, or requests and replies. Only for [`Effect::Frames`] and [`Effect::Line`], except for the seed.
     pub selection: Selection,
     /// Its effect.
     pub effect: Effect,

@@ -88,7 +88,8 @@ impl DriveIdentifiers {
     }
 }
 
-/// Selects frames: a frame must meet all of these conditions.
+/// Selects frames: a frame must meet all of these conditions. Of requests and replies on a serial line, which have no identifiers, the
+/// direction and the address count, which is `node`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Selection {
     /// The direction.
@@ -135,6 +136,12 @@ impl Selection {
             && self.function.is_none_or(|function| is_canopen && function.includes(id))
             && self.node.is_none_or(|node| self.identifiers.include(frame, node))
     }
+
+    /// The same for a request to this address, or the reply to it, on a serial line.
+    pub(crate) fn includes_message(&self, address: u8, direction: Direction) -> bool {
+        (self.direction == Direction::Both || self.direction == direction)
+            && self.node.is_none_or(|node| node == address)
+    }
 }
 
 /// Picks frames, with probability and count.
@@ -154,7 +161,18 @@ impl Selector {
 
     /// Whether this frame is selected.
     pub fn picks(&mut self, frame: &Frame, direction: Direction) -> bool {
-        if self.left == 0 || !self.selection.includes(frame, direction) {
+        let is_included = self.selection.includes(frame, direction);
+        self.picks_if(is_included)
+    }
+
+    /// Whether a request to this address, or the reply to it, is selected.
+    pub fn picks_message(&mut self, address: u8, direction: Direction) -> bool {
+        let is_included = self.selection.includes_message(address, direction);
+        self.picks_if(is_included)
+    }
+
+    fn picks_if(&mut self, is_included: bool) -> bool {
+        if self.left == 0 || !is_included {
             return false;
         }
         // An `f64` holds 53 bits exactly.

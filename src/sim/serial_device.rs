@@ -17,6 +17,24 @@ pub trait SerialDevice: Send {
     fn advance(&mut self, now_ns: Nanoseconds, answer: &mut Vec<u8>) -> Nanoseconds;
 }
 
+/// A kind of simulated device on a serial line.
+#[derive(Clone, Copy, Debug)]
+pub struct SerialDeviceKind {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is.
+    pub what: &'static str,
+    /// What a person has to know to talk to it.
+    pub use_words: fn() -> String,
+    /// A device whose supply is switched on.
+    pub make: fn() -> Box<dyn SerialDevice>,
+}
+
+/// Every kind.
+pub fn kinds() -> &'static [SerialDeviceKind] {
+    &super::hollow_lines::DEVICES
+}
+
 /// The longest wait, so that a request to stop is noticed.
 const LONGEST_WAIT_NS: Nanoseconds = 20_000_000;
 /// Bytes that wait for a host that does not read. A device has no memory for more: they are lost.

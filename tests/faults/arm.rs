@@ -146,5 +146,8 @@ fn enabled_set_points(config: &Config, run: &mut VirtualRun<Port>) -> Vec<Option
 
 /// The true state of the drive of an axis.
 fn truth(run: &mut VirtualRun<Port>, axis: &Axis) -> Observation {
-    run.ports()[axis.bus].simulated_mut().unwrap().observe(axis.node).unwrap()
+    match run.line(axis.bus) {
+        Some(line) => line.lock().observe(axis.node).unwrap(),
+        None => run.ports()[axis.bus].simulated_mut().unwrap().observe(axis.node).unwrap(),
+    }
 }

@@ -160,7 +160,7 @@ fn identifiers(axis: &Axis) -> DriveIdentifiers {
             let own_protocol = other.map_or_else(Vec::new, |other| vec![other.request.id(), other.answer]);
             DriveIdentifiers::Node { own_protocol }
         }
-        Protocol::BitFields | Protocol::Own(_) => DriveIdentifiers::These(
+        Protocol::BitFields | Protocol::Own(_) | Protocol::SerialLine => DriveIdentifiers::These(
             axis.drive.frame_identifiers(axis.node).into_iter().map(|(id, _)| id).collect(),
         ),
     }

@@ -1,6 +1,6 @@
 //! The kinds of fault and their keys.
 
-use takt_rt::{Frame, Id};
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::common::{self, Location};
 use crate::canopen::nmt::{NmtCommand, NmtTarget};
@@ -8,11 +8,12 @@ use crate::config::bounds::Bounds;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Quantity, Travel};
+use crate::family;
 use crate::faults::effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
-use crate::faults::injectable::{DriveEffect, Injectable};
+use crate::faults::injectable::{DriveEffect, InjectError, Injectable};
 use crate::faults::selection::Selection;
 use crate::faults::window::Window;
-use crate::sim::{Defect, DriveFault, SimulatedBus};
+use crate::sim::{Defect, DriveFault, SimulatedBus, SimulatedLineDevices};
 
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -119,8 +120,7 @@ pub fn read(
     match kind {
         FaultKind::Drop => frames(section, location, config, |_| Some(FrameEffect::Drop)),
         FaultKind::Delay => frames(section, location, config, |section| {
-            let entry = section.require("by", "how much later they come: by = \"300 us\"")?;
-            let by_ns = common::duration(&entry, config);
+            let by_ns = delay(section, config);
             let places = [("machine", DelayPlace::Machine), ("bus", DelayPlace::Bus)];
             let place = section.get("where").map_or(Some(DelayPlace::Machine), |entry| entry.choice(&places));
             Some(FrameEffect::Delay { by_ns: by_ns?, place: place? })
@@ -130,10 +130,8 @@ pub fn read(
             Some(FrameEffect::Duplicate { copies: u8::try_from(copies).ok()? })
         }),
         FaultKind::Corrupt => frames(section, location, config, |section| {
-            let parts = [("payload", Part::Payload), ("identifier", Part::Identifier)];
-            let part = section.get("part").map_or(Some(Part::Payload), |entry| entry.choice(&parts));
-            let bits = section.get("bits").map_or(Some(1), |entry| entry.integer(1..65));
-            Some(FrameEffect::Corrupt { bits: u8::try_from(bits?).ok()?, part: part? })
+            let (bits, part) = corruption(section)?;
+            Some(FrameEffect::Corrupt { bits, part })
         }),
         FaultKind::Reorder => frames(section, location, config, |_| Some(FrameEffect::Reorder)),
         FaultKind::EchoLoss => sent_frames(section, location, config, FrameEffect::EchoLoss),
@@ -153,6 +151,20 @@ pub fn read(
         }
         FaultKind::Drive(effect) => drive(section, effect, location, config),
     }
+}
+
+/// Reads how much later something comes.
+pub fn delay(section: &mut Section<'_>, config: &Config) -> Option<Nanoseconds> {
+    let entry = section.require("by", "how much later they come: by = \"300 us\"")?;
+    common::duration(&entry, config)
+}
+
+/// Reads how many bits are inverted, and where.
+pub fn corruption(section: &mut Section<'_>) -> Option<(u8, Part)> {
+    let parts = [("payload", Part::Payload), ("identifier", Part::Identifier)];
+    let part = section.get("part").map_or(Some(Part::Payload), |entry| entry.choice(&parts));
+    let bits = section.get("bits").map_or(Some(1), |entry| entry.integer(1..65));
+    Some((u8::try_from(bits?).ok()?, part?))
 }
 
 fn frames<'a>(
@@ -257,7 +269,8 @@ fn bytes(entry: &Entry<'_>) -> Option<Vec<u8>> {
     list.iter().map(|byte| u8::try_from(byte.integer(0..256)?).ok()).collect()
 }
 
-fn drive(
+/// Reads the keys of a fault of a drive.
+pub fn drive(
     section: &mut Section<'_>,
     kind: DriveFaultKind,
     location: &Location<'_, '_>,
@@ -274,9 +287,7 @@ fn drive(
     if !location.is_simulated(config) {
         return None;
     }
-    // A trial with a simulated drive of the same configuration shows whether it can have the effect.
-    let mut trial = SimulatedBus::new(config, axis.bus);
-    if let (Err(error), Some(entry)) = (trial.inject(axis.node, effect, true), &location.entry) {
+    if let (Err(error), Some(entry)) = (trial(axis, effect, config), &location.entry) {
         let name = FaultKind::Drive(kind).name();
         match particular(section, effect) {
             Some((particular, value)) => {
@@ -291,6 +302,17 @@ fn drive(
         return None;
     }
     Some((window?, Selection::default(), Effect::Drive { node: axis.node, effect }))
+}
+
+/// A trial with a simulated drive of the same configuration shows whether it can have the effect.
+fn trial(axis: &Axis, effect: DriveEffect, config: &Config) -> Result<(), InjectError> {
+    if !config.is_serial_line(axis.bus) {
+        return SimulatedBus::new(config, axis.bus).inject(axis.node, effect, true);
+    }
+    let devices = family::of_line(config, axis.bus)
+        .and_then(|family| family.simulated_axes_on_line(config, axis.bus))
+        .ok_or(InjectError::NotSimulated)?;
+    SimulatedLineDevices::new(devices).inject(axis.node, effect, true)
 }
 
 /// The key, with its value, that the drive refuses: another value may be possible for the same axis.

@@ -3,6 +3,7 @@
 
 mod common;
 mod kind;
+mod line;
 
 use std::fmt;
 use std::path::Path;
@@ -109,7 +110,11 @@ fn fault(mut section: Section<'_>, text: &str, config: &Config) -> Option<Scenar
         section.finish();
         return None;
     };
-    let read = kind::read(&mut section, kind, &location, config);
+    let read = if config.is_serial_line(location.bus) {
+        line::read(&mut section, &entry, kind, &location, config)
+    } else {
+        kind::read(&mut section, kind, &location, config)
+    };
     section.finish();
     let (window, selection, effect) = read?;
     Some(ScenarioFault {
