@@ -46,7 +46,7 @@ pub(crate) mod function_code {
 }
 
 /// The node ID of a frame with `function`'s 11-bit identifier; `None` for other frames.
-fn node_of(frame: &takt_rt::Frame, function: u16) -> Option<u8> {
+pub(crate) fn node_of(frame: &takt_rt::Frame, function: u16) -> Option<u8> {
     let id = frame.id();
     let node = id.value().checked_sub(function.into())?;
     (!id.is_extended() && (1..=0x7F).contains(&node)).then_some(node as u8)

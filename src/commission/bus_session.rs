@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
 
-use super::{ProcedureError, Report, RunningTask};
+use super::{ProcedureError, RunningTask};
 use crate::procedure::ProcedureEvent;
 
 /// Interval between two polls of the bus.
@@ -27,13 +27,13 @@ pub enum SessionEvent {
 ///
 /// `is_interrupted` is called at each poll; each `true` interrupts the procedure once. `see` gets every event
 /// with the time since the beginning.
-pub fn run(
-    mut procedure: Box<dyn RunningTask<Frame>>,
+pub fn run<T: Clone>(
+    mut procedure: Box<dyn RunningTask<Frame, T>>,
     port: &mut impl BusPort,
     clock: &mut impl Clock,
     mut is_interrupted: impl FnMut() -> bool,
     mut see: impl FnMut(Nanoseconds, SessionEvent),
-) -> Result<Report, ProcedureError> {
+) -> Result<T, ProcedureError> {
     let began_ns = clock.now_ns();
     let mut next_poll_ns = began_ns;
     let mut sending = VecDeque::new();

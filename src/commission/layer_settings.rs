@@ -20,6 +20,9 @@ const DRAIN_NS: Nanoseconds = 10_000_000;
 /// Time within which every device replies to the same request.
 const FURTHER_REPLIES_NS: Nanoseconds = 100_000_000;
 
+/// A bus cannot have more devices than there are node IDs.
+const MOST_DEVICES: usize = 127;
+
 /// The node ID of a device that is not configured (CiA 305).
 pub const NO_NODE: u8 = 255;
 
@@ -230,6 +233,25 @@ impl<'a, P: BusPort, C: Clock> LayerSettings<'a, P, C> {
             Ok(_) | Err(LayerSettingFailure::Task(LssError::NoReply { .. })) => Ok(Some(found)),
             Err(failure) => Err(failure),
         }
+    }
+
+    /// Finds every device without a node ID, one after the other. Returns what was implausible, which ends the search.
+    ///
+    /// # Errors
+    /// Replies were lost, or the scan was interrupted. `found` has those that were found before.
+    pub fn scan_all(
+        &mut self,
+        found: &mut Vec<LssAddress>,
+    ) -> Result<Option<ImplausibleIdentity>, LayerSettingFailure> {
+        while found.len() < MOST_DEVICES {
+            match self.scan(found.last().copied()) {
+                Ok(Some(address)) => found.push(address),
+                Ok(None) => break,
+                Err(LayerSettingFailure::Implausible(identity)) => return Ok(Some(identity)),
+                Err(failure) => return Err(failure),
+            }
+        }
+        Ok(None)
     }
 
     /// Switches all devices to LSS waiting state. With `awaited`, waits for the boot-up message of the device that has

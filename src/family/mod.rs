@@ -21,6 +21,7 @@ mod error_words;
 pub(crate) mod hollow;
 mod off_cycle;
 mod registry;
+pub mod scan;
 mod simulated_bus;
 mod simulated_joint;
 mod warning;
@@ -53,6 +54,8 @@ use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
 pub use crate::family::commission::NamedEntry;
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
+use crate::family::scan::{FoundDevice, NodeIdentity, OwnProtocol, Recognised, StartingKeys};
+use crate::procedure::ModbusSession;
 use crate::sim::{DevicesOnLine, Drive};
 
 /// ZeroErr eRob with CANopen firmware.
@@ -66,6 +69,9 @@ pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
 /// [`Family::least_shut_down_ns`] of drives without a watchdog: longer than a bus is usually disturbed.
 const UNWATCHED_SHUT_DOWN_NS: Nanoseconds = 1_000_000_000;
 
+/// A look at a slave on a Modbus line: what it is, if it is a drive of the family.
+pub type LookingAtSlave<'a> = Pin<Box<dyn Future<Output = Option<FoundDevice>> + 'a>>;
+
 /// A part of bring-up or shutdown that is under way.
 pub type SettingUp<'a> = Pin<Box<dyn Future<Output = StepResult> + Send + 'a>>;
 
@@ -76,6 +82,38 @@ pub trait Family: ConfiguredFamily {
 
     /// The node ID of a drive that is alone on its line, where none is given.
     fn usual_node(&self) -> Option<u8> {
+        None
+    }
+
+    /// Who makes the drives of the family, where one vendor does.
+    fn maker(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Whether a CANopen node with this identity is a drive of the family, and how surely.
+    fn recognises(&self, identity: &NodeIdentity) -> Option<Recognised> {
+        let own = self.unconfigured()?.identity;
+        let is_it = own.vendor.is_some() && own.vendor == identity.vendor && own.product == identity.product;
+        is_it.then_some(Recognised::ByIdentity)
+    }
+
+    /// The protocols of their own by which drives of the family are found on a CAN bus.
+    fn own_protocols(&self) -> &'static [&'static dyn OwnProtocol] {
+        &[]
+    }
+
+    /// Looks whether a slave on a Modbus line of this bit rate, which has answered a read, is a drive of the family. It is read, and
+    /// nothing else. `None` where the drives of the family are on no such line.
+    fn recognises_on_line<'a>(
+        &'a self,
+        _session: &'a ModbusSession,
+        _bit_rate: u32,
+    ) -> Option<LookingAtSlave<'a>> {
+        None
+    }
+
+    /// The keys of an axis with a drive that a scan has found; `None` where a scan cannot tell enough for an axis.
+    fn starting_keys(&self, _found: &FoundDevice) -> Option<StartingKeys> {
         None
     }
 
@@ -104,6 +142,12 @@ pub trait Family: ConfiguredFamily {
 
     /// Who speaks to the drive of an axis where it answers too slowly for the cycle; `None` where it is spoken to in the cycle.
     fn off_cycle(&self, _axis: &Axis, _config: &Config) -> Option<Box<dyn OffCycleDrive>> {
+        None
+    }
+
+    /// The frame that takes the torque of a drive to which [`off_cycle`](Self::off_cycle) speaks, whatever it is doing. The real-time thread
+    /// sends it while a bus is behind, where frames of procedures do not leave.
+    fn off_cycle_stop_frame(&self, _axis: &Axis) -> Option<Frame> {
         None
     }
 
@@ -267,7 +311,7 @@ pub(crate) fn has_pdos(axis: &Axis, config: &Config) -> bool {
 
 /// Whether the drive of an axis is spoken to outside of the cycle.
 pub(crate) fn is_off_cycle(axis: &Axis, config: &Config) -> bool {
-    axis.drive.is_on_serial_line || of(&axis.drive).off_cycle(axis, config).is_some()
+    axis.drive.protocol.is_of_serial_line() || of(&axis.drive).off_cycle(axis, config).is_some()
 }
 
 /// Cycles of its bus within which a report of a drive is expected that is spoken to outside of the cycle. On a CAN bus that is one; on a

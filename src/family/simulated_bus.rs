@@ -22,7 +22,8 @@ pub(super) fn gravity(axis: &Axis) -> Gravity {
 /// The drives that simulate the axes of a bus, one for each node, with all of its axes.
 pub(crate) fn simulated_drives(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
     // Those of a serial line are on that line.
-    let axes = || config.axes.iter().filter(|axis| axis.bus == bus && !axis.drive.is_on_serial_line);
+    let axes =
+        || config.axes.iter().filter(|axis| axis.bus == bus && !axis.drive.protocol.is_of_serial_line());
     let is_first = |axis: &&Axis| {
         axes().all(|other| other.node != axis.node || other.drive.node_axis >= axis.drive.node_axis)
     };

@@ -265,8 +265,9 @@ impl Config {
                     "it is spoken to beside the cycle: at most {} requests in a second, {} of its bus; a report every {} at the \
                      longest",
                     budget.requests_per_s.round(),
-                    Quantity::FRACTION.show(budget.bus_share),
-                    Quantity::DURATION.show(budget.report_ns as f64 / 1e9)
+                    // No budget is known to more digits than these.
+                    Quantity::FRACTION.show((budget.bus_share * 100.0).round() / 100.0),
+                    Quantity::DURATION.show((budget.report_ns as f64 / 1e5).round() / 1e4)
                 )
             });
             let losses = family.remarks(axis).into_iter().map(str::to_owned).chain(beside_the_cycle);
@@ -286,7 +287,7 @@ impl Config {
     /// A drive on a serial line waits for its master longer than some lost rounds take.
     fn short_timeout(&self, axis: &Axis) -> Option<WarningKind> {
         let budget = registry::of(&axis.drive).off_cycle_budget(axis, self)?;
-        let timeout_ns = budget.watchdog_ns.filter(|_| axis.drive.is_on_serial_line)?;
+        let timeout_ns = budget.watchdog_ns.filter(|_| axis.drive.protocol.is_of_serial_line())?;
         let needed_ns = LOST_ROUNDS * budget.report_ns;
         (timeout_ns < needed_ns).then_some(WarningKind::ShortTimeout { timeout_ns, needed_ns })
     }

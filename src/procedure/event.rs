@@ -11,6 +11,13 @@ pub enum ProcedureEvent {
     Note(String),
     /// A reading of the axis.
     Reading(AxisReading),
+    /// So much of the work is done.
+    Progress {
+        /// What is done, in units of the procedure's own.
+        done: u32,
+        /// What there is to do, as far as that is known now.
+        of: u32,
+    },
 }
 
 /// One reading of an axis, in SI units: rad (m) and seconds.
@@ -28,6 +35,8 @@ pub struct AxisReading {
     pub torque: Option<f64>,
     /// Motor current in A, if the drive reports it.
     pub current_a: Option<f64>,
+    /// Temperature in °C, if the drive reports it and it was asked for.
+    pub temperature_c: Option<f64>,
     /// The statusword, if the drive has one.
     pub statusword: Option<u16>,
     /// The state of the drive, as a name.

@@ -42,6 +42,11 @@ impl ModbusSession {
         self.client().slave
     }
 
+    /// Turns to another slave of the line.
+    pub(crate) fn turn_to(&self, slave: SlaveAddress) {
+        self.client_mut().slave = slave;
+    }
+
     /// Requests that were sent again, because their reply did not come or was damaged.
     pub fn repeated_requests(&self) -> u64 {
         self.client().master.repeated_requests()

@@ -158,6 +158,11 @@ impl<C> ProcedureSession<C> {
         self.state_mut().events.push_back(ProcedureEvent::Reading(reading));
     }
 
+    /// Reports how much of the work is done.
+    pub(crate) fn progress(&self, done: u32, of: u32) {
+        self.state_mut().events.push_back(ProcedureEvent::Progress { done, of });
+    }
+
     /// Counts a finished access, for the progress.
     pub(crate) fn count_done(&self) {
         self.state_mut().done += 1;

@@ -16,7 +16,8 @@ use takt_rt::{
 
 use super::bring_up::{AxisSession, ProcessData};
 use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
-use super::{DataSheet, Family, SettingUp, UNWATCHED_SHUT_DOWN_NS};
+use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
+use super::{DataSheet, Family, LookingAtSlave, SettingUp, UNWATCHED_SHUT_DOWN_NS};
 use crate::config::bit_fields::{
     self, BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings,
 };
@@ -24,6 +25,7 @@ use crate::config::{
     Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, ErrorControl, FamilyKeys,
     ModeChangeRule, ModeSet, Protocol, Quantity,
 };
+use crate::procedure::ModbusSession;
 use crate::sim::Drive;
 use crate::sim::bit_fields::FieldSimulation;
 
@@ -47,6 +49,22 @@ pub struct BitFieldFamily {
     pub on_line: Option<BeginOnLine>,
     /// What a pulse at the PWM input of a model is, where the drives have one.
     pub pulse_width: Option<CalculatePulse>,
+    /// How the drives are found on a bus or a line, where that is known.
+    pub found_by: Option<FoundBy>,
+}
+
+/// Looks at a slave on a line of a bit rate.
+pub type LookOnLine = for<'a> fn(&'a ModbusSession, u32) -> LookingAtSlave<'a>;
+
+/// How the drives of a family are found.
+#[derive(Clone, Copy, Debug)]
+pub struct FoundBy {
+    /// Their protocols on a CAN bus.
+    pub protocols: &'static [&'static dyn OwnProtocol],
+    /// A look at a slave on a Modbus line, where the drives may be on one.
+    pub on_line: Option<LookOnLine>,
+    /// The keys of an axis with such a drive.
+    pub starting_keys: fn(&FoundDevice) -> Option<StartingKeys>,
 }
 
 /// Drives whose description the configuration names.
@@ -57,6 +75,7 @@ pub static FROM_FILE: BitFieldFamily = BitFieldFamily {
     describe: described,
     on_line: None,
     pulse_width: None,
+    found_by: None,
 };
 
 /// The descriptions that come with takt.
@@ -250,6 +269,22 @@ impl Family for BitFieldFamily {
     /// Nothing is known of a drive without its scales: the keys of an axis.
     fn unconfigured(&self) -> Option<DriveFamily> {
         None
+    }
+
+    fn own_protocols(&self) -> &'static [&'static dyn OwnProtocol] {
+        self.found_by.map_or(&[], |found_by| found_by.protocols)
+    }
+
+    fn recognises_on_line<'a>(
+        &'a self,
+        session: &'a ModbusSession,
+        bit_rate: u32,
+    ) -> Option<LookingAtSlave<'a>> {
+        self.found_by?.on_line.map(|look| look(session, bit_rate))
+    }
+
+    fn starting_keys(&self, found: &FoundDevice) -> Option<StartingKeys> {
+        (self.found_by?.starting_keys)(found)
     }
 
     /// There are no PDOs.

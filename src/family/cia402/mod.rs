@@ -12,7 +12,7 @@ mod starting;
 
 pub use device::Device;
 use remarks::remarks;
-pub use starting::starting_configuration;
+pub use starting::{name_by_sheet, starting_configuration};
 
 use std::path::PathBuf;
 
@@ -21,6 +21,7 @@ use takt_rt::{Frame, Id, MappedObject};
 use super::bring_up::AxisSession;
 use super::commission::dictionary::ObjectEntry;
 use super::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
+use super::scan::{FoundDevice, NodeIdentity, Recognised, StartingKeys};
 use super::{DataSheet, Family, SettingUp};
 use crate::canopen::object::Object;
 use crate::canopen::objects::PdoDirection;
@@ -33,6 +34,9 @@ use bring_up::Sheet;
 pub struct Cia402;
 
 const FACTS: DriveFacts = DriveFacts::standard("cia402", "CiA 402 drive");
+
+/// The number of the device profile.
+const PROFILE: u32 = 402;
 
 /// A drive of which nothing is known but what the standard says.
 pub(crate) fn undescribed() -> DriveFamily {
@@ -97,6 +101,16 @@ impl Family for Cia402 {
     /// Nothing is known of a drive without its data sheet but what the standard says.
     fn unconfigured(&self) -> Option<DriveFamily> {
         None
+    }
+
+    /// By the device profile in the lower half of object 1000.
+    fn recognises(&self, identity: &NodeIdentity) -> Option<Recognised> {
+        let is_drive = identity.device_type.is_some_and(|device_type| device_type & 0xFFFF == PROFILE);
+        is_drive.then_some(Recognised::ByProfile)
+    }
+
+    fn starting_keys(&self, found: &FoundDevice) -> Option<StartingKeys> {
+        Some(starting::keys(found))
     }
 
     fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {

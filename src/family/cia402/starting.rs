@@ -7,6 +7,7 @@ use takt_rt::CommandSlot;
 
 use super::device::Device;
 use crate::config::{DriveFacts, MODES, mode_word};
+use crate::family::scan::{FoundDevice, StartingKeys};
 
 /// The text of a configuration with this drive, and an axis for each of its own. It is complete, and runs on a simulated bus; what nobody but
 /// the owner of the machine can know is marked.
@@ -31,6 +32,36 @@ pub fn starting_configuration(device: &Device, eds: &Path, node: u8) -> String {
         line("[[program.move]]\nto = \"10 deg\"\n\n[[program.move]]\nto = \"0 deg\"".to_owned());
     }
     text
+}
+
+/// Says of a device that a scan has found what its data sheet says, if it is the sheet of its vendor and product.
+pub fn name_by_sheet(found: &mut FoundDevice, device: &Device, eds: &Path) {
+    let of_sheet = device.facts(super::FACTS).identity;
+    let is_its = found.identity.is_some_and(|own| {
+        of_sheet.vendor.is_some() && own.vendor == of_sheet.vendor && own.product == of_sheet.product
+    });
+    if !is_its {
+        return;
+    }
+    let sheet = &device.dictionary.device;
+    found.vendor = sheet.vendor_name.clone().or_else(|| found.vendor.take());
+    found.product = sheet.product_name.clone().or_else(|| found.product.take());
+    found.sheet = Some(eds.to_owned());
+}
+
+/// The keys of an axis with a drive that a scan has found, and whose data sheet only its owner has.
+pub fn keys(found: &FoundDevice) -> StartingKeys {
+    let node = found.node.unwrap_or(1);
+    let eds = match &found.sheet {
+        Some(eds) => format!("eds = {:?}", eds.display().to_string()),
+        None => format!("eds = \"node-{node}.eds\"  # YOURS: the data sheet of the drive, from its vendor"),
+    };
+    let axis = [
+        eds,
+        "counts_per_turn = 65536  # YOURS, unless the data sheet says it".to_owned(),
+        "gear_ratio = 1  # YOURS: turns of the reported position for one turn of the joint".to_owned(),
+    ];
+    StartingKeys { axis: axis.to_vec(), ..StartingKeys::default() }
 }
 
 fn axis_lines(axis: &Device, eds: &Path, node: u8, line: &mut impl FnMut(String)) {

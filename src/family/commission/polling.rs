@@ -9,11 +9,11 @@ use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
 use super::task::MoveKind;
 use crate::canopen::objects::POSITION_ACTUAL_VALUE;
-use crate::procedure::AxisReading;
+use crate::procedure::{AxisReading, ProcedureSession};
 
-/// Shows a reading at each interval until the time is over.
-pub async fn watch(
-    c: &SdoSession,
+/// Shows a reading at each interval until the time is over, whatever the drive is spoken to by.
+pub async fn watch<C>(
+    c: &ProcedureSession<C>,
     every_ns: Nanoseconds,
     duration_ns: Option<Nanoseconds>,
     mut read: impl AsyncFnMut() -> Result<AxisReading, Failure>,
@@ -31,8 +31,8 @@ pub async fn watch(
 }
 
 /// Polls `read` at an interval until the time is over, and shows each reading; `check` can end it earlier with a failure.
-pub async fn poll_until(
-    c: &SdoSession,
+pub async fn poll_until<C>(
+    c: &ProcedureSession<C>,
     every_ns: Nanoseconds,
     duration_ns: Option<Nanoseconds>,
     mut read: impl AsyncFnMut() -> Result<AxisReading, Failure>,
@@ -50,7 +50,10 @@ pub async fn poll_until(
             return Ok(());
         }
         let pause_ns = every_ns.saturating_sub(since(begun_ns));
-        c.pause(pause_ns.min(left_ns.unwrap_or(pause_ns))).await?;
+        c.pause(pause_ns.min(left_ns.unwrap_or(pause_ns))).await;
+        if c.is_interrupted() {
+            return Err(Failure::Interrupted);
+        }
     }
 }
 

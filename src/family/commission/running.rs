@@ -36,7 +36,8 @@ impl<M> DriveTask<M> {
 }
 
 /// A procedure of commissioning, whichever client it has: it takes time and messages, and returns messages, events and an outcome.
-pub trait RunningTask<M> {
+/// `T` is what it brings.
+pub trait RunningTask<M, T = Report> {
     /// Advances it to `now_ns` and sends its messages.
     fn poll(&mut self, now_ns: Nanoseconds, send: &mut dyn FnMut(M));
 
@@ -50,10 +51,10 @@ pub trait RunningTask<M> {
     fn take_event(&mut self) -> Option<ProcedureEvent>;
 
     /// The result; `None` while it runs.
-    fn outcome(&self) -> Option<&Result<Report, ProcedureError>>;
+    fn outcome(&self) -> Option<&Result<T, ProcedureError>>;
 }
 
-impl<C: Client> RunningTask<C::Message> for Procedure<C, Report, Failure> {
+impl<C: Client, T> RunningTask<C::Message, T> for Procedure<C, T, Failure> {
     fn poll(&mut self, now_ns: Nanoseconds, mut send: &mut dyn FnMut(C::Message)) {
         Procedure::poll(self, now_ns, &mut send);
     }
@@ -70,7 +71,7 @@ impl<C: Client> RunningTask<C::Message> for Procedure<C, Report, Failure> {
         Procedure::take_event(self)
     }
 
-    fn outcome(&self) -> Option<&Result<Report, ProcedureError>> {
+    fn outcome(&self) -> Option<&Result<T, ProcedureError>> {
         Procedure::outcome(self)
     }
 }

@@ -32,6 +32,8 @@ const SILENCE_NS: Nanoseconds = 5_000_000;
 const REQUESTS_PER_ROUND: u64 = 3;
 /// A drive that is to be disabled is told so again after so many of them.
 const ROUNDS_TO_REPETITION: usize = 8;
+/// The temperature takes the place of the current once in so many of them, a multiple of four.
+const ROUNDS_TO_TEMPERATURE: usize = 32;
 /// The set-points of a controller that is alive are never so old.
 const STALE_NS: Nanoseconds = 100_000_000;
 /// A drive that has not answered for so long is stopped as soon as it answers again.
@@ -153,6 +155,8 @@ pub struct Follower {
     position: Option<Seen>,
     velocity: Seen,
     torque: f64,
+    /// °C
+    temperature: Option<f32>,
     continuous_current: Option<i32>,
     /// Which reading is next.
     turn: usize,
@@ -198,6 +202,7 @@ impl Follower {
             position: None,
             velocity: Seen::default(),
             torque: 0.0,
+            temperature: None,
             continuous_current: None,
             turn: 0,
             answered_ns: None,
@@ -256,6 +261,8 @@ impl Follower {
             self.continuous_current = Some(value);
         } else if address == entries::MOTOR_CURRENT.address {
             self.torque = self.torque_of(value);
+        } else if address == entries::TEMPERATURE.address {
+            self.temperature = Some(value as f32);
         } else if address == entries::ERROR_CODE.address {
             self.take_error(value as u16);
         }
@@ -409,7 +416,6 @@ impl Follower {
         } else {
             &entries::CONTINUOUS_CURRENT
         };
-        let others = [&entries::ACTUAL_VELOCITY, &entries::ERROR_CODE, &entries::ACTUAL_VELOCITY, current];
         let place = self.turn % REQUESTS_PER_ROUND as usize;
         // Without a set-point its place in the round is passed over.
         self.turn += if place == 0 { 2 } else { 1 };
@@ -417,6 +423,9 @@ impl Follower {
             return Request::Read(entries::ACTUAL_POSITION.address);
         }
         let round = self.turn / REQUESTS_PER_ROUND as usize;
+        let slow =
+            if (round + 1).is_multiple_of(ROUNDS_TO_TEMPERATURE) { &entries::TEMPERATURE } else { current };
+        let others = [&entries::ACTUAL_VELOCITY, &entries::ERROR_CODE, &entries::ACTUAL_VELOCITY, slow];
         Request::Read(others[round % others.len()].address)
     }
 
@@ -452,6 +461,7 @@ impl Follower {
             velocity: self.velocity.value,
             torque: self.torque,
             error_code,
+            temperature: self.temperature,
         })
     }
 }

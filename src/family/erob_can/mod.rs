@@ -16,14 +16,17 @@ pub mod follower;
 pub mod module;
 pub mod motion;
 mod reading;
+mod scan;
 pub mod session;
 mod simulated;
 
 pub use facts::FACTS;
+pub use scan::MAKER;
 
 use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
+use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
 use super::{
     Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol, SettingUp,
     UNWATCHED_SHUT_DOWN_NS,
@@ -32,6 +35,8 @@ use crate::canopen::function_code;
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::sdo::SdoRequest;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
+use crate::erob_can::entries;
+use crate::erob_can::frame::Request;
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::sim::Drive;
 use follower::Follower;
@@ -55,6 +60,19 @@ impl Family for ErobCan {
         Some(DriveFamily::of_family(&FACTS))
     }
 
+    fn maker(&self) -> Option<&'static str> {
+        Some(MAKER)
+    }
+
+    fn own_protocols(&self) -> &'static [&'static dyn OwnProtocol] {
+        &[&scan::OwnScan]
+    }
+
+    fn starting_keys(&self, _: &FoundDevice) -> Option<StartingKeys> {
+        // In each period of its bus a report of the drive is expected.
+        Some(StartingKeys { bus: vec!["period = \"10 ms\"".to_owned()], ..StartingKeys::default() })
+    }
+
     /// It has none.
     fn process_data(&self, _: &Axis) -> ProcessData {
         ProcessData::default()
@@ -62,6 +80,10 @@ impl Family for ErobCan {
 
     fn off_cycle(&self, axis: &Axis, config: &Config) -> Option<Box<dyn OffCycleDrive>> {
         Some(Box::new(Follower::new(axis, config.cycle.period_ns)?))
+    }
+
+    fn off_cycle_stop_frame(&self, axis: &Axis) -> Option<Frame> {
+        Some(Request::Write(entries::MOTOR_ENABLE.address, 0).frame(axis.node))
     }
 
     fn off_cycle_budget(&self, axis: &Axis, config: &Config) -> Option<OffCycleBudget> {

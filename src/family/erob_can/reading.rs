@@ -25,16 +25,20 @@ pub async fn read(
         velocity: target.velocity(velocity.into()),
         torque: None,
         current_a: Some(f64::from(current_ma) / 1000.0),
+        temperature_c: None,
         statusword: None,
         state,
     })
 }
 
-/// As [`read`], with the state that the drive tells.
+/// As [`read`], with the state and the temperature that the drive tells.
 pub async fn read_with_state(
     session: &ErobCanSession,
     target: &TargetDrive,
 ) -> Result<AxisReading, RequestError> {
     let state = session.read(&entries::TARGET_REACHED_STATE).await?;
-    read(session, target, entries::TARGET_REACHED_STATE.meaning(state).unwrap_or("unknown")).await
+    let temperature = session.read(&entries::TEMPERATURE).await?;
+    let state = entries::TARGET_REACHED_STATE.meaning(state).unwrap_or("unknown");
+    let reading = read(session, target, state).await?;
+    Ok(AxisReading { temperature_c: Some(temperature.into()), ..reading })
 }

@@ -10,7 +10,8 @@ pub use facts::FACTS;
 
 use takt_rt::Frame;
 
-use super::{Family, OtherProtocol, SettingUp};
+use super::scan::{FoundDevice, StartingKeys};
+use super::{Family, OtherProtocol, SettingUp, erob_can};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
@@ -39,6 +40,14 @@ impl ConfiguredFamily for ErobCanopen {
 impl Family for ErobCanopen {
     fn unconfigured(&self) -> Option<DriveFamily> {
         Some(super::EROB_CANOPEN)
+    }
+
+    fn maker(&self) -> Option<&'static str> {
+        Some(erob_can::MAKER)
+    }
+
+    fn starting_keys(&self, _: &FoundDevice) -> Option<StartingKeys> {
+        Some(StartingKeys::default())
     }
 
     fn configure<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a> {

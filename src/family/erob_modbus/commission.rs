@@ -183,27 +183,8 @@ async fn watch(
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
     let session = drive.session();
-    session.step("watch");
-    let (began_ns, mut count) = (session.now_ns(), 0_u64);
-    loop {
-        let begun_ns = session.now_ns();
-        let status = drive.status().await?;
-        session.show(reading(session.now_ns(), s, &status));
-        count += 1;
-        let since = |then_ns: Nanoseconds| session.now_ns().saturating_sub(then_ns);
-        let left_ns = duration_ns.map(|duration_ns| duration_ns.saturating_sub(since(began_ns)));
-        if left_ns == Some(0) {
-            break;
-        }
-        let pause_ns = every_ns.saturating_sub(since(begun_ns));
-        session.pause(pause_ns.min(left_ns.unwrap_or(pause_ns))).await;
-        if session.is_interrupted() {
-            return Err(Failure::Interrupted);
-        }
-    }
-    let mut report = Report::new();
-    report.add("readings", "readings", count, count.to_string());
-    Ok(report)
+    let read = async || Ok(reading(session.now_ns(), s, &drive.status().await?));
+    polling::watch(session, every_ns, duration_ns, read).await
 }
 
 /// `move`
@@ -340,6 +321,7 @@ fn reading(at_ns: Nanoseconds, s: &TargetDrive, status: &Status) -> AxisReading 
         velocity: s.velocity(status.velocity.into()),
         torque: None,
         current_a: Some(f64::from(status.current_ma) / 1000.0),
+        temperature_c: Some(status.temperature_c.into()),
         statusword: None,
         state: state_of(status),
     }

@@ -75,6 +75,8 @@ pub struct Status {
     pub velocity: i32,
     /// mA
     pub current_ma: i32,
+    /// °C
+    pub temperature_c: i32,
 }
 
 /// Register 0x0061.
@@ -198,7 +200,8 @@ impl ErobDrive {
     pub async fn status(&self) -> Result<Status, AccessError> {
         let status = self.block(&registers::FAULT_CODE, 2).await?;
         let place = self.block(&registers::REACHED_STATUS, 7).await?;
-        let speed = self.block(&registers::DEMANDED_VELOCITY, 10).await?;
+        // The manual reads velocities, currents, voltage and temperature in one request.
+        let speed = self.block(&registers::DEMANDED_VELOCITY, 13).await?;
         let double = |words: &Values, from: &Register, register: &Register| {
             let at = usize::from(register.address - from.address);
             words.get(at..at + 2).and_then(|words| register.decode(words)).unwrap_or(0) as i32
@@ -211,6 +214,7 @@ impl ErobDrive {
             position: double(&place, &registers::REACHED_STATUS, &registers::ACTUAL_POSITION),
             velocity: double(&speed, &registers::DEMANDED_VELOCITY, &registers::ACTUAL_VELOCITY),
             current_ma: double(&speed, &registers::DEMANDED_VELOCITY, &registers::MOTOR_CURRENT),
+            temperature_c: i32::from(word(&speed, 12) as i16),
         })
     }
 

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use takt_rt::OperationMode;
 
-use crate::config::{DriveFacts, ErrorControl, ModeChangeRule, ModeSet, Plausible, VelocityUnit};
+use crate::config::{DriveFacts, ErrorControl, ModeChangeRule, ModeSet, Plausible, Protocol, VelocityUnit};
 
 /// The facts.
 pub static FACTS: DriveFacts = DriveFacts {
@@ -14,7 +14,7 @@ pub static FACTS: DriveFacts = DriveFacts {
     // The axis follows positions. How it is commanded for that is no matter of a configuration.
     modes: ModeSet::of(&[OperationMode::CyclicSynchronousPosition]),
     mode_changes: ModeChangeRule::Never { because: "the axis follows positions at its own rate" },
-    is_on_serial_line: true,
+    protocol: Protocol::SerialLine,
     bit_rates: &[9_600, 19_200, 38_400, 115_200],
     has_fixed_process_data: true,
     reports_mode: false,

@@ -27,6 +27,8 @@ const ENABLED_NS: Nanoseconds = 500_000_000;
 const AGAIN_NS: Nanoseconds = 500_000_000;
 /// A joint that does not come to rest in this time is disabled all the same.
 const STOPPING_NS: Nanoseconds = 2_000_000_000;
+/// Once in so many readings beside the position, the temperature is read.
+const OTHERS_TO_TEMPERATURE: usize = 32;
 /// A joint slower than this stands: counts/s. The readings of a joint at rest are not quite 0.
 const STANDING: f64 = 300.0;
 /// The set-points of a controller that is alive are never so old.
@@ -103,6 +105,8 @@ enum Reading {
     Fault,
     /// The continuous current, for which the torque is known: 0x00B0 and 0x00B1.
     Rating,
+    /// 0x0078
+    Temperature,
 }
 
 impl Reading {
@@ -112,6 +116,7 @@ impl Reading {
             Self::Place => (registers::REACHED_STATUS, 7),
             Self::Speed => (registers::DEMANDED_VELOCITY, 10),
             Self::Rating => (registers::CONTINUOUS_CURRENT, 2),
+            Self::Temperature => (registers::TEMPERATURE, 1),
         };
         RegisterRange::new(first.address, count)
     }
@@ -139,6 +144,8 @@ struct Seen {
     speed_at_ns: Nanoseconds,
     milliamperes: f64,
     continuous_milliamperes: Option<f64>,
+    /// °C
+    temperature: Option<f32>,
     fault: u16,
     is_motor_off: bool,
 }
@@ -188,6 +195,7 @@ impl Follower {
                 speed_at_ns: 0,
                 milliamperes: 0.0,
                 continuous_milliamperes: None,
+                temperature: None,
                 fault: 0,
                 is_motor_off: true,
             },
@@ -244,6 +252,8 @@ impl Follower {
             Reading::Speed
         } else if needs_rating && self.others.is_multiple_of(8) {
             Reading::Rating
+        } else if self.others.is_multiple_of(OTHERS_TO_TEMPERATURE) {
+            Reading::Temperature
         } else if self.others.is_multiple_of(2) {
             Reading::Fault
         } else {
@@ -501,6 +511,9 @@ impl Follower {
             Reading::Rating => {
                 self.seen.continuous_milliamperes = Some(number(&registers::CONTINUOUS_CURRENT)?);
             }
+            Reading::Temperature => {
+                self.seen.temperature = Some(number(&registers::TEMPERATURE)? as f32);
+            }
             Reading::Place => {
                 let reached = ReachedStatus::from(values.first().copied()?);
                 self.seen.is_motor_off = reached == ReachedStatus::MotorOff;
@@ -534,6 +547,7 @@ impl Follower {
             velocity: velocity / self.parameters.counts_per_unit,
             torque: direction * milliamperes * per_milliampere,
             error_code: shown,
+            temperature: self.seen.temperature,
         }
     }
 }

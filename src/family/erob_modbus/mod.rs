@@ -24,6 +24,7 @@ pub mod follower;
 pub mod line;
 pub mod motion;
 pub mod registers;
+mod scan;
 mod selection;
 mod simulated;
 
@@ -32,10 +33,12 @@ pub use facts::FACTS;
 use takt_rt::Frame;
 
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
-use super::{Family, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp};
+use super::scan::{FoundDevice, StartingKeys};
+use super::{Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, erob_can};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::modbus::frame::SlaveAddress;
+use crate::procedure::ModbusSession;
 use crate::sim::{DevicesOnLine, Drive};
 use axis::LineKeys;
 use budget::LineBudget;
@@ -56,13 +59,31 @@ impl ConfiguredFamily for ErobModbus {
     }
 
     fn is_on_serial_line(&self) -> bool {
-        FACTS.is_on_serial_line
+        FACTS.protocol.is_of_serial_line()
     }
 }
 
 impl Family for ErobModbus {
     fn unconfigured(&self) -> Option<DriveFamily> {
         Some(DriveFamily::of_family(&FACTS))
+    }
+
+    fn maker(&self) -> Option<&'static str> {
+        Some(erob_can::MAKER)
+    }
+
+    fn recognises_on_line<'a>(
+        &'a self,
+        session: &'a ModbusSession,
+        bit_rate: u32,
+    ) -> Option<LookingAtSlave<'a>> {
+        Some(Box::pin(scan::look(session, bit_rate)))
+    }
+
+    fn starting_keys(&self, _: &FoundDevice) -> Option<StartingKeys> {
+        let timeout =
+            "communication_timeout = \"500 ms\"  # YOURS: its motor stops so long after the last request";
+        Some(StartingKeys { axis: vec![timeout.to_owned()], ..StartingKeys::default() })
     }
 
     /// It has none.

@@ -466,6 +466,7 @@ fn reading(at_ns: Nanoseconds, status: Status) -> AxisReading {
         velocity: f64::from(status.velocity) / COUNTS_PER_RADIAN,
         torque: None,
         current_a: Some(f64::from(status.current_ma) / 1000.0),
+        temperature_c: Some(status.temperature_c.into()),
         statusword: None,
         state: "enabled",
     }

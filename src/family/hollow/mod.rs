@@ -15,10 +15,11 @@ mod lines;
 pub mod pwm;
 mod pwm_task;
 mod registers_task;
+mod scan;
 
 use crate::config::FamilyKeys;
 use crate::config::bit_fields::Description;
-use crate::family::bit_fields::{BitFieldFamily, shipped};
+use crate::family::bit_fields::{BitFieldFamily, FoundBy, shipped};
 
 pub use lines::{CONSOLE, ENCODER, PULSE};
 
@@ -30,6 +31,11 @@ pub static CAN: BitFieldFamily = BitFieldFamily {
     describe: can,
     on_line: None,
     pulse_width: Some(pwm_task::report),
+    found_by: Some(FoundBy {
+        protocols: &[&scan::CanScan],
+        on_line: None,
+        starting_keys: scan::starting_keys,
+    }),
 };
 
 /// Motors over CAN FD, also behind a converter from RS-485.
@@ -40,6 +46,11 @@ pub static CAN_FD: BitFieldFamily = BitFieldFamily {
     describe: |_| Some(shipped("hollow-can-fd", include_str!("can_fd.toml"))),
     on_line: Some(registers_task::begin),
     pulse_width: Some(pwm_task::report),
+    found_by: Some(FoundBy {
+        protocols: &[&scan::FdScan],
+        on_line: Some(|session, bit_rate| Box::pin(scan::look(session, bit_rate))),
+        starting_keys: scan::starting_keys,
+    }),
 };
 
 fn can(keys: &mut FamilyKeys<'_, '_>) -> Option<Description> {

@@ -15,6 +15,7 @@ pub(crate) use process_data::answers_sync;
 
 use takt_rt::Frame;
 
+use super::scan::{FoundDevice, StartingKeys};
 use super::{Family, MappingMatch, SettingUp};
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
@@ -42,6 +43,19 @@ impl ConfiguredFamily for YzAim {
 impl Family for YzAim {
     fn unconfigured(&self) -> Option<DriveFamily> {
         Some(super::YZ_AIM)
+    }
+
+    fn maker(&self) -> Option<&'static str> {
+        Some("YZ-AIM")
+    }
+
+    fn starting_keys(&self, _: &FoundDevice) -> Option<StartingKeys> {
+        let ratio = "gear_ratio = 1  # YOURS: turns of the motor for one turn of the joint";
+        Some(StartingKeys {
+            axis: vec![ratio.to_owned()],
+            cycle_period: Some("2 ms"),
+            ..StartingKeys::default()
+        })
     }
 
     fn process_data(&self, axis: &Axis) -> ProcessData {

@@ -4,6 +4,7 @@ use takt_rt::{FieldMode, LifeState, Nanoseconds, ReplyValue};
 
 use super::FieldTask;
 use crate::config::bit_fields::ReplyMoment;
+use crate::family::commission::polling;
 use crate::family::commission::{Failure, Report};
 use crate::procedure::AxisReading;
 
@@ -32,6 +33,7 @@ pub fn reading(task: &FieldTask) -> AxisReading {
         velocity: reported(ReplyValue::Velocity).unwrap_or(0.0),
         torque: reported(ReplyValue::Torque),
         current_a: None,
+        temperature_c: reported(ReplyValue::Temperature),
         statusword: None,
         state: state(task),
     }
@@ -111,27 +113,11 @@ pub async fn watch(
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
     listen(task).await?;
-    task.c.step("watch");
-    let (began_ns, mut count) = (task.c.now_ns(), 0_u64);
-    loop {
-        let begun_ns = task.c.now_ns();
+    let read = async || {
         task.check_silence()?;
-        task.c.show(reading(task));
-        count += 1;
-        let since = |then_ns: Nanoseconds| task.c.now_ns().saturating_sub(then_ns);
-        let left_ns = duration_ns.map(|duration_ns| duration_ns.saturating_sub(since(began_ns)));
-        if left_ns == Some(0) {
-            break;
-        }
-        let pause_ns = every_ns.saturating_sub(since(begun_ns));
-        task.c.pause(pause_ns.min(left_ns.unwrap_or(pause_ns))).await;
-        if task.c.is_interrupted() {
-            return Err(Failure::Interrupted);
-        }
-    }
-    let mut report = Report::new();
-    report.add("readings", "readings", count, count.to_string());
-    Ok(report)
+        Ok(reading(task))
+    };
+    polling::watch(&task.c, every_ns, duration_ns, read).await
 }
 
 /// Waits for replies: of a drive that reports by itself without a word to it.

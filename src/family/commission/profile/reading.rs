@@ -40,6 +40,7 @@ pub async fn read(c: &SdoSession, s: &TargetDrive, rated: Option<f64>) -> Result
         velocity: velocity.map_or(f64::NAN, |velocity| s.velocity(velocity as f64)),
         torque: per_mille.and_then(|per_mille| torque(s, rated, per_mille)),
         current_a: None,
+        temperature_c: None,
         statusword: Some(word),
         state: DriveState::decode(word).name(),
     })

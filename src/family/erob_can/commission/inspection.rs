@@ -9,6 +9,7 @@ use crate::erob_can::client::RequestTiming;
 use crate::erob_can::entries::{self, Entry};
 use crate::erob_can::frame::NODES;
 use crate::erob_can::module_information::{ModuleNumbers, UnknownField};
+use crate::family::commission::polling;
 use crate::family::commission::scan::report;
 use crate::family::commission::{Failure, Report, TargetDrive};
 use crate::family::erob_can::session::ErobCanSession;
@@ -94,26 +95,7 @@ pub async fn watch(
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
     connect(c, s).await?;
-    c.step("watch");
-    let (began_ns, mut count) = (c.now_ns(), 0_u64);
-    loop {
-        let begun_ns = c.now_ns();
-        c.show(reading::read_with_state(c, s).await?);
-        count += 1;
-        let since = |then_ns: Nanoseconds| c.now_ns().saturating_sub(then_ns);
-        let left_ns = duration_ns.map(|duration_ns| duration_ns.saturating_sub(since(began_ns)));
-        if left_ns == Some(0) {
-            break;
-        }
-        let pause_ns = every_ns.saturating_sub(since(begun_ns));
-        c.pause(pause_ns.min(left_ns.unwrap_or(pause_ns))).await;
-        if c.is_interrupted() {
-            return Err(Failure::Interrupted);
-        }
-    }
-    let mut report = Report::new();
-    report.add("readings", "readings", count, count.to_string());
-    Ok(report)
+    polling::watch(c, every_ns, duration_ns, async || Ok(reading::read_with_state(c, s).await?)).await
 }
 
 /// `scan`: asks every node ID for its firmware version.

@@ -18,6 +18,7 @@ use crate::family::commission::task::Task;
 pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
     match task {
         Task::Info => info::info(c, s).await,
+        Task::Watch { every_ns, duration_ns } => info::watch(c, s, every_ns, duration_ns).await,
         Task::Home { method, within_ns, .. } => homing::home(c, s, method, within_ns).await,
         Task::Zero { is_confirmed } => turns::zero(c, s, is_confirmed).await,
         Task::ClearFault { is_confirmed } => {

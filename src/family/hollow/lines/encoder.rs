@@ -5,6 +5,7 @@ use takt_rt::transparent::{FrameReader, TransparentFrame};
 
 use super::client::{LineClient, LineSession};
 use super::unsupported;
+use crate::family::commission::polling;
 use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
 use crate::hollow_lines::encoder::{EncoderReading, REQUEST};
 use crate::procedure::{AxisReading, Procedure};
@@ -102,25 +103,5 @@ async fn watch(
     every_ns: Nanoseconds,
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
-    c.step("watch");
-    let (began_ns, mut count) = (c.now_ns(), 0_u64);
-    loop {
-        let begun_ns = c.now_ns();
-        let encoder = read(c).await?;
-        c.show(show(c, s, encoder));
-        count += 1;
-        let since = |then_ns: Nanoseconds| c.now_ns().saturating_sub(then_ns);
-        let left_ns = duration_ns.map(|duration_ns| duration_ns.saturating_sub(since(began_ns)));
-        if left_ns == Some(0) {
-            break;
-        }
-        let pause_ns = every_ns.saturating_sub(since(begun_ns));
-        c.pause(pause_ns.min(left_ns.unwrap_or(pause_ns))).await;
-        if c.is_interrupted() {
-            return Err(Failure::Interrupted);
-        }
-    }
-    let mut report = Report::new();
-    report.add("readings", "readings", count, count.to_string());
-    Ok(report)
+    polling::watch(c, every_ns, duration_ns, async || Ok(show(c, s, read(c).await?))).await
 }

@@ -2,7 +2,7 @@
 
 use takt_rt::Nanoseconds;
 
-use super::objects::{ALARM, CURRENT, VELOCITY};
+use super::objects::{ALARM, CURRENT, TEMPERATURE, VELOCITY};
 use super::words;
 use crate::canopen::objects::*;
 use crate::family::commission::contact;
@@ -30,6 +30,7 @@ pub async fn read(c: &SdoSession, s: &TargetDrive) -> Result<AxisReading, Failur
         velocity: s.velocity(velocity as f64 * TENTHS),
         torque: None,
         current_a: Some(current as f64 / 2000.0),
+        temperature_c: None,
         statusword: Some(word),
         state: words::state(word),
     })
@@ -58,7 +59,7 @@ pub fn faulted(alarm: Alarm) -> Failure {
     Failure::Faulted { what: format!("alarm {alarm}"), advice: alarm.advice() }
 }
 
-/// `watch`
+/// `watch`, with the temperature.
 pub async fn watch(
     c: &SdoSession,
     s: &TargetDrive,
@@ -66,7 +67,12 @@ pub async fn watch(
     duration_ns: Option<Nanoseconds>,
 ) -> Result<Report, Failure> {
     contact::connect(c, s).await?;
-    polling::watch(c, every_ns, duration_ns, async || read(c, s).await).await
+    let read_all = async || {
+        let reading = read(c, s).await?;
+        let temperature = c.read_optional(&TEMPERATURE).await?;
+        Ok(AxisReading { temperature_c: temperature.map(|degrees| degrees as f64), ..reading })
+    };
+    polling::watch(c, every_ns, duration_ns, read_all).await
 }
 
 /// Final position and state.

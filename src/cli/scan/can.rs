@@ -1,0 +1,95 @@
+//! A CAN bus.
+
+use std::cell::Cell;
+
+use takt_rt::linux::MonotonicClock;
+
+use super::super::ownership;
+use super::super::usage_error::UsageError;
+use super::output::Watcher;
+use super::{Arguments, Interruption, place};
+use crate::commission::bus_scan;
+use crate::family::scan::{BusScan, PlaceOfScan, Scanned};
+use crate::link::ownership::{BusClaim, ClaimError, IfOwned, MasterTraffic, Ownership, Role};
+use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions, open_interface, open_to_listen};
+
+/// The time in milliseconds after which the kernel restarts a controller that is bus-off.
+const RESTART_MS: u32 = 100;
+/// Frames that the kernel keeps until they are read.
+const RECEIVE_FRAMES: usize = 1 << 12;
+
+/// Scans the bus.
+pub fn scan(
+    arguments: &Arguments,
+    interface: &RealInterface,
+    interruption: &Interruption,
+    watcher: &Watcher,
+) -> Result<(PlaceOfScan, Scanned), UsageError> {
+    let (bit_rate, data_bit_rate) = (arguments.bit_rate, arguments.data_bit_rate);
+    let settings = InterfaceSettings { bit_rate, data_bit_rate, restart_ms: RESTART_MS };
+    let options = SocketCanOptions {
+        bit_rate,
+        data_bit_rate,
+        receive_frames: RECEIVE_FRAMES,
+        ..SocketCanOptions::default()
+    };
+    let name = interface.to_string();
+    let what = BusScan {
+        nodes: arguments.from..=arguments.to,
+        wait_ns: arguments.wait,
+        listening_ns: arguments.listen_for,
+        only_listens: arguments.listen,
+        may_take_torque: arguments.stop_motors,
+        has_fd: data_bit_rate.is_some(),
+    };
+    // A drive has room for the requests of one master.
+    let mut ownership = match arguments.listen {
+        true => None,
+        false => Some(claim(&name, interface, settings)?),
+    };
+    let opened = match arguments.listen {
+        true => open_to_listen(&name, interface, &settings, &options),
+        false => open_interface(&name, interface, &settings, &options),
+    };
+    let mut port = opened.map_err(|error| ownership::not_heard(&error))?;
+    let is_told = Cell::new(false);
+    let mut is_interrupted = || {
+        let is_asked = ownership.as_mut().is_some_and(|owned| owned.poll_release_request().is_some());
+        if is_asked {
+            interruption.end();
+        }
+        // Each `true` is an interruption of its own, and one is enough.
+        interruption.has_come() && !is_told.replace(true)
+    };
+    let found = bus_scan::scan(
+        &what,
+        !arguments.no_lss,
+        &mut port,
+        &mut MonotonicClock::default(),
+        &mut is_interrupted,
+        &mut |at_ns, event| watcher.see(at_ns, &event),
+    );
+    Ok((place(interface, bit_rate, data_bit_rate), found))
+}
+
+fn claim(
+    name: &str,
+    interface: &RealInterface,
+    settings: InterfaceSettings,
+) -> Result<Ownership, UsageError> {
+    let claim = BusClaim {
+        bus: name.to_owned(),
+        interface: interface.clone(),
+        settings,
+        traffic: MasterTraffic::of_any_node(),
+    };
+    Ownership::claim(vec![claim], IfOwned::Refuse).map_err(|error| {
+        let is_network = matches!(interface, RealInterface::SocketCan(_));
+        let is_owned =
+            matches!(error, ClaimError::Held { role: Role::Master, .. } | ClaimError::OtherMaster { .. });
+        match is_network && is_owned {
+            true => format!("{error}, or add --listen, which sends nothing and shows who is heard").into(),
+            false => error.to_string().into(),
+        }
+    })
+}

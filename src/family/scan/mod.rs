@@ -1,0 +1,45 @@
+//! What is on a bus or on a serial line, without a configuration. Devices are asked what changes nothing in them, and heard.
+//!
+//! ```text
+//! bus ── a CAN bus: protocols of vendors, then CANopen, listening all the while
+//! line ── a serial line: Modbus slaves, one address after the other
+//!   │
+//! canopen ── what a CANopen node tells of itself
+//! own_protocol ── how drives with a protocol of their own are asked: the family says it
+//!   │
+//! session ── frames in and out of the procedure; heard ── what devices send by themselves
+//!   │
+//! device ── what was found;  starting ── a configuration to start with
+//! ```
+//!
+//! A family tells how its drives are recognised: [`Family::recognises`](super::Family::recognises),
+//! [`Family::own_protocols`](super::Family::own_protocols), [`Family::recognises_on_line`](super::Family::recognises_on_line), and which keys
+//! drive them: [`Family::starting_keys`](super::Family::starting_keys).
+
+mod bus;
+mod canopen;
+mod device;
+mod heard;
+mod line;
+mod own_protocol;
+mod session;
+mod starting;
+
+pub use bus::{BusScan, scan_bus};
+pub use canopen::{NodeIdentity, Recognised};
+pub use device::{Answered, FoundDevice};
+pub use line::{LineScan, scan_line};
+pub use own_protocol::{OwnProtocol, Reading};
+pub use session::{ScanClient, ScanSession};
+pub use starting::{PlaceOfScan, StartingKeys, starting_configuration};
+
+/// What a scan has found.
+#[derive(Clone, Debug, Default)]
+pub struct Scanned {
+    /// The devices, in the order of their node IDs.
+    pub devices: Vec<FoundDevice>,
+    /// What is odd on the bus as a whole: sentences for people.
+    pub remarks: Vec<String>,
+    /// Whether it was interrupted before everything was asked.
+    pub is_interrupted: bool,
+}

@@ -1,0 +1,45 @@
+//! How drives that speak a protocol of their own are found on a CAN bus.
+
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::pin::Pin;
+
+use takt_rt::Frame;
+
+use super::device::FoundDevice;
+use super::session::ScanSession;
+
+/// What a drive tells of itself, while it is asked.
+pub type Reading<'a> = Pin<Box<dyn Future<Output = FoundDevice> + 'a>>;
+
+/// A protocol of a family, as far as a scan needs it.
+pub trait OwnProtocol: Sync + fmt::Debug {
+    /// Its name for people.
+    fn name(&self) -> &'static str;
+
+    /// The node IDs that its drives may have.
+    fn nodes(&self) -> RangeInclusive<u8>;
+
+    /// The request to a node by which it is found. It moves nothing, and changes nothing that lasts.
+    fn question(&self, node: u8) -> Frame;
+
+    /// The node that a frame comes from, if it is a reply in this protocol.
+    fn replying(&self, frame: &Frame) -> Option<u8>;
+
+    /// What the question does to a drive that has torque; `None` where it does nothing. A question that does something is sent only
+    /// when the person at the machine has asked for that.
+    fn consequence(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// The CANopen node whose SDO has the identifiers of this one, if there is one.
+    fn shares_sdo_with(&self, _node: u8) -> Option<u8> {
+        None
+    }
+
+    /// Asks a drive that has answered what it tells of itself. `reply` is its answer to the question.
+    fn read<'a>(&'a self, session: &'a ScanSession, node: u8, reply: Frame) -> Reading<'a>;
+
+    /// What is known of a drive that was heard, and not asked.
+    fn overheard(&self, node: u8) -> FoundDevice;
+}
