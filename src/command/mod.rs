@@ -1,13 +1,18 @@
 //! What a program may ask of a running controller, and how it is refused: the same words for one in its own process (a
 //! [`Handle`](crate::Handle)) and for one in another process (a [`Client`](crate::Client)).
 
+mod axis_properties;
 mod error;
+mod lease_holder;
 pub mod motion;
 mod point_check;
 mod running_controller;
 
+pub use axis_properties::AxisProperties;
 pub(crate) use error::needed;
 pub use error::{CommandError, LeaseError, MotionError, Refused, Stopped, StreamError, WaitError};
+pub use lease_holder::LeaseHolder;
 pub use motion::{MotionId, MoveOptions, TrajectoryProgress};
 pub use point_check::{PointRefusal, check_point};
+pub(crate) use running_controller::groups_in;
 pub use running_controller::{EventSource, RunningController};

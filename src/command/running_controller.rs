@@ -3,13 +3,15 @@
 use std::time::Duration;
 
 use takt_rt::{
-    AxisLimits, AxisPoint, Event, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot,
-    StopCategory,
+    Answer, AxisPoint, Event, GroupSnapshot, Nanoseconds, OperationMode, Phase, RequestId, RequestTarget,
+    Snapshot, StopCategory, StreamReport, StreamState,
 };
 
-use super::error::{CommandError, MotionError, StreamError, WaitError};
-use super::motion::{MotionId, MoveOptions};
-use crate::telemetry::Machine;
+use super::axis_properties::AxisProperties;
+use super::error::{CommandError, MotionError, Stopped, StreamError, WaitError};
+use super::lease_holder::LeaseHolder;
+use super::motion::{MotionId, MoveOptions, TrajectoryProgress};
+use crate::telemetry::{LoopTiming, Machine};
 use crate::trajectory::TrajectoryPoint;
 
 /// A running controller, in this process ([`Handle`](crate::Handle)) or in another one ([`Client`](crate::Client)): the calls that both
@@ -24,11 +26,17 @@ pub trait RunningController: Send + Sync {
     /// The numbers of the axes that a target means, in its order; none for a group that there is not.
     fn axes_of(&self, target: RequestTarget) -> Vec<usize>;
 
-    /// The limits of an axis.
-    fn limits(&self, axis: usize) -> Option<AxisLimits>;
+    /// What the configuration says of an axis.
+    fn axis_properties(&self, axis: usize) -> Option<AxisProperties>;
 
     /// The state after the newest complete cycle that is known here.
     fn state(&self) -> Snapshot;
+
+    /// The present time on the clock of the controller, which states, events and stamps are on: `CLOCK_MONOTONIC`, or virtual time.
+    fn now_ns(&self) -> Nanoseconds;
+
+    /// How punctual all cycles since the start were; a few milliseconds old. All times are 0 in virtual time.
+    fn timing(&self) -> LoopTiming;
 
     /// Whether the controller has ended, or the process that it runs in.
     fn has_ended(&self) -> bool;
@@ -42,6 +50,23 @@ pub trait RunningController: Send + Sync {
     /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
     fn cycle_after(&self, slot: u64, at_most: Duration) -> Result<Snapshot, WaitError>;
 
+    /// Waits for so many cycles, and returns the state after them. In virtual time it runs them.
+    ///
+    /// # Errors
+    /// [`WaitError::Ended`] if the controller has ended before them.
+    fn advance(&self, cycles: u64) -> Result<Snapshot, WaitError>;
+
+    /// Waits until `look` finds in a state what it looks for. It sees one state of each cycle, or of each millisecond if the period is
+    /// shorter.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    fn wait_until_seen(
+        &self,
+        at_most: Duration,
+        look: &mut dyn FnMut(&Snapshot) -> bool,
+    ) -> Result<(), WaitError>;
+
     /// The events from now on.
     fn event_source(&self) -> Box<dyn EventSource>;
 
@@ -53,6 +78,17 @@ pub trait RunningController: Send + Sync {
         &self,
         target: RequestTarget,
         positions: &[f64],
+        options: MoveOptions,
+    ) -> Result<MotionId, CommandError>;
+
+    /// Starts a coordinated move by these distances from the present set-points.
+    ///
+    /// # Errors
+    /// See [`Handle::move_by`](crate::Handle::move_by); nothing has changed then.
+    fn begin_move_by(
+        &self,
+        target: RequestTarget,
+        distances: &[f64],
         options: MoveOptions,
     ) -> Result<MotionId, CommandError>;
 
@@ -89,6 +125,12 @@ pub trait RunningController: Send + Sync {
     /// # Errors
     /// See [`Handle::set_speed`](crate::Handle::set_speed).
     fn resume(&self, motion: MotionId) -> Result<(), CommandError>;
+
+    /// How far a trajectory under way is; `None` of any other motion.
+    ///
+    /// # Errors
+    /// Of a controller of another process, why it has not said so.
+    fn trajectory_progress(&self, motion: MotionId) -> Result<Option<TrajectoryProgress>, CommandError>;
 
     /// Gives a drive in profile velocity a velocity.
     ///
@@ -176,6 +218,108 @@ pub trait RunningController: Send + Sync {
     /// # Errors
     /// See [`MotionError`].
     fn wait(&self, motion: MotionId, at_most: Duration) -> Result<(), MotionError>;
+
+    /// The client of another process that has the lease; `None` if nobody has, and of a controller of this process, which every part of
+    /// the program may command.
+    fn lease(&self) -> Option<LeaseHolder>;
+
+    /// Takes the lease, or renews it. A controller of this process needs none.
+    ///
+    /// # Errors
+    /// See [`Client::take_lease`](crate::Client::take_lease).
+    fn take_lease(&self) -> Result<(), CommandError>;
+
+    /// Takes the lease from whoever has it. A controller of this process needs none.
+    ///
+    /// # Errors
+    /// See [`Client::take_over`](crate::Client::take_over).
+    fn take_over(&self) -> Result<(), CommandError>;
+
+    /// Gives the lease back.
+    ///
+    /// # Errors
+    /// See [`Client::release`](crate::Client::release).
+    fn release(&self) -> Result<(), CommandError>;
+
+    /// The period of the cycle.
+    fn period_ns(&self) -> Nanoseconds {
+        self.machine().cycle_ns
+    }
+
+    /// The group with this name in the configuration.
+    ///
+    /// # Errors
+    /// [`CommandError::NoSuchGroup`].
+    fn group_named(&self, name: &str) -> Result<RequestTarget, CommandError> {
+        let groups = &self.machine().groups;
+        let found = (0..).zip(groups).find(|(_, group)| *group == name);
+        let (number, _) = found
+            .ok_or_else(|| CommandError::NoSuchGroup { name: name.to_owned(), groups: groups.clone() })?;
+        Ok(RequestTarget::Group(number))
+    }
+
+    /// The fault that has stopped a target and has not been reset: the first, of several groups.
+    fn fault_in(&self, target: RequestTarget) -> Option<Stopped> {
+        let state = self.state();
+        let faults = groups_in(&state, target).iter().filter_map(|group| group.stop);
+        let first = faults.filter(|stop| !stop.is_requested()).min_by_key(|stop| stop.slot);
+        first.map(|stop| Stopped::new(stop, self.machine()))
+    }
+
+    /// What the stream of a target is doing: of several groups, that of the first one that follows its points.
+    fn stream_report(&self, target: RequestTarget) -> StreamReport {
+        let state = self.state();
+        let groups = groups_in(&state, target);
+        let followed = |group: &&GroupSnapshot| group.stream.state != StreamState::Idle;
+        let shown = groups.iter().find(followed).or(groups.first());
+        shown.map_or_else(StreamReport::default, |group| group.stream)
+    }
+
+    /// Waits until every group of a target is in a phase.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    fn wait_for_phase(
+        &self,
+        target: RequestTarget,
+        phase: Phase,
+        at_most: Duration,
+    ) -> Result<(), WaitError> {
+        self.wait_until_seen(at_most, &mut |state| {
+            let groups = groups_in(state, target);
+            !groups.is_empty() && groups.iter().all(|group| group.phase == phase)
+        })
+    }
+
+    /// Waits until a stop that came after `before` has been taken, and every group of a target holds or is off. `before` is the
+    /// [`newest_stop`](RunningController::newest_stop) before the stop was asked for.
+    ///
+    /// # Errors
+    /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
+    fn wait_until_still(
+        &self,
+        target: RequestTarget,
+        before: RequestId,
+        at_most: Duration,
+    ) -> Result<(), WaitError> {
+        let is_still = |phase| matches!(phase, Phase::Holding | Phase::Disabled | Phase::Passive);
+        self.wait_until_seen(at_most, &mut |state| {
+            let stop = self.newest_stop(target);
+            let is_shown = state.answers.of(stop) != Answer::None || state.answers.have_forgotten(stop);
+            stop > before && is_shown && groups_in(state, target).iter().all(|group| is_still(group.phase))
+        })
+    }
+}
+
+/// The groups of a state that a target means.
+pub(crate) fn groups_in(state: &Snapshot, target: RequestTarget) -> &[GroupSnapshot] {
+    match target {
+        RequestTarget::All => state.groups(),
+        RequestTarget::Group(number) => {
+            let number = usize::from(number);
+            state.groups().get(number..=number).unwrap_or_default()
+        }
+    }
 }
 
 /// The events of a running controller, wherever it runs. As an iterator it never waits: later events may follow `None`.

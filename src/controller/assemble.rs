@@ -17,6 +17,7 @@ use crate::config::bit_fields::{FieldDevice, ReplyMoment};
 use crate::config::{self, Axis, Compliance, Config, ConfigError, Interface};
 use crate::family;
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
+use crate::schedule;
 
 /// How long the drives may take from the first controlword to operation enabled, where they have been on for long enough.
 const ENABLE_TIMEOUT_NS: u64 = 5_000_000_000;
@@ -69,7 +70,8 @@ impl fmt::Debug for AssembleError {
 
 /// The plan of a slot.
 pub fn slot_plan(config: &Config) -> SlotPlan {
-    SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns)
+    let usual = SlotPlan::usual(config.cycle.period_ns, config.cycle.command_phase_ns);
+    SlotPlan { send_phase_ns: schedule::send_phase_ns(config), ..usual }
 }
 
 /// The engine of a configuration. It is a few hundred kilobytes, so it is on the heap, and not on the stack of each caller.
@@ -183,9 +185,10 @@ fn axis_parameters(
     let feedback = |plan: &PdoPlan| Ok(Pdo::classic(plan.id, Mapping::feedback(&of_first_axis(plan, axis))?));
     let exchange = match family::of(&axis.drive).field_drive(axis) {
         Some(fields) => Exchange::BitFields(fields),
-        None if family::is_off_cycle(axis, config) => {
-            Exchange::OffCycle { report_cycles: family::report_cycles(axis, config) }
-        }
+        None if family::is_off_cycle(axis, config) => Exchange::OffCycle {
+            report_cycles: family::report_cycles(axis, config),
+            stop_frame: family::of(&axis.drive).off_cycle_stop_frame(axis),
+        },
         None => Exchange::Pdos(Pdos {
             commands: data.commands.iter().map(command).collect::<Result<_, _>>().map_err(wrong_mapping)?,
             feedback: data.feedback.iter().map(feedback).collect::<Result<_, _>>().map_err(wrong_mapping)?,

@@ -23,5 +23,5 @@ pub use handle::{
 pub use lines::{LinePort, Lines, SharedLine};
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};
-pub use supervisor::Supervisor;
+pub use supervisor::{AfterBringUp, Supervisor};
 pub use virtual_time::{VirtualClock, VirtualRun};

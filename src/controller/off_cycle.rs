@@ -26,7 +26,7 @@ impl OffCycleDrives {
             let drive = family::of(&own.drive).off_cycle(own, config)?;
             Some(OfAxis { axis, group: config.group_of_axis(axis), bus: own.bus, drive })
         });
-        Self { drives: drives.collect(), lines: Lines::simulated(config) }
+        Self { drives: drives.collect(), lines: Lines::simulated(config, None) }
     }
 
     /// With these lines.

@@ -8,7 +8,9 @@ use nix::unistd::Pid;
 use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, HostInterface, SlotPlan};
 
+use crate::channels::Producer;
 use crate::config::Realtime;
+use crate::journal::{ClockAnswer, JournaledClock};
 use crate::sleep_alignment;
 
 /// Stack that the thread touches before its first cycle. The cycle uses a small part of it.
@@ -66,6 +68,8 @@ pub struct LoopParts<P, H> {
     pub spin_guard_ns: Option<u64>,
     /// Whether a refused step ends the thread before its first cycle.
     pub is_realtime_required: bool,
+    /// Where the answers of the clock are noted, for a replay.
+    pub clock_journal: Option<Producer<ClockAnswer>>,
 }
 
 /// The running thread.
@@ -141,11 +145,16 @@ fn loop_body<P: BusPort, H: HostInterface>(
     };
     let _ = begun.send(Ok(Begun { report }));
     let epoch_ns = sleep_alignment::first_slot_after(clock.now_ns() + LEAD_IN_NS, period_ns);
+    let mut clock = JournaledClock::noted_in(clock, parts.clock_journal);
+    clock.note_epoch(epoch_ns);
     let mut cycle = Cycle::new(Grid::new(epoch_ns, period_ns)?, parts.plan);
     let before = realtime.page_faults();
-    while cycle.run(&mut parts.engine, &mut clock, &mut parts.ports, &mut parts.host) == Flow::Continue {}
+    while cycle.run(&mut parts.engine, &mut clock, &mut parts.ports, &mut parts.host) == Flow::Continue {
+        clock.end_cycle();
+    }
+    clock.end_cycle();
     let page_faults = realtime.page_faults().since(before);
-    Some(Ended { page_faults, spin_guard_ns: clock.guard_ns() })
+    Some(Ended { page_faults, spin_guard_ns: clock.clock.guard_ns() })
 }
 
 /// A clock that has measured some wake-ups, so that its guard fits from the first slot on.

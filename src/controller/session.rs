@@ -15,21 +15,23 @@ use super::lines::Lines;
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::port::Port;
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
-use super::supervisor::Supervisor;
+use super::supervisor::{AfterBringUp, Supervisor};
 use super::time_of_day::TimeOfDayKeeper;
 use crate::channels::{
-    CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer, TrajectoryGiver,
-    channels, panic_message,
+    self, CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer,
+    TrajectoryGiver, channels, panic_message,
 };
-use crate::config::Config;
+use crate::config::{Config, ConfigSources};
+
 use crate::faults::FaultInjector;
+use crate::journal::{RunJournal, clock_journal};
 use crate::link::OpenError;
 use crate::link::ownership::{ClaimError, IfOwned, Ownership};
 use crate::link::trace::Trace;
 use crate::sleep_alignment;
 use crate::telemetry::{
     BlackBoxOptions, EachCycle, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
-    RecordingDestination, WallClock,
+    RecordingDestination, ShownTiming, WallClock, shown_timing,
 };
 
 /// The pause between two polls of the controller.
@@ -50,6 +52,8 @@ pub struct SessionOptions {
     pub fault_injector: Option<Arc<FaultInjector>>,
     /// What happens when another process of this host is the master of a bus already.
     pub if_owned: IfOwned,
+    /// The files that the configuration was made of. A recording has them, so that it can be replayed.
+    pub sources: ConfigSources,
 }
 
 /// The result of a run.
@@ -144,11 +148,21 @@ pub(super) struct RemoteHandles {
     pub events: EventReader,
     /// The result of the real-time set-up.
     pub realtime: ThreadReport,
+    /// Reads the timing.
+    pub timing: ShownTiming,
+}
+
+/// Who commands the group in place of the program.
+pub(super) struct Remote {
+    /// Takes the handles.
+    pub handles: mpsc::SyncSender<RemoteHandles>,
+    /// What becomes of the drives before the first command.
+    pub after_bring_up: AfterBringUp,
 }
 
 impl RemoteHandles {
     /// `None` if they were taken before.
-    fn of(host: &mut HostSide, plan: SlotPlan, begun: &Begun) -> Option<Self> {
+    fn of(host: &mut HostSide, plan: SlotPlan, begun: &Begun, timing: ShownTiming) -> Option<Self> {
         Some(Self {
             observer: host.observer(),
             streamer: host.streamer(),
@@ -158,6 +172,7 @@ impl RemoteHandles {
             plan,
             events: host.events(),
             realtime: begun.report,
+            timing,
         })
     }
 }
@@ -168,7 +183,7 @@ pub(super) fn run_with(
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
     watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
-    remote: Option<mpsc::SyncSender<RemoteHandles>>,
+    remote: Option<Remote>,
 ) -> Result<Session, SessionError> {
     config.validate_on_this_machine().map_err(AssembleError::from)?;
     let ownership = Ownership::of(config, options.if_owned)?;
@@ -181,16 +196,24 @@ fn lead_as_owner(
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
     mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
-    remote: Option<mpsc::SyncSender<RemoteHandles>>,
+    remote: Option<Remote>,
     mut ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = assemble::engine(config)?;
-    let lines = Lines::open(config)?;
-    let (ports, traces) = open_ports(config, &lines, options.fault_injector.as_deref())?;
-    let (rt, mut host, log) = channels(&ChannelSizes::of(config));
-    let mut supervisor = match remote {
-        Some(_) => Supervisor::serving(config),
+    let lines = Lines::open(config, options.fault_injector.as_deref())?;
+    let is_recorded = options.recording.is_some() || config.telemetry.is_recorded;
+    let (ports, traces) = open_ports(config, &lines, options.fault_injector.as_deref(), is_recorded)?;
+    let (mut rt, mut host, log) = channels(&ChannelSizes::of(config));
+    let (clock_answers, journal) = match is_recorded {
+        true => {
+            let (answers, clock) = clock_journal();
+            (Some(answers), Some(RunJournal { clock, host: channels::journal(&mut rt, &mut host) }))
+        }
+        false => (None, None),
+    };
+    let mut supervisor = match &remote {
+        Some(remote) => Supervisor::serving(config, remote.after_bring_up),
         None => Supervisor::new(config, options.duration_ns),
     }
     .with_lines(lines);
@@ -212,7 +235,11 @@ fn lead_as_owner(
         traces,
     };
     // The logger's thread starts first, so that it does not inherit the real-time priority.
-    let logger = Logger::new(log, logger_options, notify).with_each_cycle(options.each_cycle);
+    let (timing_writer, timing) = shown_timing();
+    let logger = Logger::new(log, logger_options, notify)
+        .with_each_cycle(options.each_cycle)
+        .with_timing(timing_writer)
+        .with_journal(journal, &options.sources);
     let logger = LoggerThread::start(logger).map_err(SessionError::Logger)?;
     let parts = LoopParts {
         engine,
@@ -221,6 +248,7 @@ fn lead_as_owner(
         host: rt,
         spin_guard_ns: config.realtime.spin_guard_ns,
         is_realtime_required: options.is_realtime_required,
+        clock_journal: clock_answers,
     };
     let running = match realtime_thread::start(realtime_thread::thread_config(&config.realtime), parts) {
         Ok(running) => running,
@@ -235,10 +263,10 @@ fn lead_as_owner(
         warn!(target: "takt::realtime", ?step, "the real-time thread was refused {step:?}");
     }
     if let (Some(remote), Some(handles)) =
-        (remote, RemoteHandles::of(&mut host, assemble::slot_plan(config), &begun))
+        (remote, RemoteHandles::of(&mut host, assemble::slot_plan(config), &begun, timing))
     {
         // This fails only if the client has given up. It has then asked the run to end.
-        let _ = remote.send(handles);
+        let _ = remote.handles.send(handles);
     }
     let mut time_of_day = TimeOfDayKeeper::of(config);
     let mut time_request = None;
@@ -319,10 +347,12 @@ fn open_ports(
     config: &Config,
     lines: &Lines,
     fault_injector: Option<&FaultInjector>,
+    is_recorded: bool,
 ) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
-    let is_traced = config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
+    let is_traced =
+        is_recorded || config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = match lines.port(index) {
             Some(line) => Port::Line(Box::new(line)),

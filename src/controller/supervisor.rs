@@ -72,6 +72,15 @@ impl Stage {
     }
 }
 
+/// What becomes of the drives when they have been brought up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AfterBringUp {
+    /// They are enabled.
+    Enable,
+    /// They stay disabled until a client enables them.
+    StayDisabled,
+}
+
 /// Takes a controller through its life cycle.
 pub struct Supervisor {
     axes: usize,
@@ -101,6 +110,7 @@ pub struct Supervisor {
     duration_ns: Option<u64>,
     /// Whether a client commands the group, in place of the program.
     is_serving: bool,
+    after_bring_up: AfterBringUp,
     /// The buses, and their states as `tracing` knows them.
     buses: Vec<(String, BusState)>,
 }
@@ -139,6 +149,7 @@ impl Supervisor {
             deadline_ns: None,
             duration_ns,
             is_serving: false,
+            after_bring_up: AfterBringUp::Enable,
             buses: config.buses.iter().map(|bus| (bus.name.clone(), BusState::default())).collect(),
         }
     }
@@ -160,10 +171,10 @@ impl Supervisor {
         self.off_cycle.set_lines(Lines::default());
     }
 
-    /// A run without a program: the group is brought up and enabled, and then executes the requests of clients until it is
+    /// A run without a program: the group is brought up, is enabled or not, and then executes the requests of clients until it is
     /// interrupted. A stop does not end this run, since the client decides what follows it.
-    pub fn serving(config: &Config) -> Self {
-        Self { is_serving: true, ..Self::new(config, None) }
+    pub fn serving(config: &Config, after_bring_up: AfterBringUp) -> Self {
+        Self { is_serving: true, after_bring_up, ..Self::new(config, None) }
     }
 
     /// Asks the run to end. An immediate interrupt replaces a controlled one.
@@ -324,12 +335,18 @@ impl Supervisor {
     fn activate(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         let silent = self.axes_of(snapshot).iter().position(|axis| !axis.is_heard);
         match silent {
+            // A client may have begun to enable the group before this poll.
+            None if self.after_bring_up == AfterBringUp::StayDisabled
+                && is_any(snapshot, |phase| !is_off(phase)) =>
+            {
+                self.enter(Stage::Run, now_ns);
+            }
             None if !is_any(snapshot, |phase| phase != Phase::Disabled) => {
                 if self.faulted(snapshot).is_some() {
                     self.request(Request::ResetFaults);
                     self.enter(Stage::ResetFaults, now_ns);
                 } else {
-                    self.begin_enable(now_ns);
+                    self.go_on_without_faults(now_ns);
                 }
             }
             Some(axis) if elapsed_ns > self.stage_timeout_ns => self.end(now_ns, Outcome::NotHeard { axis }),
@@ -343,7 +360,7 @@ impl Supervisor {
 
     fn reset_faults(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         match self.faulted(snapshot) {
-            None => self.begin_enable(now_ns),
+            None => self.go_on_without_faults(now_ns),
             Some((axis, code)) if elapsed_ns > self.stage_timeout_ns / 4 => {
                 self.end(now_ns, Outcome::FaultPersists { axis, code });
             }
@@ -351,9 +368,14 @@ impl Supervisor {
         }
     }
 
-    fn begin_enable(&mut self, now_ns: u64) {
-        self.request(Request::Enable);
-        self.enter(Stage::Enable, now_ns);
+    fn go_on_without_faults(&mut self, now_ns: u64) {
+        match self.after_bring_up {
+            AfterBringUp::Enable => {
+                self.request(Request::Enable);
+                self.enter(Stage::Enable, now_ns);
+            }
+            AfterBringUp::StayDisabled => self.enter(Stage::Run, now_ns),
+        }
     }
 
     fn enable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
@@ -566,7 +588,11 @@ impl Supervisor {
             Stage::RemovePower => ("removing the power".to_owned(), Some(1.0)),
             Stage::Done => ("done".to_owned(), Some(1.0)),
         };
-        Progress { what, fraction }
+        let is_ending = matches!(
+            self.stage,
+            Stage::Settle { .. } | Stage::Disable | Stage::ShutDown | Stage::RemovePower | Stage::Done
+        );
+        Progress { what, fraction, is_ending }
     }
 }
 

@@ -9,11 +9,16 @@ use super::assemble::{self, AssembleError};
 use super::lines::{Lines, SharedLine};
 use super::outcome::{Interrupt, Outcome};
 use super::port::Port;
-use super::supervisor::Supervisor;
+use super::supervisor::{AfterBringUp, Supervisor};
 use super::time_of_day::TimeOfDayKeeper;
+#[cfg(feature = "internals")]
+use crate::channels;
 use crate::channels::{CallbackClock, ChannelSizes, HostSide, LogSide, RtSide, channels};
 use crate::config::Config;
 use crate::faults::FaultInjector;
+use crate::journal::JournaledClock;
+#[cfg(feature = "internals")]
+use crate::journal::{RunJournal, clock_journal};
 use crate::sim::SimulatedBus;
 use crate::telemetry::WallClock;
 
@@ -90,7 +95,7 @@ impl VirtualClock {
 pub struct VirtualRun<P> {
     engine: Box<Engine>,
     cycle: Cycle,
-    clock: VirtualClock,
+    clock: JournaledClock<VirtualClock>,
     ports: Vec<P>,
     rt: RtSide,
     host: HostSide,
@@ -125,20 +130,35 @@ impl VirtualRun<Port> {
         config: &Config,
         fault_injector: Arc<FaultInjector>,
     ) -> Result<(Self, LogSide), AssembleError> {
-        config.validate()?;
-        let lines = Lines::simulated(config);
-        let simulated = |bus| match lines.port(bus) {
-            Some(line) => Port::Line(Box::new(line)),
-            None => Port::Simulated(Box::new(SimulatedBus::new(config, bus))),
-        };
-        let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
-        let supervisor = Supervisor::new(config, None).with_lines(lines);
-        let (run, log) = Self::with_supervisor(supervisor, config, ports)?;
+        let supervisor = Supervisor::new(config, None);
+        let (run, log) = Self::faulty(config, &fault_injector, supervisor, |port| port)?;
         Ok((Self { fault_injector: Some(fault_injector), ..run }, log))
     }
 }
 
 impl<P: BusPort> VirtualRun<P> {
+    /// A controller of this life cycle on simulated buses and lines with injected faults. `outermost` makes of each port the one that it
+    /// is given. Whoever calls this shows the snapshots to the injector.
+    ///
+    /// # Errors
+    /// See [`AssembleError`].
+    pub(crate) fn faulty(
+        config: &Config,
+        fault_injector: &FaultInjector,
+        supervisor: Supervisor,
+        outermost: impl Fn(Port) -> P,
+    ) -> Result<(Self, LogSide), AssembleError> {
+        config.validate()?;
+        let lines = Lines::simulated(config, Some(fault_injector));
+        let simulated = |bus| match lines.port(bus) {
+            Some(line) => Port::Line(Box::new(line)),
+            None => Port::Simulated(Box::new(SimulatedBus::new(config, bus))),
+        };
+        let ports =
+            (0..config.buses.len()).map(|bus| outermost(fault_injector.wrap(bus, simulated(bus)))).collect();
+        Self::with_supervisor(supervisor.with_lines(lines), config, ports)
+    }
+
     /// A controller of this configuration on these ports, and the side for its logger.
     ///
     /// # Errors
@@ -152,8 +172,12 @@ impl<P: BusPort> VirtualRun<P> {
     ///
     /// # Errors
     /// See [`AssembleError`].
-    pub(crate) fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
-        Self::with_supervisor(Supervisor::serving(config), config, ports)
+    pub(crate) fn serving(
+        config: &Config,
+        ports: Vec<P>,
+        after_bring_up: AfterBringUp,
+    ) -> Result<(Self, LogSide), AssembleError> {
+        Self::with_supervisor(Supervisor::serving(config, after_bring_up), config, ports)
     }
 
     fn with_supervisor(
@@ -170,7 +194,7 @@ impl<P: BusPort> VirtualRun<P> {
         let run = Self {
             engine,
             cycle: Cycle::new(grid, assemble::slot_plan(config)),
-            clock: VirtualClock::default(),
+            clock: JournaledClock::new(VirtualClock::default()),
             ports,
             rt,
             host,
@@ -190,13 +214,16 @@ impl<P: BusPort> VirtualRun<P> {
             return false;
         }
         let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.rt);
+        self.clock.end_cycle();
         self.cycles_since_poll += 1;
         if self.cycles_since_poll >= self.poll_interval {
             self.cycles_since_poll = 0;
-            self.supervisor.poll(self.clock.now_ns, &mut self.host);
+            self.supervisor.poll(self.clock.clock.now_ns, &mut self.host);
             self.host.free_callbacks();
         }
-        if let Some(time) = self.time_of_day.poll(self.clock.now_ns, || WallClock::fixed(VIRTUAL_EPOCH_NS)) {
+        if let Some(time) =
+            self.time_of_day.poll(self.clock.clock.now_ns, || WallClock::fixed(VIRTUAL_EPOCH_NS))
+        {
             // If the queue is full, the next one follows in a minute.
             let _ = self.host.request(time);
         }
@@ -229,6 +256,17 @@ impl<P: BusPort> VirtualRun<P> {
         self.rt.measure_callbacks_by(CallbackClock::Virtual(ns));
     }
 
+    /// Notes from now on everything that the cycle is told from outside but for what its ports do, which a
+    /// [`TracedPort`](crate::link::trace::TracedPort) notes. Call it before the first cycle.
+    #[cfg(feature = "internals")]
+    pub(crate) fn journal(&mut self) -> RunJournal {
+        let (answers, clock) = clock_journal();
+        self.clock = JournaledClock::noted_in(self.clock.clock, Some(answers));
+        let period_ns = self.engine.period_ns().max(1);
+        self.clock.note_epoch(period_ns);
+        RunJournal { clock, host: channels::journal(&mut self.rt, &mut self.host) }
+    }
+
     /// Asks the run to end.
     pub fn interrupt(&mut self, interrupt: Interrupt) {
         self.supervisor.interrupt(interrupt);
@@ -251,7 +289,7 @@ impl<P: BusPort> VirtualRun<P> {
 
     /// The present time.
     pub(crate) const fn now_ns(&self) -> Nanoseconds {
-        self.clock.now_ns
+        self.clock.clock.now_ns
     }
 
     /// The simulated devices of a serial line, to observe its drives or to disturb them; `None` if the bus is none.
@@ -261,7 +299,7 @@ impl<P: BusPort> VirtualRun<P> {
 
     /// The clock, to make it late.
     pub fn clock(&mut self) -> &mut VirtualClock {
-        &mut self.clock
+        &mut self.clock.clock
     }
 
     /// The ports, to observe the simulated drives or to inject faults.

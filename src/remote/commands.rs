@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use takt_rt::{AxisPoint, Nanoseconds, OperationMode, RequestId, RequestTarget, StopCategory};
 
-use super::packet::{AXIS_POINT_WORDS, Malformed, Put, Take};
 use super::socket::PACKET_WORDS;
 use crate::command::{MotionId, MoveOptions};
+use crate::packet::{AXIS_POINT_WORDS, Malformed, Put, Take};
 use crate::trajectory::TrajectoryPoint;
 
 /// A packet of a client: a demand, by a number that its reply repeats.
@@ -36,6 +36,15 @@ pub enum Command {
         options: MoveOptions,
         /// Where to.
         positions: Vec<f64>,
+    },
+    /// See [`RunningController::begin_move_by`](crate::RunningController::begin_move_by).
+    MoveBy {
+        /// Whose axes.
+        target: RequestTarget,
+        /// How.
+        options: MoveOptions,
+        /// How far.
+        distances: Vec<f64>,
     },
     /// A velocity in profile velocity.
     Velocity {
@@ -114,6 +123,8 @@ pub enum Command {
     Pause(MotionId),
     /// To go on with it.
     Resume(MotionId),
+    /// How far it is. It needs no lease.
+    Progress(MotionId),
 }
 
 const LEASE: u64 = 1;
@@ -135,6 +146,8 @@ const THROUGH: u64 = 16;
 const SET_SPEED: u64 = 17;
 const PAUSE: u64 = 18;
 const RESUME: u64 = 19;
+const MOVE_BY: u64 = 20;
+const PROGRESS: u64 = 21;
 
 /// The words of a point of a trajectory beside its values: its time and three counts.
 const POINT_HEAD: usize = 4;
@@ -195,7 +208,10 @@ impl Command {
             | Self::Torque { .. }
             | Self::ChangeAxisMode { .. }
             | Self::Points(_) => None,
-            Self::SetSpeed { motion, .. } | Self::Pause(motion) | Self::Resume(motion) => Some(motion.target),
+            Self::SetSpeed { motion, .. }
+            | Self::Pause(motion)
+            | Self::Resume(motion)
+            | Self::Progress(motion) => Some(motion.target),
             Self::Enable(target)
             | Self::Disable(target)
             | Self::ResetFaults(target)
@@ -203,6 +219,7 @@ impl Command {
             | Self::Execute(target)
             | Self::Through(target)
             | Self::Move { target, .. }
+            | Self::MoveBy { target, .. }
             | Self::ChangeMode { target, .. }
             | Self::Point { target, .. }
             | Self::Chunk { target, .. } => Some(*target),
@@ -218,9 +235,10 @@ impl Command {
                 put.word(RELEASE);
             }
             Self::Move { target, options, positions } => {
-                let MoveOptions { velocity_scale, acceleration_scale, minimum_duration_s } = *options;
-                put.word(MOVE).target(*target).number(velocity_scale).number(acceleration_scale);
-                put.number(minimum_duration_s).numbers(positions);
+                put_options(*options, put.word(MOVE).target(*target)).numbers(positions);
+            }
+            Self::MoveBy { target, options, distances } => {
+                put_options(*options, put.word(MOVE_BY).target(*target)).numbers(distances);
             }
             Self::Velocity { axis, velocity, valid_for } => {
                 put.word(VELOCITY).index(*axis).number(*velocity).duration(*valid_for);
@@ -272,6 +290,7 @@ impl Command {
             }
             Self::Pause(motion) => put_motion(*motion, put.word(PAUSE)),
             Self::Resume(motion) => put_motion(*motion, put.word(RESUME)),
+            Self::Progress(motion) => put_motion(*motion, put.word(PROGRESS)),
         }
     }
 
@@ -287,12 +306,13 @@ impl Command {
             RELEASE => Self::Release,
             MOVE => Self::Move {
                 target: take.target()?,
-                options: MoveOptions {
-                    velocity_scale: take.number()?,
-                    acceleration_scale: take.number()?,
-                    minimum_duration_s: take.number()?,
-                },
+                options: take_options(take)?,
                 positions: take.numbers()?,
+            },
+            MOVE_BY => Self::MoveBy {
+                target: take.target()?,
+                options: take_options(take)?,
+                distances: take.numbers()?,
             },
             VELOCITY => {
                 Self::Velocity { axis: take.index()?, velocity: take.number()?, valid_for: take.duration()? }
@@ -330,9 +350,23 @@ impl Command {
             SET_SPEED => Self::SetSpeed { motion: take_motion(take)?, rate: take.number()? },
             PAUSE => Self::Pause(take_motion(take)?),
             RESUME => Self::Resume(take_motion(take)?),
+            PROGRESS => Self::Progress(take_motion(take)?),
             _ => return Err(Malformed),
         })
     }
+}
+
+fn put_options(options: MoveOptions, put: &mut Put) -> &mut Put {
+    let MoveOptions { velocity_scale, acceleration_scale, minimum_duration_s } = options;
+    put.number(velocity_scale).number(acceleration_scale).number(minimum_duration_s)
+}
+
+fn take_options(take: &mut Take<'_>) -> Result<MoveOptions, Malformed> {
+    Ok(MoveOptions {
+        velocity_scale: take.number()?,
+        acceleration_scale: take.number()?,
+        minimum_duration_s: take.number()?,
+    })
 }
 
 fn put_entries(axes: &[AxisPoint], put: &mut Put) {

@@ -6,7 +6,7 @@ use takt_rt::{GroupSnapshot, OperationMode, Phase, RequestTarget, StopCategory};
 
 use super::client::Client;
 use super::stream::ClientStream;
-use crate::command::{CommandError, MotionId, MoveOptions, RunningController, WaitError};
+use crate::command::{CommandError, MotionId, MoveOptions, RunningController, Stopped, WaitError, groups_in};
 use crate::trajectory::TrajectoryPoint;
 
 /// Commands and observes one group of a controller of another process. It has the calls of a [`GroupHandle`](crate::GroupHandle), with the
@@ -14,23 +14,35 @@ use crate::trajectory::TrajectoryPoint;
 #[derive(Clone, Debug)]
 pub struct ClientGroup {
     client: Client,
-    number: u8,
+    target: RequestTarget,
 }
 
 impl ClientGroup {
-    pub(super) const fn new(client: Client, number: u8) -> Self {
-        Self { client, number }
+    pub(super) const fn new(client: Client, target: RequestTarget) -> Self {
+        Self { client, target }
     }
 
     /// The numbers of its axes, in the order in which the configuration names them in the group.
     pub fn axes(&self) -> Vec<usize> {
-        self.client.axes_of(self.target())
+        self.client.axes_of(self.target)
+    }
+
+    /// See [`GroupHandle::number`](crate::GroupHandle::number).
+    pub const fn number(&self) -> u8 {
+        match self.target {
+            RequestTarget::Group(number) => number,
+            RequestTarget::All => 0,
+        }
     }
 
     /// See [`GroupHandle::state`](crate::GroupHandle::state).
     pub fn state(&self) -> GroupSnapshot {
-        let state = self.client.state();
-        state.groups().get(usize::from(self.number)).copied().unwrap_or_default()
+        groups_in(&self.client.state(), self.target).first().copied().unwrap_or_default()
+    }
+
+    /// See [`GroupHandle::fault`](crate::GroupHandle::fault).
+    pub fn fault(&self) -> Option<Stopped> {
+        self.client.fault_in(self.target)
     }
 
     /// See [`GroupHandle::move_to`](crate::GroupHandle::move_to).
@@ -46,7 +58,15 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn move_with(&self, target: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
-        self.client.begin_move(self.target(), target, options)
+        self.client.begin_move(self.target, target, options)
+    }
+
+    /// See [`GroupHandle::move_by`](crate::GroupHandle::move_by).
+    ///
+    /// # Errors
+    /// As [`Client::move_to`].
+    pub fn move_by(&self, distance: &[f64], options: MoveOptions) -> Result<MotionId, CommandError> {
+        self.client.begin_move_by(self.target, distance, options)
     }
 
     /// See [`GroupHandle::execute`](crate::GroupHandle::execute).
@@ -54,7 +74,7 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn execute(&self, points: &[TrajectoryPoint]) -> Result<MotionId, CommandError> {
-        self.client.begin_trajectory(self.target(), points)
+        self.client.begin_trajectory(self.target, points)
     }
 
     /// See [`GroupHandle::move_through`](crate::GroupHandle::move_through).
@@ -62,7 +82,7 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
-        self.client.begin_through(self.target(), waypoints)
+        self.client.begin_through(self.target, waypoints)
     }
 
     /// See [`GroupHandle::change_mode`](crate::GroupHandle::change_mode).
@@ -70,7 +90,7 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn change_mode(&self, mode: OperationMode) -> Result<MotionId, CommandError> {
-        self.client.begin_mode_change(self.target(), mode)
+        self.client.begin_mode_change(self.target, mode)
     }
 
     /// See [`GroupHandle::begin_stream`](crate::GroupHandle::begin_stream).
@@ -78,12 +98,12 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn begin_stream(&self) -> Result<(), CommandError> {
-        self.client.begin_streaming(self.target())
+        self.client.begin_streaming(self.target)
     }
 
     /// See [`GroupHandle::stream`](crate::GroupHandle::stream).
     pub fn stream(&self) -> ClientStream {
-        ClientStream::new(self.client.clone(), self.target())
+        ClientStream::new(self.client.clone(), self.target)
     }
 
     /// As [`Client::stop`], of this group alone.
@@ -91,7 +111,7 @@ impl ClientGroup {
     /// # Errors
     /// See [`Client::stop`].
     pub fn stop(&self, category: StopCategory) -> Result<(), CommandError> {
-        self.client.request_stop(self.target(), category)
+        self.client.request_stop(self.target, category)
     }
 
     /// See [`GroupHandle::enable`](crate::GroupHandle::enable).
@@ -99,7 +119,7 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn enable(&self) -> Result<(), CommandError> {
-        self.client.begin_enable(self.target())
+        self.client.begin_enable(self.target)
     }
 
     /// See [`GroupHandle::disable`](crate::GroupHandle::disable).
@@ -107,7 +127,7 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn disable(&self) -> Result<(), CommandError> {
-        self.client.begin_disable(self.target())
+        self.client.begin_disable(self.target)
     }
 
     /// See [`GroupHandle::reset_faults`](crate::GroupHandle::reset_faults).
@@ -115,7 +135,7 @@ impl ClientGroup {
     /// # Errors
     /// As [`Client::move_to`].
     pub fn reset_faults(&self) -> Result<(), CommandError> {
-        self.client.clear_faults(self.target())
+        self.client.clear_faults(self.target)
     }
 
     /// Waits until the group is in a phase.
@@ -123,15 +143,6 @@ impl ClientGroup {
     /// # Errors
     /// [`WaitError::NotInTime`] after `at_most`, [`WaitError::Ended`].
     pub fn wait_for(&self, phase: Phase, at_most: Duration) -> Result<(), WaitError> {
-        self.client.look_until(at_most, || (self.state().phase == phase).then_some(()))
-    }
-
-    /// What is asked of the only group is asked of all.
-    fn target(&self) -> RequestTarget {
-        if self.client.machine().groups.len() > 1 {
-            RequestTarget::Group(self.number)
-        } else {
-            RequestTarget::All
-        }
+        self.client.wait_for_phase(self.target, phase, at_most)
     }
 }

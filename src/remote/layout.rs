@@ -1,26 +1,29 @@
 //! What is where in the memory that a controller shows itself by.
 //!
 //! The memory is a sequence of 64-bit words in the byte order of the computer: the [`Header`], the description, the slots of the state, the
-//! slots of the events. The header says where they begin. `f64` stands as its bits.
+//! slots of the events, those of the timing. The header says where they begin. `f64` stands as its bits.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use serde::{Deserialize, Serialize};
-use takt_rt::{AxisLimits, MAX_GROUPS, RequestTarget};
+use takt_rt::{AxisLimits, MAX_GROUPS, OperationMode, RequestTarget};
 
 use crate::channels::{EVENT_WORDS, snapshot_words};
-use crate::telemetry::Machine;
+use crate::command::AxisProperties;
+use crate::telemetry::{LOOP_TIMING_WORDS, Machine};
 
 /// `takt mem`, as bytes.
 pub const MAGIC: u64 = u64::from_ne_bytes(*b"takt mem");
 /// Counts changes of the memory, the packets and their meaning. Both sides must have the same.
-pub const VERSION: u64 = 1;
+pub const VERSION: u64 = 2;
 
 /// Events that an observer can be behind, and one that is being written.
 const EVENT_SLOTS: u64 = 1024 + 1;
 /// The newest state, and those that a slow reader still reads.
 const STATE_SLOTS: u64 = 4;
+/// The same of the timing.
+const TIMING_SLOTS: u64 = 4;
 /// The newest stop of each target: of all axes, and of each group.
 pub const STOP_WORDS: usize = 1 + MAX_GROUPS;
 
@@ -41,10 +44,14 @@ pub struct Header {
     pub states: [AtomicU64; 3],
     /// The first word of the slots of the events, the words of a slot, and the slots.
     pub events: [AtomicU64; 3],
+    /// The same of the slots of the timing.
+    pub timings: [AtomicU64; 3],
     /// How many states are complete: state `n` is in slot `n` modulo the slots. Its lower half is the futex of a new cycle.
     pub states_completed: AtomicU64,
     /// The same of the events.
     pub events_completed: AtomicU64,
+    /// The same of the timing.
+    pub timings_completed: AtomicU64,
     /// Events that the process of the controller itself was too slow for.
     pub events_lost: AtomicU64,
     /// When the process of the controller last wrote here, by `CLOCK_MONOTONIC`, in nanoseconds.
@@ -77,13 +84,13 @@ pub struct Description {
     pub machine: Machine,
     /// The axes of each group; none where all axes are one group.
     pub groups: Vec<Vec<usize>>,
-    /// The limits of each axis.
-    limits: Vec<DescribedLimits>,
+    /// What the configuration says of each axis.
+    axes: Vec<DescribedAxis>,
 }
 
-/// [`AxisLimits`], in rad (m), seconds and N·m (N).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct DescribedLimits {
+/// [`AxisProperties`], in rad (m), seconds and N·m (N).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct DescribedAxis {
     position_min: f64,
     position_max: f64,
     velocity: f64,
@@ -91,33 +98,60 @@ struct DescribedLimits {
     deceleration: f64,
     jerk: f64,
     torque: f64,
+    node: u8,
+    stiffness_max: f64,
+    damping_max: f64,
+    /// Their numbers in object 6060.
+    modes: Vec<i8>,
+}
+
+impl DescribedAxis {
+    fn new(axis: &AxisProperties) -> Self {
+        let AxisLimits { position_min, position_max, velocity, acceleration, deceleration, jerk, torque } =
+            axis.limits;
+        Self {
+            position_min,
+            position_max,
+            velocity,
+            acceleration,
+            deceleration,
+            jerk,
+            torque,
+            node: axis.node,
+            stiffness_max: axis.stiffness_max,
+            damping_max: axis.damping_max,
+            modes: axis.modes.iter().map(|mode| *mode as i8).collect(),
+        }
+    }
+
+    fn properties(&self) -> AxisProperties {
+        AxisProperties {
+            limits: AxisLimits {
+                position_min: self.position_min,
+                position_max: self.position_max,
+                velocity: self.velocity,
+                acceleration: self.acceleration,
+                deceleration: self.deceleration,
+                jerk: self.jerk,
+                torque: self.torque,
+            },
+            node: self.node,
+            stiffness_max: self.stiffness_max,
+            damping_max: self.damping_max,
+            modes: self.modes.iter().filter_map(|mode| OperationMode::from_number(*mode)).collect(),
+        }
+    }
 }
 
 impl Description {
-    /// The description of a machine with these groups and limits.
-    pub fn new(machine: Machine, groups: Vec<Vec<usize>>, limits: &[AxisLimits]) -> Self {
-        let described = |limits: &AxisLimits| {
-            let AxisLimits { position_min, position_max, velocity, acceleration, deceleration, jerk, torque } =
-                *limits;
-            DescribedLimits { position_min, position_max, velocity, acceleration, deceleration, jerk, torque }
-        };
-        Self { machine, groups, limits: limits.iter().map(described).collect() }
+    /// The description of a machine with these groups and axes.
+    pub fn new(machine: Machine, groups: Vec<Vec<usize>>, axes: &[AxisProperties]) -> Self {
+        Self { machine, groups, axes: axes.iter().map(DescribedAxis::new).collect() }
     }
 
-    /// The limits of an axis.
-    pub fn limits(&self, axis: usize) -> Option<AxisLimits> {
-        self.limits.get(axis).map(|limits| {
-            let DescribedLimits {
-                position_min,
-                position_max,
-                velocity,
-                acceleration,
-                deceleration,
-                jerk,
-                torque,
-            } = *limits;
-            AxisLimits { position_min, position_max, velocity, acceleration, deceleration, jerk, torque }
-        })
+    /// What the configuration says of an axis.
+    pub fn axis(&self, axis: usize) -> Option<AxisProperties> {
+        self.axes.get(axis).map(DescribedAxis::properties)
     }
 
     /// The axes that a target means.
@@ -142,6 +176,8 @@ pub struct Layout {
     pub states: Slots,
     /// The slots of the events.
     pub events: Slots,
+    /// The slots of the timing.
+    pub timings: Slots,
 }
 
 /// Slots of the same length, one behind another.
@@ -182,12 +218,14 @@ impl Layout {
         let states = Slots { first: description_end, words: state_words, count: STATE_SLOTS };
         let events_first = description_end + state_words * STATE_SLOTS as usize;
         let events = Slots { first: events_first, words: EVENT_WORDS, count: EVENT_SLOTS };
-        Self { description_bytes, description: first..description_end, states, events }
+        let timings_first = events_first + EVENT_WORDS * EVENT_SLOTS as usize;
+        let timings = Slots { first: timings_first, words: LOOP_TIMING_WORDS, count: TIMING_SLOTS };
+        Self { description_bytes, description: first..description_end, states, events, timings }
     }
 
     /// All words.
     pub fn words(&self) -> usize {
-        self.events.first + self.events.words * self.events.count as usize
+        self.timings.first + self.timings.words * self.timings.count as usize
     }
 
     /// Writes it to the header.
@@ -198,7 +236,9 @@ impl Layout {
             .iter()
             .zip(numbers)
             .for_each(|(to, from)| to.store(from as u64, Ordering::Relaxed));
-        for (to, from) in [(&header.states, self.states), (&header.events, self.events)] {
+        let parts =
+            [(&header.states, self.states), (&header.events, self.events), (&header.timings, self.timings)];
+        for (to, from) in parts {
             let numbers = [from.first as u64, from.words as u64, from.count];
             to.iter().zip(numbers).for_each(|(to, from)| to.store(from, Ordering::Relaxed));
         }
@@ -219,10 +259,12 @@ impl Layout {
             description,
             states: slots(&header.states)?,
             events: slots(&header.events)?,
+            timings: slots(&header.timings)?,
         };
         let is_within = layout.description.end <= words
             && layout.states.is_within(words)
-            && layout.events.is_within(words);
+            && layout.events.is_within(words)
+            && layout.timings.is_within(words);
         is_within.then_some(layout)
     }
 }
@@ -235,10 +277,10 @@ mod tests {
 
     fn description() -> Description {
         let config = Config::load(Path::new("configs/arm-and-gripper.toml")).unwrap();
-        let mut limits: Vec<AxisLimits> = config.axes.iter().map(|axis| axis.limits).collect();
-        limits[0].jerk = f64::INFINITY;
+        let mut axes: Vec<AxisProperties> = config.axes.iter().map(AxisProperties::of).collect();
+        axes[0].limits.jerk = f64::INFINITY;
         let groups = config.groups.iter().map(|group| group.axes.clone()).collect();
-        Description::new(Machine::of(&config), groups, &limits)
+        Description::new(Machine::of(&config), groups, &axes)
     }
 
     #[test]
@@ -263,8 +305,10 @@ mod tests {
             description: Default::default(),
             states: Default::default(),
             events: Default::default(),
+            timings: Default::default(),
             states_completed: AtomicU64::default(),
             events_completed: AtomicU64::default(),
+            timings_completed: AtomicU64::default(),
             events_lost: AtomicU64::default(),
             alive_ns: AtomicU64::default(),
             has_ended: AtomicU64::default(),
@@ -278,15 +322,15 @@ mod tests {
         assert_eq!(Layout::of(&whole, words), Some(layout.clone()));
         assert_eq!(Layout::of(&whole, words - 1), None);
         for number in [0, 1, u64::MAX, u64::MAX / 2, words as u64] {
-            for part in 0..8 {
+            for part in 0..11 {
                 let broken = header();
                 layout.put(&broken);
-                let parts: Vec<&AtomicU64> =
-                    broken.description.iter().chain(&broken.states).chain(&broken.events).collect();
+                let slots = [&broken.states, &broken.events, &broken.timings].into_iter().flatten();
+                let parts: Vec<&AtomicU64> = broken.description.iter().chain(slots).collect();
                 parts[part].store(number, Ordering::Relaxed);
                 // Whatever is taken for a layout is within the memory.
                 let Some(layout) = Layout::of(&broken, words) else { continue };
-                for slots in [layout.states, layout.events] {
+                for slots in [layout.states, layout.events, layout.timings] {
                     assert!((0..slots.count.min(2000)).all(|slot| {
                         let first = slots.first + slots.words * slot as usize;
                         first + slots.words <= words

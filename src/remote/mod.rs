@@ -20,37 +20,42 @@
 //! - `layout`: what is where in it.
 //! - `shown`: the state and the events in it, for their writer and their readers.
 //! - `socket`: the sockets, their names and rights.
-//! - `packet`, `commands`, `replies`: what the packets say.
-//! - `client`, `group`, `stream`, `events`: the public face.
+//! - `commands`, `replies`: what the packets say.
+//! - `connect`, `asking`: how a client comes to a controller, and asks it.
+//! - `client`, `commanding`, `group`, `stream`, `events`: the public face; `running_controller`: the same as a trait.
 
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/another-process.md")]
 mod guide {}
 
+mod asking;
 mod client;
+mod commanding;
 mod commands;
+mod connect;
 mod error;
 mod events;
 mod group;
 mod layout;
 mod memory;
-mod packet;
 mod replies;
+mod running_controller;
 mod shown;
 mod socket;
 mod stream;
 
-pub use client::{Client, LeaseHolder, connect};
+pub use client::Client;
+pub use connect::connect;
 pub use error::ConnectError;
 pub use events::ClientEvents;
 pub use group::ClientGroup;
 pub use stream::ClientStream;
 
+pub use crate::packet::Malformed;
 pub use commands::{Command, Demand, StopRequest};
 pub(crate) use layout::{Description, LeaseShown};
 pub(crate) use memory::Memory;
-pub use packet::Malformed;
-pub use replies::Reply;
+pub use replies::{Answer, Reply};
 pub(crate) use shown::{ShownWriter, now_ns};
 pub(crate) use socket::{Listener, NameError, Names, SocketError, accept};
 pub use socket::{PACKET_WORDS, Packets, Received, Role};

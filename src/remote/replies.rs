@@ -6,10 +6,23 @@ use std::time::Duration;
 use takt_rt::{Phase, RejectReason, RequestError, RequestKind};
 
 use super::commands::{put_motion, take_motion};
-use super::packet::{Malformed, Put, Take};
-use crate::command::{CommandError, LeaseError, MotionId, PointRefusal, Refused, StreamError, needed};
+use crate::command::{
+    CommandError, LeaseError, MotionId, PointRefusal, Refused, StreamError, TrajectoryProgress, needed,
+};
+use crate::packet::{Malformed, Put, Take};
 use crate::telemetry::Machine;
 use crate::trajectory::{BrokenLimit, PointQuantity, RateError, TrajectoryError};
+
+/// A reply on its way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Answer {
+    /// The number of the demand.
+    pub number: u64,
+    /// The slot of the newest state that the process of the controller knew then: what the reply tells is in it.
+    pub slot: u64,
+    /// The reply.
+    pub reply: Reply,
+}
 
 /// The answer to a demand.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,42 +35,60 @@ pub enum Reply {
     Refused(CommandError),
     /// Points were not taken.
     NotTaken(StreamError),
+    /// How far a trajectory is; `None` if it is none under way.
+    Progress(Option<TrajectoryProgress>),
 }
 
 const DONE: u64 = 0;
 const MOTION: u64 = 1;
 const REFUSED: u64 = 2;
 const NOT_TAKEN: u64 = 3;
+const PROGRESS: u64 = 4;
 
-impl Reply {
-    /// Its words, for the demand of this number.
-    pub fn words(&self, number: u64) -> Vec<u64> {
+impl Answer {
+    /// Its words.
+    pub fn words(&self) -> Vec<u64> {
         let mut put = Put::default();
-        put.word(number);
-        match self {
-            Self::Done => {
+        put.word(self.number).word(self.slot);
+        match &self.reply {
+            Reply::Done => {
                 put.word(DONE);
             }
-            Self::Motion(motion) => put_motion(*motion, put.word(MOTION)),
-            Self::Refused(error) => put_command_error(error, put.word(REFUSED)),
-            Self::NotTaken(error) => put_stream_error(error, put.word(NOT_TAKEN)),
+            Reply::Motion(motion) => put_motion(*motion, put.word(MOTION)),
+            Reply::Refused(error) => put_command_error(error, put.word(REFUSED)),
+            Reply::NotTaken(error) => put_stream_error(error, put.word(NOT_TAKEN)),
+            Reply::Progress(progress) => {
+                put.word(PROGRESS).word(progress.is_some().into());
+                if let Some(TrajectoryProgress { path_s, of_s, rate }) = *progress {
+                    put.number(path_s).number(of_s).number(rate);
+                }
+            }
         }
         put.0
     }
 
-    /// The number of a packet, and the reply in it.
-    pub fn of(words: &[u64], machine: &Machine) -> Result<(u64, Self), Malformed> {
+    /// The answer of a packet.
+    pub fn of(words: &[u64], machine: &Machine) -> Result<Self, Malformed> {
         let mut take = Take(words);
-        let number = take.word()?;
+        let (number, slot) = (take.word()?, take.word()?);
         let reply = match take.word()? {
-            DONE => Self::Done,
-            MOTION => Self::Motion(take_motion(&mut take)?),
-            REFUSED => Self::Refused(take_command_error(&mut take, machine)?),
-            NOT_TAKEN => Self::NotTaken(take_stream_error(&mut take)?),
+            DONE => Reply::Done,
+            MOTION => Reply::Motion(take_motion(&mut take)?),
+            REFUSED => Reply::Refused(take_command_error(&mut take, machine)?),
+            NOT_TAKEN => Reply::NotTaken(take_stream_error(&mut take)?),
+            PROGRESS => Reply::Progress(match take.word()? {
+                0 => None,
+                1 => Some(TrajectoryProgress {
+                    path_s: take.number()?,
+                    of_s: take.number()?,
+                    rate: take.number()?,
+                }),
+                _ => return Err(Malformed),
+            }),
             _ => return Err(Malformed),
         };
         take.end()?;
-        Ok((number, reply))
+        Ok(Self { number, slot, reply })
     }
 }
 

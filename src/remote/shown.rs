@@ -16,6 +16,7 @@ use super::memory::{Memory, wait_while, wake};
 use crate::channels::{
     Attempt, Cells, EventReader, EventWriter, LatestReader, LatestWriter, put_snapshot, take_snapshot,
 };
+use crate::telemetry::{LoopTiming, newest_timing};
 
 /// The slots of one mailbox in the memory.
 pub struct ShownSlots {
@@ -33,6 +34,11 @@ impl ShownSlots {
     fn events(memory: &Arc<Memory>, layout: &Layout) -> Arc<Self> {
         let slots = layout.events;
         Arc::new(Self { memory: Arc::clone(memory), completed: |header| &header.events_completed, slots })
+    }
+
+    fn timings(memory: &Arc<Memory>, layout: &Layout) -> Arc<Self> {
+        let slots = layout.timings;
+        Arc::new(Self { memory: Arc::clone(memory), completed: |header| &header.timings_completed, slots })
     }
 }
 
@@ -55,6 +61,8 @@ pub struct ShownWriter {
     memory: Arc<Memory>,
     states: LatestWriter<ShownSlots>,
     events: EventWriter<ShownSlots>,
+    timings: LatestWriter<ShownSlots>,
+    timing: LoopTiming,
 }
 
 impl ShownWriter {
@@ -78,6 +86,8 @@ impl ShownWriter {
         Ok(Self {
             states: LatestWriter::over(ShownSlots::states(&memory, &layout)),
             events: EventWriter::over(LatestWriter::over(ShownSlots::events(&memory, &layout))),
+            timings: LatestWriter::over(ShownSlots::timings(&memory, &layout)),
+            timing: LoopTiming::default(),
             memory,
         })
     }
@@ -95,6 +105,14 @@ impl ShownWriter {
     /// Shows how many events were lost before they came here.
     pub fn events_lost(&self, lost: u64) {
         self.memory.header().events_lost.store(lost, Ordering::Relaxed);
+    }
+
+    /// Shows how punctual the loop is, if that has changed.
+    pub fn timing(&mut self, timing: LoopTiming) {
+        if timing != self.timing {
+            self.timings.write(|words| timing.put(words));
+            self.timing = timing;
+        }
     }
 
     /// Shows a state, with the newest stop of each target in it, and wakes who waits for it.
@@ -141,6 +159,7 @@ pub struct Shown {
     memory: Arc<Memory>,
     states: LatestReader<ShownSlots>,
     events: Arc<ShownSlots>,
+    timings: LatestReader<ShownSlots>,
 }
 
 /// A state, and the newest stop of each target in it.
@@ -188,7 +207,8 @@ impl Shown {
         let memory = Arc::new(memory);
         let states = LatestReader::over(ShownSlots::states(&memory, &layout));
         let events = ShownSlots::events(&memory, &layout);
-        Ok((Self { memory, states, events }, description))
+        let timings = LatestReader::over(ShownSlots::timings(&memory, &layout));
+        Ok((Self { memory, states, events, timings }, description))
     }
 
     /// The newest state. The first one is there before the memory is handed over.
@@ -204,6 +224,11 @@ impl Shown {
                 Attempt::Torn | Attempt::Nothing => std::thread::yield_now(),
             }
         }
+    }
+
+    /// The newest timing.
+    pub fn timing(&self) -> LoopTiming {
+        newest_timing(&self.timings)
     }
 
     /// How many states there have been, for [`Shown::wait`].
@@ -260,6 +285,7 @@ pub fn now_ns() -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command::AxisProperties;
     use crate::config::Config;
     use crate::telemetry::Machine;
     use std::path::Path;
@@ -267,9 +293,9 @@ mod tests {
 
     fn shown() -> (ShownWriter, Shown) {
         let config = Config::load(Path::new("configs/arm-and-gripper.toml")).unwrap();
-        let limits: Vec<_> = config.axes.iter().map(|axis| axis.limits).collect();
+        let axes: Vec<_> = config.axes.iter().map(AxisProperties::of).collect();
         let groups = config.groups.iter().map(|group| group.axes.clone()).collect();
-        let description = Description::new(Machine::of(&config), groups, &limits);
+        let description = Description::new(Machine::of(&config), groups, &axes);
         let writer = ShownWriter::new(&description).unwrap();
         let file = writer.memory().file().try_clone_to_owned().unwrap();
         let (shown, read) = Shown::of(Memory::of_other(file).unwrap()).unwrap();

@@ -164,6 +164,18 @@ impl Listener {
 }
 
 impl Listener {
+    /// The names in /dev/shm that a process serves by at present, in their order.
+    #[cfg(feature = "cli")]
+    pub fn names_in_use() -> Vec<String> {
+        let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
+        let name = |file: &str| Some(file.strip_prefix("takt-")?.strip_suffix(".observe")?.to_owned());
+        let names = entries.filter_map(|entry| name(entry.file_name().to_str()?));
+        let is_served = |name: &String| Names::new(name).is_ok_and(|names| Self::is_in_use(&names));
+        let mut names: Vec<String> = names.filter(is_served).collect();
+        names.sort();
+        names
+    }
+
     /// Whether another process has a name.
     #[cfg(feature = "cli")]
     pub fn is_in_use(names: &Names) -> bool {

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use takt_rt::{AxisPoint, GroupSnapshot, Nanoseconds, RequestTarget, StreamReport, StreamState};
+use takt_rt::{AxisPoint, Nanoseconds, RequestTarget, StreamReport};
 
 use super::client::Client;
 use super::shown::now_ns;
@@ -61,15 +61,7 @@ impl ClientStream {
 
     /// See [`StreamHandle::report`](crate::StreamHandle::report).
     pub fn report(&self) -> StreamReport {
-        let state = self.client.state();
-        let first = match self.target {
-            RequestTarget::Group(number) => state.groups().get(usize::from(number)),
-            RequestTarget::All => {
-                let followed = |group: &&GroupSnapshot| group.stream.state != StreamState::Idle;
-                state.groups().iter().find(followed).or(state.groups().first())
-            }
-        };
-        first.map_or_else(StreamReport::default, |group| group.stream)
+        self.client.stream_report(self.target)
     }
 
     /// How far the set-points are behind the stamps now.

@@ -14,7 +14,9 @@ use super::Served;
 use super::lease::Claimant;
 use super::worker::Worker;
 use crate::command::LeaseError;
-use crate::remote::{Listener, Memory, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest, accept};
+use crate::remote::{
+    Answer, Listener, Memory, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest, accept,
+};
 
 /// Observers, and connections for stops, at most.
 const PEERS: usize = 128;
@@ -139,7 +141,8 @@ impl Connections {
         self.workers.retain(|worker| !worker.is_closed());
         let refuse = |connection: &Packets| {
             // The client may be gone already.
-            let _ = connection.send(&Reply::lease(LeaseError::TooManyClients).words(u64::MAX));
+            let reply = Reply::lease(LeaseError::TooManyClients);
+            let _ = connection.send(&Answer { number: u64::MAX, slot: 0, reply }.words());
         };
         let (Ok(own), true) = (connection.try_clone(), self.working.load(Ordering::Acquire) < WORKERS) else {
             return refuse(&connection);

@@ -56,6 +56,13 @@ impl Lease {
         Ok(())
     }
 
+    /// A command has been carried out: if its client still has the lease, it has it for the whole length from now on.
+    pub fn prolong(&mut self, claimant: Claimant, now_ns: u64) {
+        if self.holder.is_some_and(|holder| holder.claimant == claimant) {
+            self.give(claimant, now_ns);
+        }
+    }
+
     /// A client takes the lease, whoever has it.
     pub fn take_over(&mut self, claimant: Claimant, now_ns: u64) {
         self.ousted.retain(|(connection, _)| *connection != claimant.connection);
@@ -107,6 +114,17 @@ mod tests {
 
     const LENGTH: Duration = Duration::from_millis(500);
     const MS: u64 = 1_000_000;
+    #[test]
+    fn a_command_that_took_its_time_prolongs_the_lease_of_its_client_and_of_no_other() {
+        let mut lease = Lease::new(LENGTH);
+        assert_eq!(lease.renew(FIRST, 0), Ok(()));
+        lease.prolong(FIRST, 400 * MS);
+        assert_eq!(lease.shown(800 * MS).process, FIRST.process);
+        lease.release(FIRST.connection);
+        lease.prolong(FIRST, 800 * MS);
+        assert_eq!(lease.shown(800 * MS).process, 0, "it has been given back");
+    }
+
     const FIRST: Claimant = Claimant { connection: 1, process: 101 };
     const SECOND: Claimant = Claimant { connection: 2, process: 102 };
 

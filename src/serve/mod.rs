@@ -219,6 +219,6 @@ fn description(controller: &dyn RunningController) -> Description {
         .zip(&machine.groups)
         .map(|(group, _)| controller.axes_of(takt_rt::RequestTarget::Group(group)))
         .collect();
-    let limits: Vec<_> = (0..machine.axes.len()).filter_map(|axis| controller.limits(axis)).collect();
-    Description::new(machine, groups, &limits)
+    let axes: Vec<_> = (0..machine.axes.len()).filter_map(|axis| controller.axis_properties(axis)).collect();
+    Description::new(machine, groups, &axes)
 }

@@ -33,6 +33,7 @@ impl Publisher {
             self.shown.event(&event);
         }
         self.shown.events_lost(self.events.missed());
+        self.shown.timing(self.served.controller.timing());
         self.shown.lease(self.served.lease().shown(now_ns()));
         self.shown.state(&state, |target| self.served.controller.newest_stop(target));
         self.slot = state.slot;

@@ -7,7 +7,7 @@ use takt_rt::RequestTarget;
 use super::Served;
 use super::lease::Claimant;
 use crate::command::{CommandError, MotionId, StreamError};
-use crate::remote::{Command, Demand, Malformed, PACKET_WORDS, Packets, Received, Reply, now_ns};
+use crate::remote::{Answer, Command, Demand, Malformed, PACKET_WORDS, Packets, Received, Reply, now_ns};
 use crate::trajectory::TrajectoryPoint;
 
 /// Points of a trajectory that a client can hand over before it is carried out: 100 s at 1 kHz.
@@ -33,9 +33,12 @@ impl Worker {
         while let Received::Words(count) = connection.receive(&mut words, true) {
             let Ok(demand) = Demand::of(words.get(..count).unwrap_or_default()) else { break };
             let number = demand.number;
+            let is_of_lease = matches!(demand.command, Command::Lease { .. } | Command::Release);
             let Ok(reply) = self.answer(demand.command) else { break };
+            // Who has the lease is shown beside the next state, which a client waits for.
+            let slot = self.served.controller.state().slot.saturating_add(is_of_lease.into());
             // A client that does not receive its replies is disconnected.
-            if connection.send(&reply.words(number)).is_err() {
+            if connection.send(&Answer { number, slot, reply }.words()).is_err() {
                 break;
             }
         }
@@ -57,7 +60,7 @@ impl Worker {
             Ok(()) => {
                 let reply = self.carry_out(command);
                 // The controller may have taken its time.
-                let _ = self.admit(&Command::Lease { is_taken_over: false });
+                self.served.lease().prolong(self.claimant, now_ns());
                 reply
             }
             Err(error) if is_of_stream => Reply::NotTaken(StreamError::Lease(error)),
@@ -71,6 +74,8 @@ impl Worker {
         match command {
             Command::Lease { is_taken_over: true } => lease.take_over(self.claimant, now_ns()),
             Command::Release => lease.release(self.claimant.connection),
+            // To look is for everybody.
+            Command::Progress(_) => {}
             _ => lease.renew(self.claimant, now_ns())?,
         }
         Ok(())
@@ -82,6 +87,9 @@ impl Worker {
             Command::Lease { .. } | Command::Release => Reply::Done,
             Command::Move { target, options, positions } => {
                 motion(controller.begin_move(target, &positions, options))
+            }
+            Command::MoveBy { target, options, distances } => {
+                motion(controller.begin_move_by(target, &distances, options))
             }
             Command::Velocity { axis, velocity, valid_for } => {
                 motion(controller.velocity(axis, velocity, valid_for))
@@ -110,6 +118,9 @@ impl Worker {
             Command::SetSpeed { motion, rate } => done(controller.set_speed(motion, rate)),
             Command::Pause(motion) => done(controller.pause(motion)),
             Command::Resume(motion) => done(controller.resume(motion)),
+            Command::Progress(motion) => {
+                controller.trajectory_progress(motion).map_or_else(Reply::Refused, Reply::Progress)
+            }
         }
     }
 

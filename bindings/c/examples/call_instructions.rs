@@ -1,4 +1,5 @@
-//! Calls of the header, for `benches/instructions`: how many instructions each takes on its way to the real-time thread and back.
+//! The same calls of a handle in Rust and of the header in C, for `benches/instructions`: how many instructions each takes on its way to the
+//! real-time thread and back; and a cycle of six simulated drives in virtual time.
 //!
 //! ```text
 //! call_instructions WORK REPETITIONS
@@ -6,9 +7,11 @@
 #![allow(clippy::undocumented_unsafe_blocks, reason = "every pointer here is one of a local variable")]
 
 use std::ffi::CString;
+use std::hint::black_box;
 use std::mem::MaybeUninit;
 use std::ptr;
 
+use takt::{Config, MoveOptions, VirtualController};
 use takt_c::errors::takt_result::{self, TAKT_OK};
 use takt_c::handles::takt_handle;
 use takt_c::life::{takt_now_ns, takt_stop};
@@ -31,6 +34,9 @@ fn main() {
     unsafe { (&raw mut (*state.as_mut_ptr()).size).write(size_of::<takt_state>() as u32) };
     let positions = [0.1; AXES];
     let targets = [takt_target { kind: 1, position: 0.1, ..unsafe { std::mem::zeroed() } }; AXES];
+    if in_rust(&work, repetitions) {
+        std::process::exit(0);
+    }
     let mut result = TAKT_OK;
     for stamp_ns in 0..repetitions {
         let called: takt_result = match work.as_str() {
@@ -54,4 +60,33 @@ fn main() {
     assert!(repetitions > 0 && result != takt_result::TAKT_ERROR_DEFECT);
     // Without an end: the process is measured, and ends here.
     std::process::exit(0);
+}
+
+/// The work by a handle in Rust; `false` if it is none of that.
+fn in_rust(work: &str, repetitions: u64) -> bool {
+    if !work.starts_with("rust-") && !work.starts_with("simulate-") {
+        return false;
+    }
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/arm6-erob.toml");
+    let Ok(config) = Config::load(path.as_ref()) else { return false };
+    let Ok(arm) = VirtualController::start(&config, None) else { return false };
+    let positions = [0.1; AXES];
+    match work {
+        "rust-read-state-6" => (0..repetitions).for_each(|_| assert!(black_box(arm.state()).slot > 0)),
+        // No cycle takes them: there is room for 256.
+        "rust-push-positions-6" => (0..repetitions).for_each(|stamp_ns| {
+            assert_eq!(arm.stream().push(stamp_ns, &positions), Ok(()));
+        }),
+        "simulate-6" => assert_eq!(arm.step(repetitions), repetitions),
+        "simulate-6-by-one" => (0..repetitions).for_each(|_| assert_eq!(arm.step(1), 1)),
+        "simulate-6-moving" => {
+            let there: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set + 0.4).collect();
+            assert!(
+                arm.move_with(&there, MoveOptions { velocity_scale: 0.01, ..MoveOptions::default() }).is_ok()
+            );
+            assert_eq!(arm.step(repetitions), repetitions);
+        }
+        _ => return false,
+    }
+    true
 }

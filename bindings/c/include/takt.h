@@ -61,7 +61,7 @@ enum takt_result
   TAKT_ERROR_HANDLE = -2,
   // The configuration, or the fault scenario, cannot be read or used.
   TAKT_ERROR_CONFIGURATION = -3,
-  // The controller could not be started: a bus, a right or a drive is missing. Nothing has moved.
+  // The controller could not be started: a bus, a right or a drive is missing; or none is served by this name. Nothing has moved.
   TAKT_ERROR_START = -4,
   // A limit would be broken. Nothing has changed.
   TAKT_ERROR_LIMIT = -5,
@@ -81,7 +81,8 @@ enum takt_result
   TAKT_ERROR_FORGOTTEN = -12,
   // The motion is not a trajectory under way.
   TAKT_ERROR_NO_TRAJECTORY = -13,
-  // It has not happened in time. What was waited for goes on.
+  // It has not happened in time. What was waited for goes on. Of a controller of another process also: that has not answered, and may
+  // still carry the command out.
   TAKT_ERROR_TIMEOUT = -14,
   // The controller has ended.
   TAKT_ERROR_ENDED = -15,
@@ -89,6 +90,10 @@ enum takt_result
   TAKT_ERROR_IN_CALLBACK = -16,
   // A defect of takt, please report it. The program may go on; the drives are stopped when the controller is closed.
   TAKT_ERROR_DEFECT = -17,
+  // Another process commands the controller, or this one may only observe it. Nothing has changed.
+  TAKT_ERROR_LEASE = -18,
+  // Only the process that has opened the controller can do this. Nothing has changed.
+  TAKT_ERROR_NOT_OWN = -19,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -420,6 +425,16 @@ typedef struct {
   uint64_t longest_ns;
 } takt_callback_times;
 
+// Who commands a controller that is served to other processes. Set `size` to `sizeof(takt_lease)`.
+typedef struct {
+  // `sizeof(takt_lease)`
+  uint32_t size;
+  // The process that commands; 0 if no other process does.
+  uint32_t process;
+  // When it may be followed by another one, unless it gives another command: ns from now.
+  uint64_t expires_in_ns;
+} takt_lease;
+
 // What the configuration says of an axis. Set `size` to `sizeof(takt_axis)`.
 typedef struct {
   // `sizeof(takt_axis)`
@@ -616,8 +631,11 @@ typedef struct {
   int32_t drives;
   // 1 if it is a failure that the operating system refuses a right to the real-time thread; 0 if takt goes on without it.
   uint8_t is_realtime_required;
+  // 1 to leave the drives disabled: takt_open() returns when each of them reports its position, and takt_enable() enables them. 0 to
+  // enable them.
+  uint8_t is_left_disabled;
   // 0; for later.
-  uint8_t reserved[7];
+  uint8_t reserved[6];
   // The folder for a recording of the run; NULL for what the configuration says. In virtual time it must be NULL, and nothing is
   // recorded.
   const char *recording;
@@ -654,7 +672,7 @@ extern "C" {
 // handle.
 //
 // Errors: TAKT_ERROR_ARGUMENT, TAKT_ERROR_REFUSED in any other motion, TAKT_ERROR_FULL, TAKT_ERROR_OVERTAKEN, TAKT_ERROR_ENDED,
-// TAKT_ERROR_HANDLE. Nothing has changed then.
+// TAKT_ERROR_NOT_OWN for a controller of another process, TAKT_ERROR_HANDLE. Nothing has changed then.
 //
 // Pointers: `function` does what is said of it, and `user` is valid for so long; the others are null, or point to what they should.
 takt_result takt_begin_callback(takt_handle handle,
@@ -688,6 +706,44 @@ takt_result takt_read_callback_times(takt_callback callback, takt_callback_times
 //
 // Errors: TAKT_ERROR_HANDLE.
 takt_result takt_close_callback(takt_callback callback);
+
+// Connects to a controller that another process of this computer serves by a name: `takt run CONFIG --serve NAME`. The handle is taken by
+// every call of this header, with the same meaning and the same errors, but for takt_begin_callback(): a callback is a function of the
+// process of the controller.
+//
+// Any number of processes observe; one commands. The first command takes the lease, each command renews it, and it expires 1 s after the
+// last one, or when its process ends. Until then the commands of others are TAKT_ERROR_LEASE; takt_take_over() takes it. takt_stop() needs
+// none. When the process of the controller ends, every call is TAKT_ERROR_ENDED, and takt_read_state() reads the last state.
+//
+// Any thread, not in a callback; blocks until the other process answers: up to seconds if that is overloaded. takt_close() ends the
+// connection, and not the controller.
+//
+// Errors: TAKT_ERROR_START (none is served by the name, it is of another version, or its permissions do not let this process observe),
+// TAKT_ERROR_ARGUMENT, TAKT_ERROR_FULL.
+//
+// Pointers: The pointers are null, or point to what they should.
+takt_result takt_connect(const char *name,
+                         takt_handle *handle);
+
+// Takes the lease of a controller of another process from whoever has it. What moves goes on. That process gets TAKT_ERROR_LEASE from
+// then on, until it takes it over itself. A controller of this process needs no lease: then it does nothing.
+//
+// Any thread, not in a callback; blocks until the other process answers.
+//
+// Errors: TAKT_ERROR_LEASE without write permission, TAKT_ERROR_TIMEOUT, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE.
+takt_result takt_take_over(takt_handle handle);
+
+// Gives the lease of a controller of another process back, so that others need not wait for its end. As takt_take_over().
+takt_result takt_release(takt_handle handle);
+
+// Reads who commands.
+//
+// Any thread, not in a callback; does not block.
+//
+// Errors: TAKT_ERROR_ARGUMENT, TAKT_ERROR_HANDLE.
+//
+// Pointers: `lease` is null, or points to a structure of the size that it says.
+takt_result takt_read_lease(takt_handle handle, takt_lease *lease);
 
 // How many axes a handle has; 0 for one that is null, closed or of another kind. Any thread; does not block.
 size_t takt_axis_count(takt_handle handle);
@@ -759,7 +815,8 @@ takt_result takt_close_events(takt_events events);
 // The version of the library: "0.1.0". Any thread; does not block.
 const char *takt_version(void);
 
-// Closes a handle. That of takt_open() ends the run with it: the axes come to rest, the drives are disabled and shut down. Calls that
+// Closes a handle. That of takt_open() ends the run with it: the axes come to rest, the drives are disabled and shut down. That of
+// takt_connect() ends nothing: the controller goes on in its process, and what moves goes on. Calls that
 // other threads are in return TAKT_ERROR_ENDED. Handles of its groups, events and callbacks stay open, to be closed as well.
 //
 // Any thread, not in a callback; blocks until the drives are shut down and the calls of other threads with this handle have returned.
@@ -776,9 +833,11 @@ uint64_t takt_now_ns(takt_handle handle);
 // be carried out is discarded, so that nothing begins after the stop. takt_wait_phase() waits until the axes are at rest.
 //
 // Any thread, also in a callback and in a signal handler: it is a few atomic operations, allocates nothing, takes no lock and does not
-// block. It leaves the last error as it is.
+// block. It leaves the last error as it is. Of a controller of another process it is two or three system calls that do not wait, and
+// needs no lease.
 //
-// Errors: TAKT_ERROR_HANDLE, TAKT_ERROR_ENDED, TAKT_ERROR_ARGUMENT for another category.
+// Errors: TAKT_ERROR_HANDLE, TAKT_ERROR_ENDED, TAKT_ERROR_ARGUMENT for another category; of another process TAKT_ERROR_LEASE without write
+// permission, and TAKT_ERROR_TIMEOUT if it has taken none of many stops.
 takt_result takt_stop(takt_handle handle,
                       int32_t category);
 
@@ -923,7 +982,8 @@ takt_result takt_wait(takt_handle handle,
 takt_result takt_motion_result(takt_handle handle,
                                takt_motion motion);
 
-// Opens a controller by a configuration file: brings its drives up and enables them, and returns when the axes hold their position.
+// Opens a controller by a configuration file: brings its drives up and enables them, and returns when the axes hold their position. With
+// `options->is_left_disabled` it leaves them disabled.
 //
 // takt owns the real-time thread from then on. The program may be slow, late or stopped: the axes keep their limits, and a stream that
 // runs dry comes to rest. `options` may be NULL.
@@ -944,6 +1004,17 @@ takt_result takt_open(const char *path,
 takt_result takt_open_text(const char *configuration,
                            const takt_options *options,
                            takt_handle *handle);
+
+// Compares a configuration with the text of a robot description (URDF): an axis that has the name of a joint may do no more than it. The
+// limits of positions, velocities and torques are compared; narrower ones are no contradiction. Nothing is opened.
+//
+// Any thread; blocks while it reads the file.
+//
+// Errors: TAKT_ERROR_CONFIGURATION, with each contradiction in the text; TAKT_ERROR_ARGUMENT for a NULL.
+//
+// Pointers: The pointers are null, or point to texts.
+takt_result takt_check_urdf(const char *path,
+                            const char *urdf);
 
 // Reads the state after the newest complete cycle. Before the first one, no drive is heard. After the end, it is the last one.
 //
@@ -966,7 +1037,8 @@ takt_result takt_begin_stream(takt_handle handle);
 // Pushes a point that is meant for now: a target for each axis of the handle. It is stamped with takt_now_ns(). Points may come at any
 // rate, evenly or not: takt follows them within all limits, a little behind (`stream_lag_ns`), and comes to rest when they run out.
 //
-// Any thread, not in a callback; allocates nothing, and waits for no more than another thread that pushes points to the same group.
+// Any thread, not in a callback; allocates nothing, and waits for no more than another thread that pushes points to the same group. To a
+// controller of another process it sends a packet, and waits for the answer.
 //
 // Errors: TAKT_ERROR_LIMIT (a torque or a gain beyond that of its axis; positions and velocities are led to within the limits),
 // TAKT_ERROR_MODE, TAKT_ERROR_ARGUMENT, TAKT_ERROR_FULL, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE. The point is not taken then.

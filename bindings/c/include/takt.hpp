@@ -192,6 +192,7 @@ using motion = takt_motion;
 struct options {
     takt_drives drives = TAKT_CONFIGURED;
     bool is_realtime_required = false;
+    bool is_left_disabled = false; ///< until enable()
     std::string recording{}; ///< a folder; empty as the configuration says
     std::string faults{};    ///< a file; empty for none
 
@@ -200,6 +201,7 @@ struct options {
         raw.size = sizeof raw;
         raw.drives = drives;
         raw.is_realtime_required = is_realtime_required ? 1 : 0;
+        raw.is_left_disabled = is_left_disabled ? 1 : 0;
         raw.recording = recording.empty() ? nullptr : recording.c_str();
         raw.faults = faults.empty() ? nullptr : faults.c_str();
         return raw;
@@ -325,6 +327,16 @@ public:
     result enable() const { return result(takt_enable(raw_)); }
     result disable() const { return result(takt_disable(raw_)); }
     result clear_faults() const { return result(takt_clear_faults(raw_)); }
+
+    /// Of a controller of another process: who commands it, to command it in place of another process, and to let others.
+    result_of<takt_lease> lease() const {
+        takt_lease lease{};
+        lease.size = sizeof lease;
+        takt_result code = takt_read_lease(raw_, &lease);
+        return {code, lease};
+    }
+    result take_over() const { return result(takt_take_over(raw_)); }
+    result release() const { return result(takt_release(raw_)); }
 
     result_of<motion> move_to(span<const double> targets, const move_options &how = {}) const {
         motion begun{};
@@ -470,7 +482,10 @@ public:
     }
 };
 
-/// The owner of a run. When it goes out of scope the axes come to rest, and the drives are disabled and shut down.
+/// Done if no axis of a configuration file may do more than the joint of its name in a robot description; else with each contradiction.
+inline result check_urdf(const std::string &path, const std::string &urdf) { return result(takt_check_urdf(path.c_str(), urdf.c_str())); }
+
+/// The owner of a run, or a connection to one. When an owner goes out of scope the axes come to rest, and the drives are disabled and shut down.
 class controller : public axes {
 public:
     /// By a configuration file. Throws takt::error.
@@ -486,6 +501,13 @@ public:
         controller opened;
         if (takt_result code = takt_open_text(text.c_str(), &raw, &opened.raw_); code != TAKT_OK) throw error(failure::last(code));
         return opened;
+    }
+    /// One of another process, by the name that it is served by (takt run --serve): every call is the same, but for begin_callback(). When
+    /// it goes out of scope the connection ends, and not the controller. Throws takt::error.
+    static controller connect(const std::string &name) {
+        controller connected;
+        if (takt_result code = takt_connect(name.c_str(), &connected.raw_); code != TAKT_OK) throw error(failure::last(code));
+        return connected;
     }
     controller(controller &&) noexcept = default;
     controller &operator=(controller &&) noexcept = default;

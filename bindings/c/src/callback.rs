@@ -140,7 +140,7 @@ unsafe impl Send for Given {}
 /// handle.
 ///
 /// Errors: TAKT_ERROR_ARGUMENT, TAKT_ERROR_REFUSED in any other motion, TAKT_ERROR_FULL, TAKT_ERROR_OVERTAKEN, TAKT_ERROR_ENDED,
-/// TAKT_ERROR_HANDLE. Nothing has changed then.
+/// TAKT_ERROR_NOT_OWN for a controller of another process, TAKT_ERROR_HANDLE. Nothing has changed then.
 ///
 /// # Safety
 /// `function` does what is said of it, and `user` is valid for so long; the others are null, or point to what they should.
@@ -176,11 +176,13 @@ pub unsafe extern "C" fn takt_begin_callback(
             move |state: &CallbackState<'_>, cycle: &CallbackCycle, command: &mut CallbackCommand<'_>| {
                 given.call(state, cycle, command);
             };
-        let begun = match &scope.group {
-            Some(group) => group.in_loop_with(options, call),
-            None => scope.handle.in_loop_with(options, call),
+        let own =
+            scope.own.as_ref().ok_or_else(|| Failure::not_own("a callback is in the real-time thread"))?;
+        let begun = match scope.group_name() {
+            Some(group) => own.group(group).and_then(|group| group.in_loop_with(options, call)),
+            None => own.in_loop_with(options, call),
         };
-        let begun = begun.map_err(|error| Failure::of_command(&error, &scope.handle, &scope.axes))?;
+        let begun = begun.map_err(|error| Failure::of_command(&error, &scope))?;
         let number = handles::open(Entry::Callback(begun, scope.axes.clone()))?;
         // SAFETY: the caller promises it.
         unsafe { border::put(callback, takt_callback { number }, "callback") }

@@ -1,13 +1,12 @@
 //! What a controller consists of: its axes and its groups.
 
 use std::ffi::c_char;
-use std::sync::Mutex;
 
-use takt::config::Travel;
+use takt::telemetry::Unit;
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{self, Entry, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
 
 /// Room for a name, with the zero at its end.
 pub const TAKT_NAME_LENGTH: usize = 64;
@@ -67,7 +66,7 @@ pub extern "C" fn takt_axis_count(handle: takt_handle) -> usize {
 pub extern "C" fn takt_period_ns(handle: takt_handle) -> u64 {
     let mut period_ns = 0;
     border::enter_without_words(|| {
-        period_ns = handle.scope_if_open().map_or(0, |scope| scope.handle.period_ns());
+        period_ns = handle.scope_if_open().map_or(0, |scope| scope.controller.period_ns());
         takt_result::TAKT_OK
     });
     period_ns
@@ -89,13 +88,14 @@ pub unsafe extern "C" fn takt_describe_axis(
 ) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        let refused = |error| Failure::of_command(&error, &scope.handle, &scope.axes);
+        let refused = |error| Failure::of_command(&error, &scope);
         let number = scope.axis(axis).map_err(refused)?;
-        let of = scope.handle.axes().get(number).ok_or_else(Failure::defect)?;
+        let named = scope.controller.machine().axes.get(number).ok_or_else(Failure::defect)?;
+        let of = scope.controller.axis_properties(number).ok_or_else(Failure::defect)?;
         let shown = takt_axis {
             size: size_of::<takt_axis>() as u32,
             number: number as u32,
-            is_linear: u32::from(matches!(of.travel, Travel::Linear { .. })),
+            is_linear: u32::from(named.unit == Unit::Metre),
             node: of.node.into(),
             position_min: of.limits.position_min,
             position_max: of.limits.position_max,
@@ -104,9 +104,9 @@ pub unsafe extern "C" fn takt_describe_axis(
             deceleration: of.limits.deceleration,
             jerk: of.limits.jerk,
             torque: of.limits.torque,
-            stiffness_max: of.compliance.stiffness_max,
-            damping_max: of.compliance.damping_max,
-            name: put_text(&of.name),
+            stiffness_max: of.stiffness_max,
+            damping_max: of.damping_max,
+            name: put_text(&named.name),
         };
         // SAFETY: the caller promises it.
         unsafe { border::put_growing(described, &shown, "described") }
@@ -133,11 +133,9 @@ pub unsafe extern "C" fn takt_open_group(
         let scope = handle.scope()?;
         // SAFETY: the caller promises it.
         let name = unsafe { border::text(name, "name") }?;
-        let refused = |error| Failure::of_command(&error, &scope.handle, &scope.axes);
-        let found = scope.handle.group(name).map_err(refused)?;
-        let axes = found.axes().to_vec();
-        let own = Scope { handle: scope.handle.clone(), group: Some(found), axes, owner: Mutex::new(None) };
-        let number = handles::open(Entry::Scope(own))?;
+        let refused = |error| Failure::of_command(&error, &scope);
+        let found = scope.controller.group_named(name).map_err(refused)?;
+        let number = handles::open(Entry::Scope(scope.group(found)))?;
         // SAFETY: the caller promises it.
         unsafe { border::put(group, takt_handle { number }, "group") }
     })

@@ -5,10 +5,12 @@ use std::ffi::{CString, c_char};
 
 use takt::trajectory::{RateError, TrajectoryError};
 use takt::{
-    CommandError, Error, Handle, MotionError, PointRefusal, Refused, RejectReason, StreamError, WaitError,
+    CommandError, ConnectError, Error, MotionError, PointRefusal, Refused, RejectReason, StreamError,
+    WaitError,
 };
 
 use crate::border::{self, Growing};
+use crate::handles::Scope;
 
 /// What a call has come to. Below 0 is a failure: then takt_last_error() and takt_last_error_text() say more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +26,7 @@ pub enum takt_result {
     TAKT_ERROR_HANDLE = -2,
     /// The configuration, or the fault scenario, cannot be read or used.
     TAKT_ERROR_CONFIGURATION = -3,
-    /// The controller could not be started: a bus, a right or a drive is missing. Nothing has moved.
+    /// The controller could not be started: a bus, a right or a drive is missing; or none is served by this name. Nothing has moved.
     TAKT_ERROR_START = -4,
     /// A limit would be broken. Nothing has changed.
     TAKT_ERROR_LIMIT = -5,
@@ -44,7 +46,8 @@ pub enum takt_result {
     TAKT_ERROR_FORGOTTEN = -12,
     /// The motion is not a trajectory under way.
     TAKT_ERROR_NO_TRAJECTORY = -13,
-    /// It has not happened in time. What was waited for goes on.
+    /// It has not happened in time. What was waited for goes on. Of a controller of another process also: that has not answered, and may
+    /// still carry the command out.
     TAKT_ERROR_TIMEOUT = -14,
     /// The controller has ended.
     TAKT_ERROR_ENDED = -15,
@@ -52,6 +55,10 @@ pub enum takt_result {
     TAKT_ERROR_IN_CALLBACK = -16,
     /// A defect of takt, please report it. The program may go on; the drives are stopped when the controller is closed.
     TAKT_ERROR_DEFECT = -17,
+    /// Another process commands the controller, or this one may only observe it. Nothing has changed.
+    TAKT_ERROR_LEASE = -18,
+    /// Only the process that has opened the controller can do this. Nothing has changed.
+    TAKT_ERROR_NOT_OWN = -19,
 }
 
 /// The last failure of a call in this thread. Set `size` to `sizeof(takt_error)`.
@@ -170,11 +177,20 @@ impl Failure {
         Self { beyond: Some((value, limit)), ..self }
     }
 
+    /// Only the process of the controller can do it.
+    pub(crate) fn not_own(what: &str) -> Self {
+        let words = format!(
+            "{what}, and this controller is in another process: do it there, in the program that opens it"
+        );
+        Self::new(takt_result::TAKT_ERROR_NOT_OWN, words)
+    }
+
     /// Of a command for these axes.
-    pub(crate) fn of_command(error: &CommandError, handle: &Handle, axes: &[usize]) -> Self {
-        let by_name = |name: &str| {
-            axes.iter().position(|axis| handle.axes().get(*axis).is_some_and(|axis| axis.name == name))
-        };
+    pub(crate) fn of_command(error: &CommandError, scope: &Scope) -> Self {
+        let axes = &scope.axes;
+        let known = &scope.controller.machine().axes;
+        let by_name =
+            |name: &str| axes.iter().position(|axis| known.get(*axis).is_some_and(|axis| axis.name == name));
         let failure = Self::new(result_of(error), error.to_string());
         match error {
             CommandError::NoSuchAxis { axis, .. } => failure.on_axis(Some(*axis)),
@@ -236,7 +252,7 @@ impl Failure {
     }
 }
 
-fn result_of(error: &CommandError) -> takt_result {
+pub(crate) fn result_of(error: &CommandError) -> takt_result {
     match error {
         CommandError::Count { .. }
         | CommandError::NoSuchAxis { .. }
@@ -260,6 +276,8 @@ fn result_of(error: &CommandError) -> takt_result {
         CommandError::Refused(refused) => result_of_refusal(refused),
         CommandError::Unanswered => takt_result::TAKT_ERROR_FORGOTTEN,
         CommandError::Overtaken => takt_result::TAKT_ERROR_OVERTAKEN,
+        CommandError::Lease(_) => takt_result::TAKT_ERROR_LEASE,
+        CommandError::NoReply { .. } => takt_result::TAKT_ERROR_TIMEOUT,
         CommandError::Ended => takt_result::TAKT_ERROR_ENDED,
         _ => takt_result::TAKT_ERROR_REFUSED,
     }
@@ -302,6 +320,8 @@ impl From<StreamError> for Failure {
             }
             StreamError::Count { .. } => Self::argument(words),
             StreamError::Full => Self::new(takt_result::TAKT_ERROR_FULL, words),
+            StreamError::Lease(_) => Self::new(takt_result::TAKT_ERROR_LEASE, words),
+            StreamError::NoReply { .. } => Self::new(takt_result::TAKT_ERROR_TIMEOUT, words),
             _ => Self::new(takt_result::TAKT_ERROR_ENDED, words),
         }
     }
@@ -312,6 +332,17 @@ impl From<WaitError> for Failure {
         let result = match error {
             WaitError::NotInTime => takt_result::TAKT_ERROR_TIMEOUT,
             WaitError::Ended => takt_result::TAKT_ERROR_ENDED,
+        };
+        Self::new(result, error.to_string())
+    }
+}
+
+/// Of connecting to a controller of another process.
+impl From<ConnectError> for Failure {
+    fn from(error: ConnectError) -> Self {
+        let result = match error {
+            ConnectError::Name { .. } => takt_result::TAKT_ERROR_ARGUMENT,
+            _ => takt_result::TAKT_ERROR_START,
         };
         Self::new(result, error.to_string())
     }

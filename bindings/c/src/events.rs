@@ -1,9 +1,10 @@
 //! What happens in a controller, polled or waited for, with its words.
 
 use std::ffi::c_char;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use takt::{Event, EventKind, Events};
+use takt::telemetry::{Machine, event_words};
+use takt::{Event, EventKind, EventSource};
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::takt_result;
@@ -81,7 +82,9 @@ unsafe impl Growing for takt_event {
 pub unsafe extern "C" fn takt_open_events(handle: takt_handle, events: *mut takt_events) -> takt_result {
     border::carry_out(|| {
         border::check_pointer(events, "events")?;
-        let number = handles::open(Entry::Events(Mutex::new(handle.scope()?.handle.events())))?;
+        let scope = handle.scope()?;
+        let source = Mutex::new(scope.controller.event_source());
+        let number = handles::open(Entry::Events(source, Arc::clone(&scope.controller)))?;
         // SAFETY: the caller promises it.
         unsafe { border::put(events, takt_events { number }, "events") }
     })
@@ -104,12 +107,12 @@ pub unsafe extern "C" fn takt_next_event(
 ) -> takt_result {
     border::carry_out(|| {
         let used = handles::using(events.number).ok_or_else(wrong)?;
-        let Entry::Events(reader) = &*used else { return Err(wrong()) };
+        let Entry::Events(reader, controller) = &*used else { return Err(wrong()) };
         let timeout = border::duration(timeout_s, "timeout_s")?;
         border::check_pointer(event, "event")?;
-        let mut reader: MutexGuard<'_, Events> = reader.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut reader = reader.lock().unwrap_or_else(PoisonError::into_inner);
         let taken = reader.wait(timeout)?;
-        let shown = takt_event::of(&taken, &reader);
+        let shown = takt_event::of(&taken, &**reader, controller.machine());
         // SAFETY: the caller promises it.
         unsafe { border::put_growing(event, &shown, "event") }
     })
@@ -122,11 +125,11 @@ pub unsafe extern "C" fn takt_next_event(
 /// Errors: TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_close_events(events: takt_events) -> takt_result {
-    border::carry_out(|| handles::close(events.number, |entry| matches!(entry, Entry::Events(_)), |_| ()))
+    border::carry_out(|| handles::close(events.number, |entry| matches!(entry, Entry::Events(..)), |_| ()))
 }
 
 impl takt_event {
-    fn of(event: &Event, events: &Events) -> Self {
+    fn of(event: &Event, events: &dyn EventSource, machine: &Machine) -> Self {
         let (kind, axis, code) = meaning(&event.kind);
         Self {
             size: size_of::<Self>() as u32,
@@ -137,7 +140,7 @@ impl takt_event {
             axis: axis.map_or(-1, i32::from),
             code,
             missed: events.missed(),
-            words: put_text(&events.words(event)),
+            words: put_text(&event_words(event, machine)),
         }
     }
 }

@@ -7,11 +7,12 @@
 use std::ops::Deref;
 use std::ptr;
 use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use takt::{CallbackHandle, Controller, Events, GroupHandle, Handle, VirtualController};
+use takt::rt::RequestTarget;
+use takt::{CallbackHandle, Controller, EventSource, Handle, RunningController, VirtualController};
 
 use crate::errors::{Failure, takt_result};
 
@@ -41,13 +42,46 @@ pub struct takt_callback {
 
 /// The axes that a handle stands for.
 pub(crate) struct Scope {
-    pub handle: Handle,
-    /// The group; `None` for all axes of the controller.
-    pub group: Option<GroupHandle>,
+    /// The controller, of this process or of another one.
+    pub controller: Arc<dyn RunningController>,
+    /// The same, if it is of this process.
+    pub own: Option<Handle>,
+    /// All axes of the controller, or those of one group.
+    pub target: RequestTarget,
     /// The numbers of the axes among those of the controller.
     pub axes: Vec<usize>,
     /// The run, if the handle owns it. Closing takes it.
     pub owner: Mutex<Option<Owner>>,
+}
+
+impl Scope {
+    /// All axes of a controller, which `own` is a handle of if it is of this process.
+    pub(crate) fn all(
+        controller: Arc<dyn RunningController>,
+        own: Option<Handle>,
+        owner: Option<Owner>,
+    ) -> Self {
+        let target = RequestTarget::All;
+        let axes = controller.axes_of(target);
+        Self { controller, own, target, axes, owner: Mutex::new(owner) }
+    }
+
+    /// Those of one of its groups.
+    pub(crate) fn group(&self, target: RequestTarget) -> Self {
+        let axes = self.controller.axes_of(target);
+        let (controller, own) = (Arc::clone(&self.controller), self.own.clone());
+        Self { controller, own, target, axes, owner: Mutex::new(None) }
+    }
+
+    /// The name of its group; `None` for all axes.
+    pub(crate) fn group_name(&self) -> Option<&str> {
+        match self.target {
+            RequestTarget::Group(group) => {
+                self.controller.machine().groups.get(usize::from(group)).map(String::as_str)
+            }
+            RequestTarget::All => None,
+        }
+    }
 }
 
 /// The owner of a run.
@@ -59,7 +93,7 @@ pub(crate) enum Owner {
 /// What a handle stands for.
 pub(crate) enum Entry {
     Scope(Scope),
-    Events(Mutex<Events>),
+    Events(Mutex<Box<dyn EventSource>>, Arc<dyn RunningController>),
     Callback(CallbackHandle, Vec<usize>),
 }
 
@@ -209,7 +243,7 @@ mod tests {
     fn entry() -> Entry {
         let config = Config::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/first.toml").as_ref());
         let controller = VirtualController::start(&config.unwrap(), None).unwrap();
-        Entry::Events(Mutex::new(controller.events()))
+        Entry::Events(Mutex::new(controller.event_source()), Arc::new(controller.handle()))
     }
 
     #[test]
@@ -243,7 +277,7 @@ mod tests {
             thread::yield_now();
         }
         assert!(!closing.is_finished());
-        assert!(matches!(*used, Entry::Events(_)));
+        assert!(matches!(*used, Entry::Events(..)));
         drop(used);
         assert!(closing.join().unwrap());
     }

@@ -6,6 +6,7 @@
 
 pub mod border;
 pub mod callback;
+pub mod connect;
 pub mod description;
 pub mod errors;
 pub mod events;

@@ -6,7 +6,7 @@ use std::sync::PoisonError;
 use takt::{CommandError, Outcome, Phase, StopCategory};
 
 use crate::border;
-use crate::errors::{Failure, takt_result};
+use crate::errors::{self, Failure, takt_result};
 use crate::handles::{self, Entry, Owner, Scope, takt_handle};
 use crate::state::{put_state, takt_phase, takt_state};
 
@@ -28,7 +28,8 @@ pub extern "C" fn takt_version() -> *const c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
 }
 
-/// Closes a handle. That of takt_open() ends the run with it: the axes come to rest, the drives are disabled and shut down. Calls that
+/// Closes a handle. That of takt_open() ends the run with it: the axes come to rest, the drives are disabled and shut down. That of
+/// takt_connect() ends nothing: the controller goes on in its process, and what moves goes on. Calls that
 /// other threads are in return TAKT_ERROR_ENDED. Handles of its groups, events and callbacks stay open, to be closed as well.
 ///
 /// Any thread, not in a callback; blocks until the drives are shut down and the calls of other threads with this handle have returned.
@@ -56,7 +57,7 @@ fn end_of(scope: &Scope) -> Result<(), Failure> {
     };
     match outcome {
         Ok(Outcome::Finished) => Ok(()),
-        Ok(outcome) => failed(outcome.words(scope.handle.machine())),
+        Ok(outcome) => failed(outcome.words(scope.controller.machine())),
         Err(error) => failed(error.to_string()),
     }
 }
@@ -67,7 +68,7 @@ fn end_of(scope: &Scope) -> Result<(), Failure> {
 pub extern "C" fn takt_now_ns(handle: takt_handle) -> u64 {
     let mut now_ns = 0;
     border::enter_without_words(|| {
-        now_ns = handle.scope_if_open().map_or(0, |scope| scope.handle.now_ns());
+        now_ns = handle.scope_if_open().map_or(0, |scope| scope.controller.now_ns());
         takt_result::TAKT_OK
     });
     now_ns
@@ -77,9 +78,11 @@ pub extern "C" fn takt_now_ns(handle: takt_handle) -> u64 {
 /// be carried out is discarded, so that nothing begins after the stop. takt_wait_phase() waits until the axes are at rest.
 ///
 /// Any thread, also in a callback and in a signal handler: it is a few atomic operations, allocates nothing, takes no lock and does not
-/// block. It leaves the last error as it is.
+/// block. It leaves the last error as it is. Of a controller of another process it is two or three system calls that do not wait, and
+/// needs no lease.
 ///
-/// Errors: TAKT_ERROR_HANDLE, TAKT_ERROR_ENDED, TAKT_ERROR_ARGUMENT for another category.
+/// Errors: TAKT_ERROR_HANDLE, TAKT_ERROR_ENDED, TAKT_ERROR_ARGUMENT for another category; of another process TAKT_ERROR_LEASE without write
+/// permission, and TAKT_ERROR_TIMEOUT if it has taken none of many stops.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_stop(handle: takt_handle, category: i32) -> takt_result {
     border::enter_without_words(|| {
@@ -90,11 +93,8 @@ pub extern "C" fn takt_stop(handle: takt_handle, category: i32) -> takt_result {
             _ => return takt_result::TAKT_ERROR_ARGUMENT,
         };
         let Some(scope) = handle.scope_if_open() else { return takt_result::TAKT_ERROR_HANDLE };
-        let stopped = match &scope.group {
-            Some(group) => group.stop(category),
-            None => scope.handle.stop(category),
-        };
-        stopped.map_or(takt_result::TAKT_ERROR_ENDED, |()| takt_result::TAKT_OK)
+        let stopped = scope.controller.request_stop(scope.target, category);
+        stopped.map_or_else(|error| errors::result_of(&error), |()| takt_result::TAKT_OK)
     })
 }
 
@@ -106,10 +106,7 @@ pub extern "C" fn takt_stop(handle: takt_handle, category: i32) -> takt_result {
 /// Errors: TAKT_ERROR_REFUSED, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_disable(handle: takt_handle) -> takt_result {
-    command(handle, |scope| match &scope.group {
-        Some(group) => group.disable(),
-        None => scope.handle.disable(),
-    })
+    command(handle, |scope| scope.controller.begin_disable(scope.target))
 }
 
 /// Begins to enable the drives again: after takt_disable(), or after a fault and takt_clear_faults(). takt_wait_phase() with
@@ -120,10 +117,7 @@ pub extern "C" fn takt_disable(handle: takt_handle) -> takt_result {
 /// Errors: TAKT_ERROR_REFUSED unless the axes are disabled and no fault is left, TAKT_ERROR_FULL, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_enable(handle: takt_handle) -> takt_result {
-    command(handle, |scope| match &scope.group {
-        Some(group) => group.enable(),
-        None => scope.handle.enable(),
-    })
+    command(handle, |scope| scope.controller.begin_enable(scope.target))
 }
 
 /// Clears the faults that have stopped the axes. Look at the machine first: takt does not know whether the cause is gone.
@@ -133,16 +127,16 @@ pub extern "C" fn takt_enable(handle: takt_handle) -> takt_result {
 /// Errors: TAKT_ERROR_REFUSED in motion, TAKT_ERROR_FULL, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_clear_faults(handle: takt_handle) -> takt_result {
-    command(handle, |scope| match &scope.group {
-        Some(group) => group.reset_faults(),
-        None => scope.handle.reset_faults(),
-    })
+    command(handle, |scope| scope.controller.clear_faults(scope.target))
 }
 
-fn command(handle: takt_handle, act: impl FnOnce(&Scope) -> Result<(), CommandError>) -> takt_result {
+pub(crate) fn command(
+    handle: takt_handle,
+    act: impl FnOnce(&Scope) -> Result<(), CommandError>,
+) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        act(&scope).map_err(|error| Failure::of_command(&error, &scope.handle, &scope.axes))
+        act(&scope).map_err(|error| Failure::of_command(&error, &scope))
     })
 }
 
@@ -174,7 +168,7 @@ pub unsafe extern "C" fn takt_wait_cycle(
         }
         // SAFETY: the caller promises that the structure is of the size that it says, and the slot is within it.
         let seen = unsafe { (*state).slot };
-        let shown = scope.handle.cycle_after(seen, timeout)?;
+        let shown = scope.controller.cycle_after(seen, timeout)?;
         // SAFETY: the caller promises it.
         unsafe { put_state(&scope, &shown, state) }
     })
@@ -193,11 +187,7 @@ pub extern "C" fn takt_wait_phase(handle: takt_handle, phase: i32, timeout_s: f6
         let wanted = Phase::ALL.into_iter().find(|known| *known as i32 == phase);
         let wanted =
             wanted.ok_or_else(|| Failure::argument(format!("phase is {phase}, which is no takt_phase")))?;
-        match &scope.group {
-            Some(group) => group.wait_for(wanted, timeout)?,
-            None => scope.handle.wait_for(wanted, timeout)?,
-        }
-        Ok(())
+        Ok(scope.controller.wait_for_phase(scope.target, wanted, timeout)?)
     })
 }
 
@@ -218,7 +208,7 @@ pub unsafe extern "C" fn takt_advance(
 ) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        let shown = scope.handle.advance(cycles)?;
+        let shown = scope.controller.advance(cycles)?;
         if state.is_null() {
             return Ok(());
         }

@@ -74,10 +74,8 @@ pub unsafe extern "C" fn takt_move_to(
     options: *const takt_move_options,
     motion: *mut takt_motion,
 ) -> takt_result {
-    let act = |scope: &Scope, targets: &[f64], options| match &scope.group {
-        Some(group) => group.move_with(targets, options),
-        None => scope.handle.move_with(targets, options),
-    };
+    let act =
+        |scope: &Scope, targets: &[f64], options| scope.controller.begin_move(scope.target, targets, options);
     // SAFETY: the caller promises it.
     unsafe { move_axes(handle, (targets, axes, "targets"), options, motion, act) }
 }
@@ -94,9 +92,8 @@ pub unsafe extern "C" fn takt_move_by(
     options: *const takt_move_options,
     motion: *mut takt_motion,
 ) -> takt_result {
-    let act = |scope: &Scope, distances: &[f64], options| match &scope.group {
-        Some(group) => group.move_by(distances, options),
-        None => scope.handle.move_by(distances, options),
+    let act = |scope: &Scope, distances: &[f64], options| {
+        scope.controller.begin_move_by(scope.target, distances, options)
     };
     // SAFETY: the caller promises it.
     unsafe { move_axes(handle, (distances, axes, "distances"), options, motion, act) }
@@ -139,7 +136,7 @@ pub unsafe extern "C" fn takt_profile_velocity(
 ) -> takt_result {
     begin(handle, motion, |scope| {
         let valid_for = valid_for(valid_s)?;
-        Ok(scope.axis(axis).and_then(|axis| scope.handle.velocity(axis, velocity, valid_for)))
+        Ok(scope.axis(axis).and_then(|axis| scope.controller.velocity(axis, velocity, valid_for)))
     })
 }
 
@@ -157,7 +154,7 @@ pub unsafe extern "C" fn takt_profile_torque(
 ) -> takt_result {
     begin(handle, motion, |scope| {
         let valid_for = valid_for(valid_s)?;
-        Ok(scope.axis(axis).and_then(|axis| scope.handle.torque(axis, torque, valid_for)))
+        Ok(scope.axis(axis).and_then(|axis| scope.controller.torque(axis, torque, valid_for)))
     })
 }
 
@@ -183,10 +180,7 @@ pub unsafe extern "C" fn takt_change_mode(
 ) -> takt_result {
     begin(handle, motion, |scope| {
         let mode = operation_mode(mode)?;
-        Ok(match &scope.group {
-            Some(group) => group.change_mode(mode),
-            None => scope.handle.change_mode(mode),
-        })
+        Ok(scope.controller.begin_mode_change(scope.target, mode))
     })
 }
 
@@ -203,7 +197,7 @@ pub unsafe extern "C" fn takt_change_axis_mode(
 ) -> takt_result {
     begin(handle, motion, |scope| {
         let mode = operation_mode(mode)?;
-        Ok(scope.axis(axis).and_then(|axis| scope.handle.change_axis_mode(axis, mode)))
+        Ok(scope.axis(axis).and_then(|axis| scope.controller.change_axis_mode(axis, mode)))
     })
 }
 
@@ -225,7 +219,7 @@ pub extern "C" fn takt_wait(handle: takt_handle, motion: takt_motion, timeout_s:
     border::carry_out(|| {
         let scope = handle.scope()?;
         let timeout = border::duration(timeout_s, "timeout_s")?;
-        let result = scope.handle.wait(motion.id()?, timeout);
+        let result = scope.controller.wait(motion.id()?, timeout);
         result.map_err(|error| Failure::of_motion(&error, &scope.axes))
     })
 }
@@ -236,7 +230,7 @@ pub extern "C" fn takt_wait(handle: takt_handle, motion: takt_motion, timeout_s:
 pub extern "C" fn takt_motion_result(handle: takt_handle, motion: takt_motion) -> takt_result {
     border::enter(|| {
         let scope = handle.scope()?;
-        match scope.handle.result_of(motion.id()?) {
+        match scope.controller.result_of(motion.id()?) {
             None => Ok(takt_result::TAKT_UNDER_WAY),
             Some(Ok(())) => Ok(takt_result::TAKT_OK),
             Some(Err(error)) => Err(Failure::of_motion(&error, &scope.axes)),
@@ -256,7 +250,7 @@ pub(crate) fn begin(
         }
         let scope = handle.scope()?;
         let begun = act(&scope)?;
-        let begun = begun.map_err(|error| Failure::of_command(&error, &scope.handle, &scope.axes))?;
+        let begun = begun.map_err(|error| Failure::of_command(&error, &scope))?;
         if motion.is_null() {
             return Ok(());
         }

@@ -2,9 +2,9 @@
 
 use std::ffi::c_char;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-use takt::config::Interface;
+use takt::config::{Interface, Urdf};
 use takt::{
     Config, Controller, Error, FaultInjector, RecordingDestination, Scenario, SessionOptions,
     VirtualController,
@@ -37,8 +37,11 @@ pub struct takt_options {
     pub drives: i32,
     /// 1 if it is a failure that the operating system refuses a right to the real-time thread; 0 if takt goes on without it.
     pub is_realtime_required: u8,
+    /// 1 to leave the drives disabled: takt_open() returns when each of them reports its position, and takt_enable() enables them. 0 to
+    /// enable them.
+    pub is_left_disabled: u8,
     /// 0; for later.
-    pub reserved: [u8; 7],
+    pub reserved: [u8; 6],
     /// The folder for a recording of the run; NULL for what the configuration says. In virtual time it must be NULL, and nothing is
     /// recorded.
     pub recording: *const c_char,
@@ -52,7 +55,8 @@ impl Default for takt_options {
             size: size_of::<Self>() as u32,
             drives: 0,
             is_realtime_required: 0,
-            reserved: [0; 7],
+            is_left_disabled: 0,
+            reserved: [0; 6],
             recording: std::ptr::null(),
             faults: std::ptr::null(),
         }
@@ -64,7 +68,8 @@ unsafe impl Growing for takt_options {
     const FIRST_SIZE: usize = size_of::<Self>();
 }
 
-/// Opens a controller by a configuration file: brings its drives up and enables them, and returns when the axes hold their position.
+/// Opens a controller by a configuration file: brings its drives up and enables them, and returns when the axes hold their position. With
+/// `options->is_left_disabled` it leaves them disabled.
 ///
 /// takt owns the real-time thread from then on. The program may be slow, late or stopped: the axes keep their limits, and a stream that
 /// runs dry comes to rest. `options` may be NULL.
@@ -108,6 +113,36 @@ pub unsafe extern "C" fn takt_open_text(
     })
 }
 
+/// Compares a configuration with the text of a robot description (URDF): an axis that has the name of a joint may do no more than it. The
+/// limits of positions, velocities and torques are compared; narrower ones are no contradiction. Nothing is opened.
+///
+/// Any thread; blocks while it reads the file.
+///
+/// Errors: TAKT_ERROR_CONFIGURATION, with each contradiction in the text; TAKT_ERROR_ARGUMENT for a NULL.
+///
+/// # Safety
+/// The pointers are null, or point to texts.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn takt_check_urdf(path: *const c_char, urdf: *const c_char) -> takt_result {
+    border::carry_out(|| {
+        // SAFETY: the caller promises it.
+        let path = unsafe { border::text(path, "path") }?;
+        // SAFETY: the caller promises it.
+        let text = unsafe { border::text(urdf, "urdf") }?;
+        let config = Config::load(Path::new(path)).map_err(Error::from)?;
+        let contradictions = match Urdf::parse(Path::new("the robot description"), text) {
+            Ok(urdf) => urdf.contradictions(&config),
+            Err(error) => vec![error],
+        };
+        let words: Vec<String> =
+            contradictions.iter().map(|error| format!("{error} ({})", error.help())).collect();
+        if words.is_empty() {
+            return Ok(());
+        }
+        Err(Failure::new(takt_result::TAKT_ERROR_CONFIGURATION, words.join("\n")))
+    })
+}
+
 /// # Safety
 /// As takt_open().
 unsafe fn open(
@@ -145,16 +180,18 @@ unsafe fn open(
         fault_injector: scenario.map(|scenario| Arc::new(FaultInjector::new(scenario))),
         ..SessionOptions::default()
     };
-    let owner = match is_virtual {
-        true => Owner::Virtual(VirtualController::start(&config, None).map_err(Error::from)?),
-        false => Owner::Real(Controller::start(config, session).map_err(Error::from)?),
+    let owner = match (is_virtual, options.is_left_disabled != 0) {
+        (true, false) => VirtualController::start(&config, None).map(Owner::Virtual),
+        (true, true) => VirtualController::start_disabled(&config, None).map(Owner::Virtual),
+        (false, false) => Controller::start(config, session).map(Owner::Real),
+        (false, true) => Controller::start_disabled(config, session).map(Owner::Real),
     };
+    let owner = owner.map_err(Error::from)?;
     let own = match &owner {
         Owner::Real(controller) => controller.handle(),
         Owner::Virtual(controller) => controller.handle(),
     };
-    let axes = (0..own.axes().len()).collect();
-    let scope = Scope { handle: own, group: None, axes, owner: Mutex::new(Some(owner)) };
+    let scope = Scope::all(Arc::new(own.clone()), Some(own), Some(owner));
     let number = handles::open(Entry::Scope(scope))?;
     // SAFETY: the caller promises it.
     unsafe { border::put(handle, takt_handle { number }, "handle") }

@@ -2,7 +2,7 @@
 
 use std::ffi::c_char;
 
-use takt::rt::{BusState, GroupSnapshot, MAX_AXES, MAX_BUSES, MAX_GROUPS};
+use takt::rt::{BusState, GroupSnapshot, MAX_AXES, MAX_BUSES, MAX_GROUPS, RequestTarget};
 use takt::{AxisSnapshot, BusHealth, Snapshot, StopReason, TimingLevel};
 
 use crate::border::{self, Growing, put_text};
@@ -224,7 +224,7 @@ pub unsafe extern "C" fn takt_read_state(handle: takt_handle, state: *mut takt_s
     border::carry_out(|| {
         let scope = handle.scope()?;
         // SAFETY: the caller promises it.
-        unsafe { put_state(&scope, &scope.handle.state(), state) }
+        unsafe { put_state(&scope, &scope.controller.state(), state) }
     })
 }
 
@@ -271,9 +271,11 @@ impl takt_state {
             state.axis_count += 1;
             state.is_any_stale |= to.is_stale;
         }
-        let groups = match &scope.group {
-            Some(group) => shown.groups().get(usize::from(group.number())..).and_then(|of| of.get(..1)),
-            None => Some(shown.groups()),
+        let groups = match scope.target {
+            RequestTarget::Group(group) => {
+                shown.groups().get(usize::from(group)..).and_then(|of| of.get(..1))
+            }
+            RequestTarget::All => Some(shown.groups()),
         };
         for (to, from) in state.groups.iter_mut().zip(groups.unwrap_or_default()) {
             *to = takt_group_state::of(from);

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use takt::AxisPoint;
 use takt::rt::{MAX_AXES, PositionPoint};
-use takt::{AxisPoint, StreamHandle};
 
 use crate::border;
 use crate::errors::{Failure, takt_result};
@@ -96,18 +96,16 @@ impl takt_target {
 pub extern "C" fn takt_begin_stream(handle: takt_handle) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        let begun = match &scope.group {
-            Some(group) => group.begin_stream(),
-            None => scope.handle.begin_stream(),
-        };
-        begun.map_err(|error| Failure::of_command(&error, &scope.handle, &scope.axes))
+        let begun = scope.controller.begin_streaming(scope.target);
+        begun.map_err(|error| Failure::of_command(&error, &scope))
     })
 }
 
 /// Pushes a point that is meant for now: a target for each axis of the handle. It is stamped with takt_now_ns(). Points may come at any
 /// rate, evenly or not: takt follows them within all limits, a little behind (`stream_lag_ns`), and comes to rest when they run out.
 ///
-/// Any thread, not in a callback; allocates nothing, and waits for no more than another thread that pushes points to the same group.
+/// Any thread, not in a callback; allocates nothing, and waits for no more than another thread that pushes points to the same group. To a
+/// controller of another process it sends a packet, and waits for the answer.
 ///
 /// Errors: TAKT_ERROR_LIMIT (a torque or a gain beyond that of its axis; positions and velocities are led to within the limits),
 /// TAKT_ERROR_MODE, TAKT_ERROR_ARGUMENT, TAKT_ERROR_FULL, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE. The point is not taken then.
@@ -125,7 +123,7 @@ pub unsafe extern "C" fn takt_push_now(
         // SAFETY: the caller promises it.
         let targets = unsafe { border::array(targets, axes, "targets") }?;
         let mut room = [AxisPoint::default(); MAX_AXES];
-        Ok(scope.stream().push_now(point(targets, &mut room)?)?)
+        push(&scope, scope.controller.now_ns(), point(targets, &mut room)?)
     })
 }
 
@@ -146,7 +144,7 @@ pub unsafe extern "C" fn takt_push_at(
         // SAFETY: the caller promises it.
         let targets = unsafe { border::array(targets, axes, "targets") }?;
         let mut room = [AxisPoint::default(); MAX_AXES];
-        Ok(scope.stream().push(at_ns, point(targets, &mut room)?)?)
+        push(&scope, at_ns, point(targets, &mut room)?)
     })
 }
 
@@ -172,8 +170,7 @@ pub unsafe extern "C" fn takt_push_chunk(
         let targets = unsafe { border::array(targets, values(points, axes)?, "targets") }?;
         let entry = |(index, target): (usize, &takt_target)| entry(target, index / axes, index % axes);
         let entries = targets.iter().enumerate().map(entry).collect::<Result<Vec<AxisPoint>, _>>()?;
-        let rows: Vec<&[AxisPoint]> = entries.chunks(axes).collect();
-        Ok(scope.stream().push_chunk(from_ns, Duration::from_nanos(interval_ns), &rows)?)
+        push_chunk(&scope, from_ns, interval_ns, &entries)
     })
 }
 
@@ -191,7 +188,8 @@ pub unsafe extern "C" fn takt_push_positions(
         let scope = handle.scope()?;
         // SAFETY: the caller promises it.
         let positions = unsafe { border::array(positions, axes, "positions") }?;
-        Ok(scope.stream().push_now(positions)?)
+        let mut room = [AxisPoint::default(); MAX_AXES];
+        push(&scope, scope.controller.now_ns(), positions_point(positions, &mut room)?)
     })
 }
 
@@ -210,7 +208,8 @@ pub unsafe extern "C" fn takt_push_positions_at(
         let scope = handle.scope()?;
         // SAFETY: the caller promises it.
         let positions = unsafe { border::array(positions, axes, "positions") }?;
-        Ok(scope.stream().push(at_ns, positions)?)
+        let mut room = [AxisPoint::default(); MAX_AXES];
+        push(&scope, at_ns, positions_point(positions, &mut room)?)
     })
 }
 
@@ -232,9 +231,19 @@ pub unsafe extern "C" fn takt_push_positions_chunk(
         check_axes(&scope, axes)?;
         // SAFETY: the caller promises it.
         let positions = unsafe { border::array(positions, values(points, axes)?, "positions") }?;
-        let rows: Vec<&[f64]> = positions.chunks(axes).collect();
-        Ok(scope.stream().push_chunk(from_ns, Duration::from_nanos(interval_ns), &rows)?)
+        let entries: Vec<AxisPoint> = positions.iter().map(|position| (*position).into()).collect();
+        push_chunk(&scope, from_ns, interval_ns, &entries)
     })
+}
+
+fn push(scope: &Scope, at_ns: u64, entries: &[AxisPoint]) -> Result<(), Failure> {
+    Ok(scope.controller.push_point(scope.target, at_ns, entries)?)
+}
+
+fn push_chunk(scope: &Scope, from_ns: u64, interval_ns: u64, entries: &[AxisPoint]) -> Result<(), Failure> {
+    let rows: Vec<Vec<AxisPoint>> = entries.chunks(scope.axes.len().max(1)).map(<[_]>::to_vec).collect();
+    let interval = Duration::from_nanos(interval_ns);
+    Ok(scope.controller.push_chunk(scope.target, from_ns, interval, &rows)?)
 }
 
 /// One point. It allocates nothing, so that a real-time thread of the program may push it.
@@ -242,14 +251,26 @@ fn point<'a>(
     targets: &[takt_target],
     room: &'a mut [AxisPoint; MAX_AXES],
 ) -> Result<&'a [AxisPoint], Failure> {
-    let count = targets.len();
-    let Some(room) = room.get_mut(..count) else {
-        return Err(Failure::argument(format!("a point has {MAX_AXES} targets at most, and not {count}")));
-    };
+    let room = room_for(targets.len(), room)?;
     for (axis, (to, target)) in room.iter_mut().zip(targets).enumerate() {
         *to = entry(target, 0, axis)?;
     }
     Ok(room)
+}
+
+/// The same of positions alone.
+fn positions_point<'a>(
+    positions: &[f64],
+    room: &'a mut [AxisPoint; MAX_AXES],
+) -> Result<&'a [AxisPoint], Failure> {
+    let room = room_for(positions.len(), room)?;
+    room.iter_mut().zip(positions).for_each(|(to, position)| *to = (*position).into());
+    Ok(room)
+}
+
+fn room_for(count: usize, room: &mut [AxisPoint; MAX_AXES]) -> Result<&mut [AxisPoint], Failure> {
+    room.get_mut(..count)
+        .ok_or_else(|| Failure::argument(format!("a point has {MAX_AXES} targets at most, and not {count}")))
 }
 
 fn entry(target: &takt_target, point: usize, axis: usize) -> Result<AxisPoint, Failure> {
@@ -261,14 +282,5 @@ fn entry(target: &takt_target, point: usize, axis: usize) -> Result<AxisPoint, F
         Ok(Some(entry)) => Ok(entry),
         Ok(None) => Err(none("it has no kind")),
         Err(kind) => Err(none(&format!("its kind is {kind}"))),
-    }
-}
-
-impl Scope {
-    fn stream(&self) -> StreamHandle {
-        match &self.group {
-            Some(group) => group.stream(),
-            None => self.handle.stream(),
-        }
     }
 }

@@ -74,10 +74,7 @@ pub unsafe extern "C" fn takt_execute(
             accelerations: row(accelerations, point),
         };
         let points: Vec<TrajectoryPoint> = times_s.iter().enumerate().map(point).collect();
-        Ok(match &scope.group {
-            Some(group) => group.execute(&points),
-            None => scope.handle.execute(&points),
-        })
+        Ok(scope.controller.begin_trajectory(scope.target, &points))
     })
 }
 
@@ -104,10 +101,7 @@ pub unsafe extern "C" fn takt_move_through(
         // SAFETY: the caller promises it.
         let all = unsafe { border::array(waypoints, values(points, axes)?, "waypoints") }?;
         let waypoints: Vec<Vec<f64>> = all.chunks(axes).map(<[f64]>::to_vec).collect();
-        Ok(match &scope.group {
-            Some(group) => group.move_through(&waypoints),
-            None => scope.handle.move_through(&waypoints),
-        })
+        Ok(scope.controller.begin_through(scope.target, &waypoints))
     })
 }
 
@@ -120,19 +114,19 @@ pub unsafe extern "C" fn takt_move_through(
 /// TAKT_ERROR_FULL, TAKT_ERROR_OVERTAKEN, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE. The trajectory goes on as before then.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_set_speed(handle: takt_handle, motion: takt_motion, rate: f64) -> takt_result {
-    change(handle, |scope| Ok(scope.handle.set_speed(motion.id()?, rate)))
+    change(handle, |scope| Ok(scope.controller.set_speed(motion.id()?, rate)))
 }
 
 /// Brings the axes to rest on the path of a trajectory. As takt_set_speed().
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_pause(handle: takt_handle, motion: takt_motion) -> takt_result {
-    change(handle, |scope| Ok(scope.handle.pause(motion.id()?)))
+    change(handle, |scope| Ok(scope.controller.pause(motion.id()?)))
 }
 
 /// Goes on with a trajectory that was paused. As takt_set_speed().
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_resume(handle: takt_handle, motion: takt_motion) -> takt_result {
-    change(handle, |scope| Ok(scope.handle.resume(motion.id()?)))
+    change(handle, |scope| Ok(scope.controller.resume(motion.id()?)))
 }
 
 /// How far a trajectory under way is.
@@ -151,8 +145,9 @@ pub unsafe extern "C" fn takt_trajectory_progress(
 ) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        let none = || Failure::of_command(&takt::CommandError::NoTrajectory, &scope.handle, &scope.axes);
-        let shown = scope.handle.trajectory_progress(motion.id()?).ok_or_else(none)?;
+        let shown = scope.controller.trajectory_progress(motion.id()?);
+        let shown = shown.and_then(|shown| shown.ok_or(takt::CommandError::NoTrajectory));
+        let shown = shown.map_err(|error| Failure::of_command(&error, &scope))?;
         let shown = takt_progress {
             size: size_of::<takt_progress>() as u32,
             reserved: 0,
@@ -171,7 +166,7 @@ fn change(
 ) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        act(&scope)?.map_err(|error| Failure::of_command(&error, &scope.handle, &scope.axes))
+        act(&scope)?.map_err(|error| Failure::of_command(&error, &scope))
     })
 }
 

@@ -1,21 +1,13 @@
 //! The examples and the programs of `tests/programs`, compiled as a user compiles them, against what `bindings/c/install` installs, and run:
 //! as they are, and under the sanitizers of gcc and valgrind.
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use std::time::SystemTime;
-use std::{env, fs};
+mod installed;
 
-use tempfile::TempDir;
+use std::fs;
+use std::path::PathBuf;
+use std::process::Command;
 
-const WARNINGS: [&str; 6] = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-Wshadow", "-Wconversion"];
-const MEMORY: [&str; 2] = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
-const THREADS: [&str; 1] = ["-fsanitize=thread"];
-/// The library is compiled without the sanitizer, which knows nothing of the atomics in it: it looks at what the program does, and not at
-/// the memcpy, malloc and free of the library.
-const OF_THE_PROGRAM_ALONE: &str = "called_from_lib:libtakt.so\n";
-/// The sanitizer takes a part of every stack for itself, and the session thread of a debug build fills most of its two megabytes.
-const STACK_BYTES: &str = "16777216";
+use installed::{Installed, Library, MEMORY, THREADS, crate_folder, program, repository, succeeds};
 
 /// Each program with its configuration, and what it says in the end.
 const EXAMPLES: [(&str, &str, &str); 6] = [
@@ -27,133 +19,8 @@ const EXAMPLES: [(&str, &str, &str); 6] = [
     ("every_way.cpp", "configs/arm6-erob.toml", "refused at point 0, axis 0"),
 ];
 
-/// takt as `bindings/c/install` installs it, and a folder for the programs of a test.
-struct Installed {
-    prefix: PathBuf,
-    programs: TempDir,
-}
-
-/// Against which of the two libraries a program is linked.
-#[derive(Clone, Copy, PartialEq)]
-enum Library {
-    Shared,
-    Static,
-}
-
-fn crate_folder() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-fn repository() -> PathBuf {
-    crate_folder().join("../..").canonicalize().unwrap()
-}
-
-/// The static library that cargo has made of the crate for these tests: the newest, if features have made several.
-fn static_library() -> PathBuf {
-    let deps = env::current_exe().unwrap().parent().unwrap().to_owned();
-    let is_ours = |path: &PathBuf| {
-        let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        name.starts_with("libtakt_c") && name.ends_with(".a")
-    };
-    let files = fs::read_dir(&deps).unwrap().map(|entry| entry.unwrap().path()).filter(is_ours);
-    files.max_by_key(|path| modified(path)).unwrap()
-}
-
-fn modified(path: &Path) -> SystemTime {
-    fs::metadata(path).unwrap().modified().unwrap()
-}
-
-fn succeeds(command: &mut Command) -> String {
-    let Output { status, stdout, stderr } = command.output().unwrap();
-    let (stdout, stderr) = (String::from_utf8_lossy(&stdout), String::from_utf8_lossy(&stderr));
-    assert!(status.success(), "{command:?}: {status}\n{stdout}\n{stderr}");
-    stdout.into_owned()
-}
-
-impl Installed {
-    /// Each state of the library and of its files is installed once, whichever test comes first.
-    fn new() -> Self {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("takt-c");
-        fs::create_dir_all(&folder).unwrap();
-        let lock = fs::File::create(folder.join("lock")).unwrap();
-        lock.lock().unwrap();
-        let library = static_library();
-        let own = ["install", "takt.map", "include/takt.h", "include/takt.hpp"];
-        let newest = own
-            .map(|name| modified(&crate_folder().join(name)))
-            .into_iter()
-            .max()
-            .unwrap()
-            .max(modified(&library));
-        let prefix = folder.join("installed");
-        let is_installed = prefix.join("done").exists() && modified(&prefix.join("done")) >= newest;
-        if !is_installed {
-            let _ = fs::remove_dir_all(&prefix);
-            let mut install = Command::new(crate_folder().join("install"));
-            succeeds(install.arg("--prefix").arg(&prefix).arg("--static").arg(&library));
-            fs::write(prefix.join("done"), "").unwrap();
-        }
-        Self { prefix, programs: tempfile::tempdir().unwrap() }
-    }
-
-    /// What pkg-config says. The file is simple enough to be read here where there is no pkg-config.
-    fn flags(&self, library: Library) -> Vec<String> {
-        let text = fs::read_to_string(self.prefix.join("lib/pkgconfig/takt.pc")).unwrap();
-        let field = |name: &str| text.lines().find_map(|line| line.strip_prefix(name)).unwrap().to_owned();
-        let prefix = self.prefix.to_str().unwrap();
-        let expanded = |value: String| {
-            let value =
-                value.replace("${libdir}", "${prefix}/lib").replace("${includedir}", "${prefix}/include");
-            value.replace("${prefix}", prefix)
-        };
-        let libraries = match library {
-            Library::Static => format!("{prefix}/lib/libtakt.a {}", field("Libs.private:")),
-            Library::Shared => format!("{} -Wl,-rpath,{prefix}/lib", expanded(field("Libs:"))),
-        };
-        let flags = [expanded(field("Cflags:")), libraries];
-        flags.iter().flat_map(|flags| flags.split_whitespace()).map(str::to_owned).collect()
-    }
-
-    /// Compiles a program with every warning as an error.
-    fn compile(&self, source: &Path, more: &[&str], library: Library) -> PathBuf {
-        self.compile_all(&[source], more, library)
-    }
-
-    /// The same of several files, named for the first.
-    fn compile_all(&self, sources: &[&Path], more: &[&str], library: Library) -> PathBuf {
-        let source = sources[0];
-        let is_cpp = source.extension().is_some_and(|extension| extension == "cpp");
-        let (compiler, standard) = if is_cpp { ("c++", "-std=c++17") } else { ("cc", "-std=c11") };
-        let program = self.programs.path().join(source.file_name().unwrap()).with_extension(if is_cpp {
-            "of-cpp"
-        } else {
-            "of-c"
-        });
-        let mut command = Command::new(compiler);
-        command.args([standard, "-D_DEFAULT_SOURCE", "-g", "-O1"]).args(WARNINGS).args(more).args(sources);
-        succeeds(command.args(self.flags(library)).args(["-lm", "-lpthread", "-o"]).arg(&program));
-        program
-    }
-
-    /// A program, in a folder where its recordings may go.
-    fn run(&self, runner: &[&str], program: &Path, config: &str) -> String {
-        let suppressions = self.programs.path().join("suppressions");
-        fs::write(&suppressions, OF_THE_PROGRAM_ALONE).unwrap();
-        let mut words =
-            runner.iter().map(PathBuf::from).chain([program.to_owned(), repository().join(config)]);
-        let mut command = Command::new(words.next().unwrap());
-        command.args(words).current_dir(self.programs.path()).env("RUST_MIN_STACK", STACK_BYTES);
-        let options = format!("suppressions={} halt_on_error=1", suppressions.display());
-        succeeds(command.env("TSAN_OPTIONS", options))
-    }
-}
-
 fn example(name: &str) -> PathBuf {
     crate_folder().join("examples").join(name)
-}
-
-fn program(name: &str) -> PathBuf {
-    crate_folder().join("tests/programs").join(name)
 }
 
 fn is_here(command: &str) -> bool {
@@ -258,11 +125,18 @@ fn pkg_config_finds_the_library() {
 }
 
 #[test]
-fn a_controller_manager_leads_the_system_of_ros2_control_through_its_life() {
+fn a_controller_manager_of_humble_or_of_rolling_leads_the_system_of_ros2_control_through_its_life() {
     let takt = Installed::new();
+    for of in ["humble", "rolling"] {
+        led_through_its_life(&takt, of);
+    }
+}
+
+fn led_through_its_life(takt: &Installed, of: &str) {
     let package = crate_folder().join("../ros2_control");
     let include = |folder: &str| format!("-I{}", package.join(folder).display());
-    let more = [MEMORY[0], MEMORY[1], &include("include"), &include("test/stand_in")];
+    let stand_ins = [include("test/stand_in/ros"), include(&format!("test/stand_in/{of}"))];
+    let more = [MEMORY[0], MEMORY[1], &include("include"), &stand_ins[0], &stand_ins[1]];
     let sources = [package.join("test/drive_system.cpp"), package.join("src/takt_system.cpp")];
     let compiled = takt.compile_all(&[&sources[0], &sources[1]], &more, Library::Shared);
     let urdf = package.join("urdf/arm.ros2_control.urdf");

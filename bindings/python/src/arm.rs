@@ -9,15 +9,19 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyTuple};
 use takt::config::Interface;
 use takt::telemetry::RealtimeReport;
-use takt::{Controller, IfOwned, Phase, RecordingDestination, SessionOptions, WaitError, schedule};
+use takt::{
+    Controller, Handle, IfOwned, Phase, RecordingDestination, RunningController, ServeOptions,
+    SessionOptions, WaitError, schedule,
+};
 
 use crate::config::config;
-use crate::error::{raise, raise_start};
+use crate::error::{raise, raise_command, raise_start};
 use crate::events::Events;
 use crate::group::Group;
 use crate::link::{Link, duration, seconds};
 use crate::owner::{Owned, Owner};
 use crate::recording::{Recorder, Recording};
+use crate::server::Server;
 
 /// The drives are enabled within this time. It covers the power-up time of all drives.
 const ENABLE_TIMEOUT: Duration = Duration::from_secs(60);
@@ -36,14 +40,37 @@ pub struct Arm {
 impl Arm {
     /// An arm that owns this controller.
     pub fn owning(owned: Owned, recorder: Recorder) -> PyClassInitializer<Self> {
-        let handle = match &owned {
-            Owned::Real(controller) => controller.handle(),
-            Owned::Virtual(controller) => controller.handle(),
+        let (link, group) = match &owned {
+            Owned::Real(controller) => of_own(controller),
+            Owned::Virtual(controller) => of_own(controller),
+            Owned::Served(client) => with_all(Link::to_served(client.clone()), client),
         };
-        let (link, axes) = (Link::new(handle.clone()), handle.axes().len());
+        let axes = link.axis_names().len();
         let arm = Self { owner: Owner::new(owned, link.clone()), link, recorder, axes };
-        PyClassInitializer::from(Group::all(handle)).add_subclass(arm)
+        PyClassInitializer::from(group).add_subclass(arm)
     }
+}
+
+fn of_own(handle: &Handle) -> (Link, Group) {
+    with_all(Link::to_own(handle.clone()), handle)
+}
+
+fn with_all(link: Link, controller: &dyn RunningController) -> (Link, Group) {
+    let group = Group::all(link.clone(), controller);
+    (link, group)
+}
+
+/// Connects to a controller that another process serves by a name.
+#[pyfunction]
+#[pyo3(signature = (name, *, take_over=false))]
+pub fn connect(py: Python<'_>, name: &str, take_over: bool) -> PyResult<Py<Arm>> {
+    let client = py.detach(|| takt::connect(name));
+    let client = client.map_err(|error| raise(py, "StartError", &error.to_string(), &[]))?;
+    if take_over {
+        let taken = py.detach(|| client.take_over());
+        taken.map_err(|error| raise_command(py, &[], &error))?;
+    }
+    Py::new(py, Arm::owning(Owned::Served(client), Recorder::default()))
 }
 
 /// What becomes of the telemetry: as the configuration says, nothing, or a file.
@@ -125,13 +152,13 @@ impl Arm {
     /// The present time on the clock of the arm, in seconds: `time.monotonic()`, or virtual time.
     #[getter]
     fn time(&self, py: Python<'_>) -> PyResult<f64> {
-        Ok(seconds(self.link.handle(py)?.now_ns()))
+        Ok(seconds(self.link.controller(py)?.now_ns()))
     }
 
     /// The names of the groups; none where all axes are one group.
     #[getter]
     fn groups(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        Ok(self.link.handle(py)?.groups().iter().map(|group| group.name.clone()).collect())
+        Ok(self.link.controller(py)?.machine().groups.clone())
     }
 
     /// One group of several, by its name.
@@ -141,22 +168,26 @@ impl Arm {
 
     /// The events from now on.
     fn events(&self, py: Python<'_>) -> PyResult<Events> {
-        Ok(Events::new(self.link.clone(), self.link.handle(py)?.events()))
+        Ok(Events::new(self.link.clone(), self.link.controller(py)?.event_source()))
     }
 
     /// Records every cycle from now on, for no more than so many seconds.
     #[pyo3(signature = (at_most=600.0))]
     fn record(&self, py: Python<'_>, at_most: f64) -> PyResult<Recording> {
-        let period_ns = u128::from(self.link.handle(py)?.machine().cycle_ns.max(1));
+        let period_ns = u128::from(self.link.controller(py)?.period_ns().max(1));
         let cycles = duration("at_most", at_most)?.as_nanos().div_ceil(period_ns);
         let cycles = usize::try_from(cycles).unwrap_or(usize::MAX);
-        Ok(self.recorder.begin(self.link.clone(), (0..self.axes).collect(), cycles))
+        self.recorder.begin(py, self.link.clone(), (0..self.axes).collect(), cycles)
     }
 
     /// What the operating system has granted to the real-time thread, and what it has refused.
     #[getter]
     fn realtime<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let report = RealtimeReport::new(self.link.handle(py)?.realtime(), 0, 0);
+        let report = RealtimeReport::new(
+            self.link.own(py, "knows what the system has granted to the real-time thread")?.realtime(),
+            0,
+            0,
+        );
         let fields = PyDict::new(py);
         fields.set_item("policy", report.policy)?;
         fields.set_item("priority", report.priority)?;
@@ -171,13 +202,42 @@ impl Arm {
     /// The recordings that could not be written. The motion goes on after them.
     #[getter]
     fn not_written(&self, py: Python<'_>) -> PyResult<Vec<String>> {
-        Ok(self.link.handle(py)?.not_written())
+        Ok(self.link.own(py, "knows which recordings could not be written")?.not_written())
     }
 
     /// Whether the run has ended.
     #[getter]
     fn has_ended(&self, py: Python<'_>) -> PyResult<bool> {
-        Ok(self.link.handle(py)?.has_ended())
+        Ok(self.link.controller(py)?.has_ended())
+    }
+
+    /// The process that commands a controller of another process, and the seconds until another one may follow it.
+    #[getter]
+    fn lease(&self, py: Python<'_>) -> PyResult<Option<(u32, f64)>> {
+        let holder = self.link.controller(py)?.lease();
+        Ok(holder.map(|holder| (holder.process, holder.expires_in.as_secs_f64())))
+    }
+
+    /// Commands a controller of another process in place of whoever commands it.
+    fn take_over(&self, py: Python<'_>) -> PyResult<()> {
+        let controller = self.link.controller(py)?;
+        let taken = py.detach(|| controller.take_over());
+        taken.map_err(|error| raise_command(py, &self.link.axis_names(), &error))
+    }
+
+    /// Lets other processes observe and command the controller by a name.
+    #[pyo3(signature = (name, *, mode=0o600, lease=1.0))]
+    fn serve(&self, py: Python<'_>, name: &str, mode: u32, lease: f64) -> PyResult<Server> {
+        let options = ServeOptions::default().with_mode(mode).with_lease(duration("lease", lease)?);
+        let handle = self.link.own(py, "serves it")?.clone();
+        Server::start(py, handle, name, options)
+    }
+
+    /// Lets another process command.
+    fn release(&self, py: Python<'_>) -> PyResult<()> {
+        let controller = self.link.controller(py)?;
+        let released = py.detach(|| controller.release());
+        released.map_err(|error| raise_command(py, &self.link.axis_names(), &error))
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {

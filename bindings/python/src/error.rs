@@ -4,8 +4,8 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyString;
 use takt::{
-    CommandError, ConfigError, MotionError, Refused, StartFailure, Stopped, StreamError, TrajectoryError,
-    WaitError,
+    CommandError, ConfigError, LeaseError, MotionError, Refused, StartFailure, Stopped, StreamError,
+    TrajectoryError, WaitError,
 };
 
 static ERRORS: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
@@ -106,9 +106,20 @@ pub fn raise_command(py: Python<'_>, axes: &[&str], error: &CommandError) -> PyE
         | CommandError::SeveralGroups { .. }
         | CommandError::Rate(_) => raise(py, "ArgumentError", &words, &[]),
         CommandError::Refused(refused) => raise_refused(py, refused),
+        CommandError::Lease(error) => raise_lease(py, *error),
+        CommandError::NoReply { .. } => raise_timeout(py, &words),
         CommandError::Ended => raise_ended(py),
         _ => raise(py, "CommandError", &words, &[]),
     }
+}
+
+/// Another process commands, or this one may only observe.
+fn raise_lease(py: Python<'_>, error: LeaseError) -> PyErr {
+    let process = match error {
+        LeaseError::Held { process, .. } | LeaseError::TakenOver { process } => Some(process as usize),
+        _ => None,
+    };
+    raise(py, "LeaseError", &error.to_string(), &[("process", process.into())])
 }
 
 fn raise_refused(py: Python<'_>, refused: &Refused) -> PyErr {
@@ -177,6 +188,8 @@ pub fn raise_stream(py: Python<'_>, axes: &[&str], error: &StreamError) -> PyErr
             raise(py, "StreamError", &words, &[("point", (*point).into()), ("axis", name.into())])
         }
         StreamError::Count { .. } => raise(py, "ArgumentError", &words, &[]),
+        StreamError::Lease(error) => raise_lease(py, *error),
+        StreamError::NoReply { .. } => raise_timeout(py, &words),
         StreamError::Ended => raise_ended(py),
         _ => raise(py, "StreamError", &words, &[]),
     }

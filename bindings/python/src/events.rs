@@ -3,7 +3,8 @@
 use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
-use takt::{EventKind, Handle, WaitError};
+use takt::telemetry::{Machine, event_words};
+use takt::{EventKind, EventSource, WaitError};
 
 use crate::error::raise_ended;
 use crate::link::{Link, seconds};
@@ -38,7 +39,7 @@ impl Event {
 }
 
 impl Event {
-    fn of(handle: &Handle, events: &takt::Events, event: &takt::Event) -> Self {
+    fn of(machine: &Machine, event: &takt::Event) -> Self {
         let axis = match event.kind {
             EventKind::DriveState { axis, .. }
             | EventKind::Mode { axis, .. }
@@ -47,7 +48,7 @@ impl Event {
             EventKind::Rejected(rejected) => rejected.axis,
             _ => None,
         };
-        let group = event.group.and_then(|group| handle.groups().get(usize::from(group)));
+        let group = event.group.and_then(|group| machine.groups.get(usize::from(group)));
         Self {
             slot: event.slot,
             time: seconds(event.at_ns),
@@ -63,9 +64,9 @@ impl Event {
                 EventKind::Timing { .. } => "timing",
                 EventKind::Rejected(_) => "rejected",
             },
-            axis: axis.and_then(|axis| handle.axes().get(usize::from(axis))).map(|axis| axis.name.clone()),
-            group: group.map(|group| group.name.clone()),
-            words: events.words(event),
+            axis: axis.and_then(|axis| machine.axes.get(usize::from(axis))).map(|axis| axis.name.clone()),
+            group: group.cloned(),
+            words: event_words(event, machine),
         }
     }
 }
@@ -74,21 +75,21 @@ impl Event {
 #[pyclass(module = "takt", frozen)]
 pub struct Events {
     link: Link,
-    events: Mutex<takt::Events>,
+    events: Mutex<Box<dyn EventSource>>,
 }
 
 impl Events {
-    pub fn new(link: Link, events: takt::Events) -> Self {
+    pub fn new(link: Link, events: Box<dyn EventSource>) -> Self {
         Self { link, events: Mutex::new(events) }
     }
 
     /// The next one; `None` when the controller has ended.
     fn next(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<Event>> {
         let late = WaitError::NotInTime.to_string();
-        until(py, &self.link, timeout, &late, |handle, at_most| {
+        until(py, &self.link, timeout, &late, |controller, at_most| {
             let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
             match events.wait(at_most) {
-                Ok(event) => Some(Some(Event::of(handle, &events, &event))),
+                Ok(event) => Some(Some(Event::of(controller.machine(), &event))),
                 Err(WaitError::Ended) => Some(None),
                 Err(WaitError::NotInTime) => None,
             }
@@ -100,11 +101,11 @@ impl Events {
 impl Events {
     /// The events that have come. Does not wait.
     fn poll(&self, py: Python<'_>) -> PyResult<Vec<Event>> {
-        let handle = self.link.handle(py)?;
+        let machine = self.link.controller(py)?.machine();
         Ok(py.detach(|| {
             let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
             let come: Vec<takt::Event> = events.by_ref().collect();
-            come.iter().map(|event| Event::of(handle, &events, event)).collect()
+            come.iter().map(|event| Event::of(machine, event)).collect()
         }))
     }
 

@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use takt::config::{MODES, mode_word};
+use takt::rt::RequestTarget;
 use takt::{
-    CommandError, GroupHandle, Handle, MotionId, MoveOptions, OperationMode, Phase, Snapshot, StopCategory,
-    Stopped, TrajectoryPoint, WaitError,
+    CommandError, MotionId, MoveOptions, OperationMode, Phase, RunningController, StopCategory,
+    TrajectoryPoint, WaitError,
 };
 
 use crate::array;
@@ -15,7 +16,7 @@ use crate::link::{Link, duration};
 use crate::motion::Motion;
 use crate::state::State;
 use crate::stream::Stream;
-use crate::waiting::until;
+use crate::waiting::{stop_and_wait, until};
 
 /// An axis, as the configuration has it. rad, rad/s, rad/s², rad/s³ and N·m; m and N of a linear axis.
 #[pyclass(module = "takt", frozen, get_all)]
@@ -39,66 +40,12 @@ impl Axis {
     }
 }
 
-/// Whom commands are for.
-#[derive(Clone)]
-pub enum Commanded {
-    /// All axes.
-    All,
-    /// Those of one group.
-    One(GroupHandle),
-}
-
-impl Commanded {
-    /// The fault that has stopped them.
-    pub fn fault(&self, handle: &Handle) -> Option<Stopped> {
-        match self {
-            Self::All => handle.fault(),
-            Self::One(group) => group.fault(),
-        }
-    }
-
-    /// Asks for a stop. It waits for nothing.
-    pub fn stop(&self, handle: &Handle, category: StopCategory) -> Result<(), CommandError> {
-        match self {
-            Self::All => handle.stop(category),
-            Self::One(group) => group.stop(category),
-        }
-    }
-
-    /// Waits until these axes, which are theirs, hold or are off, after a stop has been asked for.
-    pub fn wait_until_still(
-        &self,
-        py: Python<'_>,
-        link: &Link,
-        axes: &[usize],
-        timeout: Option<f64>,
-    ) -> PyResult<()> {
-        let groups = link.handle(py)?.groups();
-        let is_its = |number: usize| match (self, groups.get(number)) {
-            (Self::One(_), Some(group)) => group.axes.iter().any(|axis| axes.contains(axis)),
-            _ => true,
-        };
-        let is_still = |phase| matches!(phase, Phase::Holding | Phase::Disabled | Phase::Passive);
-        until(py, link, timeout, "the axes have not come to rest in time", |handle, at_most| {
-            // The stop is taken in the next cycle.
-            let seen = handle.next_cycle(at_most);
-            if seen == Err(WaitError::NotInTime) {
-                return None;
-            }
-            let still = handle.wait_until(at_most, |state| {
-                let mut groups = state.groups().iter().enumerate().filter(|(number, _)| is_its(*number));
-                groups.all(|(_, group)| is_still(group.phase)).then_some(())
-            });
-            (still != Err(WaitError::NotInTime)).then_some(())
-        })
-    }
-}
-
 /// Axes that move together.
 #[pyclass(module = "takt", frozen, subclass)]
 pub struct Group {
     pub link: Link,
-    pub commanded: Commanded,
+    /// Whom commands are for.
+    target: RequestTarget,
     name: String,
     /// The numbers of the axes.
     axes: Vec<usize>,
@@ -106,16 +53,18 @@ pub struct Group {
 
 impl Group {
     /// All axes of a controller.
-    pub fn all(handle: Handle) -> Self {
-        let (name, axes) = (handle.machine().name.clone(), (0..handle.axes().len()).collect());
-        Self { link: Link::new(handle), commanded: Commanded::All, name, axes }
+    pub fn all(link: Link, controller: &dyn RunningController) -> Self {
+        let target = RequestTarget::All;
+        let (name, axes) = (controller.machine().name.clone(), controller.axes_of(target));
+        Self { link, target, name, axes }
     }
 
     /// The group with this name.
     pub fn named(&self, py: Python<'_>, name: &str) -> PyResult<Self> {
-        let group = self.link.handle(py)?.group(name).map_err(|error| self.command_error(py, &error))?;
-        let axes = group.axes().to_vec();
-        Ok(Self { link: self.link.clone(), commanded: Commanded::One(group), name: name.to_owned(), axes })
+        let controller = self.link.controller(py)?;
+        let target = controller.group_named(name).map_err(|error| self.command_error(py, &error))?;
+        let axes = controller.axes_of(target);
+        Ok(Self { link: self.link.clone(), target, name: name.to_owned(), axes })
     }
 
     fn axis_names(&self) -> Vec<&str> {
@@ -130,14 +79,10 @@ impl Group {
     fn command<T: Send>(
         &self,
         py: Python<'_>,
-        all: impl FnOnce(&Handle) -> Result<T, CommandError> + Send,
-        one: impl FnOnce(&GroupHandle) -> Result<T, CommandError> + Send,
+        command: impl FnOnce(&dyn RunningController, RequestTarget) -> Result<T, CommandError> + Send,
     ) -> PyResult<T> {
-        let handle = self.link.handle(py)?;
-        let commanded = py.detach(|| match &self.commanded {
-            Commanded::All => all(handle),
-            Commanded::One(group) => one(group),
-        });
+        let controller = self.link.controller(py)?;
+        let commanded = py.detach(|| command(controller, self.target));
         commanded.map_err(|error| self.command_error(py, &error))
     }
 
@@ -158,13 +103,11 @@ impl Group {
         timeout: Option<f64>,
         words: &str,
     ) -> PyResult<()> {
-        let reached = until(py, &self.link, timeout, words, |handle, at_most| {
-            let waited = match &self.commanded {
-                Commanded::All => handle.wait_for(phase, at_most),
-                Commanded::One(group) => group.wait_for(phase, at_most),
-            };
-            match waited {
-                Err(WaitError::NotInTime) => self.commanded.fault(handle).map(|stopped| Err(Some(stopped))),
+        let reached = until(py, &self.link, timeout, words, |controller, at_most| {
+            match controller.wait_for_phase(self.target, phase, at_most) {
+                Err(WaitError::NotInTime) => {
+                    controller.fault_in(self.target).map(|stopped| Err(Some(stopped)))
+                }
                 Ok(()) => Some(Ok(())),
                 Err(WaitError::Ended) => Some(Err(None)),
             }
@@ -203,10 +146,11 @@ impl Group {
     /// The axes, in the order in which values are given and returned.
     #[getter]
     fn axes(&self, py: Python<'_>) -> PyResult<Vec<Axis>> {
-        let handle = self.link.handle(py)?;
-        let of = |number: &usize| handle.axes().get(*number);
-        let axes = self.axes.iter().filter_map(of).map(|axis| Axis {
-            name: axis.name.clone(),
+        let controller = self.link.controller(py)?;
+        let known = &controller.machine().axes;
+        let of = |number: &usize| Some((known.get(*number)?, controller.axis_properties(*number)?));
+        let axes = self.axes.iter().filter_map(of).map(|(named, axis)| Axis {
+            name: named.name.clone(),
             position_min: axis.limits.position_min,
             position_max: axis.limits.position_max,
             velocity: axis.limits.velocity,
@@ -214,7 +158,7 @@ impl Group {
             deceleration: axis.limits.deceleration,
             jerk: axis.limits.jerk,
             torque: axis.limits.torque,
-            modes: axis.controls().map(|control| mode_word(control.operation_mode())).collect(),
+            modes: axis.modes.iter().map(|mode| mode_word(*mode)).collect(),
         });
         Ok(axes.collect())
     }
@@ -222,11 +166,7 @@ impl Group {
     /// The state after the newest complete cycle.
     #[getter]
     fn state(&self, py: Python<'_>) -> PyResult<State> {
-        let group = match &self.commanded {
-            Commanded::All => None,
-            Commanded::One(_) => Some(self.name.as_str()),
-        };
-        Ok(State::of(self.link.handle(py)?, &self.axes, group))
+        Ok(State::of(self.link.controller(py)?, &self.axes, self.target))
     }
 
     /// Moves every axis to its target, where all come to rest at the same time.
@@ -248,11 +188,7 @@ impl Group {
             acceleration_scale: acceleration,
             minimum_duration_s: duration,
         };
-        let id = self.command(
-            py,
-            |handle| handle.move_with(&target, options),
-            |group| group.move_with(&target, options),
-        )?;
+        let id = self.command(py, |arm, whose| arm.begin_move(whose, &target, options))?;
         self.begun(py, id, wait, timeout)
     }
 
@@ -267,11 +203,7 @@ impl Group {
     ) -> PyResult<Motion> {
         let waypoints: Vec<Vec<f64>> =
             array::table("waypoints", waypoints)?.rows().map(<[f64]>::to_vec).collect();
-        let id = self.command(
-            py,
-            |handle| handle.move_through(&waypoints),
-            |group| group.move_through(&waypoints),
-        )?;
+        let id = self.command(py, |arm, whose| arm.begin_through(whose, &waypoints))?;
         self.begun(py, id, wait, timeout)
     }
 
@@ -312,19 +244,14 @@ impl Group {
         for (point, qdd) in points.iter_mut().zip(accelerations.iter().flat_map(array::Table::rows)) {
             point.accelerations = qdd.to_vec();
         }
-        let id = self.command(py, |handle| handle.execute(&points), |group| group.execute(&points))?;
+        let id = self.command(py, |arm, whose| arm.begin_trajectory(whose, &points))?;
         self.begun(py, id, wait, timeout)
     }
 
     /// Begins to follow a stream of points, until the stream is closed.
     fn follow(&self, py: Python<'_>) -> PyResult<Stream> {
-        self.command(py, Handle::begin_stream, GroupHandle::begin_stream)?;
-        let handle = self.link.handle(py)?;
-        let stream = match &self.commanded {
-            Commanded::All => handle.stream(),
-            Commanded::One(group) => group.stream(),
-        };
-        Ok(Stream::new(self.link.clone(), self.commanded.clone(), stream, self.axes.clone()))
+        self.command(py, |arm, whose| arm.begin_streaming(whose))?;
+        Ok(Stream::new(self.link.clone(), self.target, self.axes.clone()))
     }
 
     /// Waits for a motion: the same as its own `wait`.
@@ -345,37 +272,35 @@ impl Group {
                 return Err(raise(py, "ArgumentError", &words, &[]));
             }
         };
-        let stopped = self.commanded.stop(self.link.handle(py)?, category);
-        stopped.map_err(|error| self.command_error(py, &error))?;
-        if wait { self.commanded.wait_until_still(py, &self.link, &self.axes, timeout) } else { Ok(()) }
+        let stopped = match wait {
+            true => stop_and_wait(py, &self.link, self.target, category, timeout)?,
+            false => self.link.controller(py)?.request_stop(self.target, category),
+        };
+        stopped.map_err(|error| self.command_error(py, &error))
     }
 
     /// Enables the axes again, and waits until they hold. It does nothing where they hold already.
     #[pyo3(signature = (timeout=30.0))]
     fn enable(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
-        let is_holding = |state: &Snapshot| state.groups().iter().all(|group| group.phase == Phase::Holding);
-        let handle = self.link.handle(py)?;
-        let is_enabled = match &self.commanded {
-            Commanded::All => is_holding(&handle.state()),
-            Commanded::One(group) => group.state().phase == Phase::Holding,
-        };
-        if is_enabled && self.commanded.fault(handle).is_none() {
+        let controller = self.link.controller(py)?;
+        let is_enabled = controller.wait_for_phase(self.target, Phase::Holding, Duration::ZERO).is_ok();
+        if is_enabled && controller.fault_in(self.target).is_none() {
             return Ok(());
         }
-        self.command(py, Handle::enable, GroupHandle::enable)?;
+        self.command(py, |arm, whose| arm.begin_enable(whose))?;
         self.wait_for_phase(py, Phase::Holding, timeout, "the axes have not been enabled in time")
     }
 
     /// Brings the axes to rest and disables them, and waits for that.
     #[pyo3(signature = (timeout=30.0))]
     fn disable(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
-        self.command(py, Handle::disable, GroupHandle::disable)?;
+        self.command(py, |arm, whose| arm.begin_disable(whose))?;
         self.wait_for_phase(py, Phase::Disabled, timeout, "the axes have not been disabled in time")
     }
 
     /// Clears the fault that has stopped the axes. They stay disabled.
     fn clear_fault(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, Handle::reset_faults, GroupHandle::reset_faults)
+        self.command(py, |arm, whose| arm.clear_faults(whose))
     }
 
     /// Changes the mode of operation of every axis, or of one.
@@ -389,11 +314,10 @@ impl Group {
     ) -> PyResult<()> {
         let mode = operation_mode(py, mode)?;
         let id = match axis {
-            None => self.command(py, |handle| handle.change_mode(mode), |group| group.change_mode(mode))?,
+            None => self.command(py, |arm, whose| arm.begin_mode_change(whose, mode))?,
             Some(axis) => {
                 let axis = self.axis_number(py, axis)?;
-                let changed = self.link.handle(py)?.change_axis_mode(axis, mode);
-                changed.map_err(|error| self.command_error(py, &error))?
+                self.command(py, |arm, _| arm.change_axis_mode(axis, mode))?
             }
         };
         Motion::new(self.link.clone(), id).wait(py, timeout)
@@ -408,7 +332,7 @@ impl Group {
         velocity: f64,
         valid_for: f64,
     ) -> PyResult<Motion> {
-        self.drive(py, axis, valid_for, |handle, axis, valid_for| handle.velocity(axis, velocity, valid_for))
+        self.drive(py, axis, valid_for, |arm, axis, valid_for| arm.velocity(axis, velocity, valid_for))
     }
 
     /// Gives an axis in profile torque a torque, for as long as it is valid.
@@ -420,7 +344,7 @@ impl Group {
         torque: f64,
         valid_for: f64,
     ) -> PyResult<Motion> {
-        self.drive(py, axis, valid_for, |handle, axis, valid_for| handle.torque(axis, torque, valid_for))
+        self.drive(py, axis, valid_for, |arm, axis, valid_for| arm.torque(axis, torque, valid_for))
     }
 
     fn __repr__(&self) -> String {
@@ -434,12 +358,11 @@ impl Group {
         py: Python<'_>,
         axis: &Bound<'_, PyAny>,
         valid_for: f64,
-        drive: impl FnOnce(&Handle, usize, Duration) -> Result<MotionId, CommandError>,
+        drive: impl FnOnce(&dyn RunningController, usize, Duration) -> Result<MotionId, CommandError> + Send,
     ) -> PyResult<Motion> {
         let axis = self.axis_number(py, axis)?;
         let valid_for = duration("valid_for", valid_for)?;
-        let driven = drive(self.link.handle(py)?, axis, valid_for);
-        let id = driven.map_err(|error| self.command_error(py, &error))?;
+        let id = self.command(py, |arm, _| drive(arm, axis, valid_for))?;
         Ok(Motion::new(self.link.clone(), id))
     }
 }

@@ -9,10 +9,11 @@
 //!
 //! | file | subject |
 //! | --- | --- |
-//! | [`arm`] | `Arm`: starts and owns a controller in real time |
+//! | [`arm`] | `Arm`: starts and owns a controller in real time, or connects to one |
 //! | [`simulation`] | `Simulation`: the same in virtual time |
 //! | [`group`] | what an arm, or a group of its axes, can be told |
 //! | [`motion`], [`stream`] | a motion under way; points of a stream |
+//! | [`server`] | lets other processes observe and command |
 //! | [`state`], [`events`], [`recording`] | what is seen |
 //! | [`config`], [`array`], [`error`] | what goes in and comes out: configurations, numpy, exceptions |
 //! | [`link`], [`owner`], [`waiting`] | the way to the controller, its life, and waiting without the lock |
@@ -30,6 +31,7 @@ mod link;
 mod motion;
 mod owner;
 mod recording;
+mod server;
 mod simulation;
 mod state;
 mod stream;
@@ -39,7 +41,7 @@ mod waiting;
 #[pyo3::pymodule]
 mod _takt {
     #[pymodule_export]
-    use crate::arm::Arm;
+    use crate::arm::{Arm, connect};
     #[pymodule_export]
     use crate::events::{Event, Events};
     #[pymodule_export]
@@ -50,6 +52,8 @@ mod _takt {
     use crate::owner::close_all;
     #[pymodule_export]
     use crate::recording::Recording;
+    #[pymodule_export]
+    use crate::server::Server;
     #[pymodule_export]
     use crate::simulation::{Simulation, simulate};
     #[pymodule_export]

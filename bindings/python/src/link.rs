@@ -1,52 +1,97 @@
 //! The way to a controller, which all objects of an arm share.
 
 use std::process;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use takt::Handle;
+use takt::{Client, Handle, RunningController};
 
 use crate::error::raise;
 
-/// A handle, and the process that it is of.
+/// A controller, and the process that may use it.
 #[derive(Clone)]
 pub struct Link {
-    handle: Handle,
+    controller: Arc<dyn RunningController>,
+    /// The same, if this program owns it.
+    own: Option<Handle>,
     process: u32,
+    is_closed: Arc<AtomicBool>,
 }
 
 impl Link {
-    pub fn new(handle: Handle) -> Self {
-        Self { handle, process: process::id() }
+    /// To a controller of this process.
+    pub fn to_own(handle: Handle) -> Self {
+        Self { own: Some(handle.clone()), ..Self::to(Arc::new(handle)) }
     }
 
-    /// The handle, in the process that has the controller. A fork of it has a copy of the memory, and none of the threads.
-    pub fn handle(&self, py: Python<'_>) -> PyResult<&Handle> {
-        if self.is_of_this_process() {
-            return Ok(&self.handle);
+    /// To one of another process.
+    pub fn to_served(client: Client) -> Self {
+        Self::to(Arc::new(client))
+    }
+
+    fn to(controller: Arc<dyn RunningController>) -> Self {
+        Self { controller, own: None, process: process::id(), is_closed: Arc::default() }
+    }
+
+    /// The controller, in the process that has it or has connected to it. A fork has a copy of the memory, and none of the threads.
+    pub fn controller(&self, py: Python<'_>) -> PyResult<&dyn RunningController> {
+        if !self.is_of_this_process() {
+            let words = format!(
+                "the controller is in process {}, and this is a fork of it; command it from there, or start workers by \
+                 multiprocessing's \"spawn\"",
+                self.process
+            );
+            return Err(raise(py, "EndedError", &words, &[]));
         }
-        let words = format!(
-            "the controller is in process {}, and this is a fork of it; command it from there, or start workers by \
-             multiprocessing's \"spawn\"",
-            self.process
-        );
-        Err(raise(py, "EndedError", &words, &[]))
+        if self.is_closed.load(Ordering::Acquire) {
+            return Err(raise(py, "EndedError", "the connection to the controller is closed", &[]));
+        }
+        Ok(&*self.controller)
     }
 
-    /// Whether the controller is in this process.
+    /// The same, for a thread of its own.
+    pub fn shared(&self, py: Python<'_>) -> PyResult<Arc<dyn RunningController>> {
+        self.controller(py)?;
+        Ok(Arc::clone(&self.controller))
+    }
+
+    /// The controller, for what only the program that runs it can do.
+    pub fn own(&self, py: Python<'_>, what: &str) -> PyResult<&Handle> {
+        self.controller(py)?;
+        self.own.as_ref().ok_or_else(|| {
+            let words =
+                format!("only the program that runs the controller {what}, and this one is connected to it");
+            raise(py, "OwnerError", &words, &[])
+        })
+    }
+
+    /// Whether this program owns the controller.
+    pub const fn is_own(&self) -> bool {
+        self.own.is_some()
+    }
+
+    /// From now on nobody can use it.
+    pub fn close(&self) {
+        self.is_closed.store(true, Ordering::Release);
+    }
+
+    /// Whether the controller is in this process, or this process has connected to it.
     pub fn is_of_this_process(&self) -> bool {
         process::id() == self.process
     }
 
     /// The names of all axes.
     pub fn axis_names(&self) -> Vec<&str> {
-        self.handle.axes().iter().map(|axis| axis.name.as_str()).collect()
+        self.controller.machine().axes.iter().map(|axis| axis.name.as_str()).collect()
     }
 
     /// The names of the axes with these numbers.
     pub fn names_of(&self, axes: &[usize]) -> Vec<&str> {
-        axes.iter().filter_map(|axis| self.handle.axes().get(*axis)).map(|axis| axis.name.as_str()).collect()
+        let known = &self.controller.machine().axes;
+        axes.iter().filter_map(|axis| known.get(*axis)).map(|axis| axis.name.as_str()).collect()
     }
 }
 

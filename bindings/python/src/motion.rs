@@ -1,7 +1,7 @@
 //! A motion under way.
 
 use pyo3::prelude::*;
-use takt::{Handle, MotionError, MotionId};
+use takt::{MotionError, MotionId, RunningController};
 
 use crate::error::{raise_command, raise_motion};
 use crate::link::Link;
@@ -22,10 +22,10 @@ impl Motion {
     fn command(
         &self,
         py: Python<'_>,
-        command: impl FnOnce(&Handle, MotionId) -> Result<(), takt::CommandError> + Send,
+        command: impl FnOnce(&dyn RunningController, MotionId) -> Result<(), takt::CommandError> + Send,
     ) -> PyResult<()> {
-        let handle = self.link.handle(py)?;
-        let commanded = py.detach(|| command(handle, self.id));
+        let controller = self.link.controller(py)?;
+        let commanded = py.detach(|| command(controller, self.id));
         commanded.map_err(|error| raise_command(py, &self.link.axis_names(), &error))
     }
 }
@@ -37,7 +37,7 @@ impl Motion {
     pub fn wait(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
         let late = MotionError::NotInTime.to_string();
         let result =
-            until(py, &self.link, timeout, &late, |handle, at_most| match handle.wait(self.id, at_most) {
+            until(py, &self.link, timeout, &late, |arm, at_most| match arm.wait(self.id, at_most) {
                 Err(MotionError::NotInTime) => None,
                 result => Some(result),
             })?;
@@ -47,33 +47,35 @@ impl Motion {
     /// Whether it has ended, however it has.
     #[getter]
     fn is_done(&self, py: Python<'_>) -> PyResult<bool> {
-        Ok(self.link.handle(py)?.result_of(self.id).is_some())
+        Ok(self.link.controller(py)?.result_of(self.id).is_some())
     }
 
     /// Changes the speed along the path of a trajectory: 1 as it was written.
     fn set_speed(&self, py: Python<'_>, rate: f64) -> PyResult<()> {
-        self.command(py, |handle, id| handle.set_speed(id, rate))
+        self.command(py, |arm, id| arm.set_speed(id, rate))
     }
 
     /// Brings the axes to rest on the path of a trajectory.
     fn pause(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, Handle::pause)
+        self.command(py, |arm, id| arm.pause(id))
     }
 
     /// Goes on with a trajectory that was paused.
     fn resume(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, Handle::resume)
+        self.command(py, |arm, id| arm.resume(id))
     }
 
     /// Of a trajectory: its time on the path, the time of its last point, and how fast it passes; None of any other motion.
     #[getter]
     fn progress(&self, py: Python<'_>) -> PyResult<Option<(f64, f64, f64)>> {
-        let progress = self.link.handle(py)?.trajectory_progress(self.id);
+        let controller = self.link.controller(py)?;
+        let progress = py.detach(|| controller.trajectory_progress(self.id));
+        let progress = progress.map_err(|error| raise_command(py, &self.link.axis_names(), &error))?;
         Ok(progress.map(|progress| (progress.path_s, progress.of_s, progress.rate)))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(match self.link.handle(py)?.result_of(self.id) {
+        Ok(match self.link.controller(py)?.result_of(self.id) {
             None => "<motion under way>".to_owned(),
             Some(Ok(())) => "<motion at its target>".to_owned(),
             Some(Err(error)) => format!("<motion: {error}>"),

@@ -1,18 +1,19 @@
 //! Who owns a controller, and its end: by `close`, by the end of the program, or when nobody has the arm any more.
 
-use std::mem;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::{mem, process};
 
 use pyo3::prelude::*;
-use takt::{Controller, Outcome, StartFailure, VirtualController};
+use takt::{Client, Controller, Outcome, StartFailure, VirtualController};
 
 use crate::error::{raise, raise_start};
 use crate::link::Link;
 
-/// A controller in real time, or in virtual time.
+/// A controller in real time, or in virtual time; or a connection to one of another process, which goes on after it.
 pub enum Owned {
     Real(Controller),
     Virtual(VirtualController),
+    Served(Client),
 }
 
 impl Owned {
@@ -27,6 +28,15 @@ impl Owned {
             Self::Virtual(controller) => {
                 let handle = controller.handle();
                 (controller.finish(), handle.machine().clone(), vec![])
+            }
+            Self::Served(client) => {
+                // Another client need not wait for the end of the lease. One that has never commanded has none.
+                let has_lease = client.lease().is_some_and(|lease| lease.process == process::id());
+                if has_lease {
+                    // The process of the controller may have ended.
+                    let _ = client.release();
+                }
+                return Ok(None);
             }
         };
         if !unreached.is_empty() {
@@ -65,7 +75,11 @@ impl Owner {
         if !self.link.is_of_this_process() {
             return Ok(());
         }
+        let is_served = matches!(&*lock(&self.owned), Some(Owned::Served(_)));
         let finished = py.detach(|| lock(&self.owned).take().map(Owned::finish));
+        if is_served {
+            self.link.close();
+        }
         match finished {
             None | Some(Ok(None)) => Ok(()),
             Some(Ok(Some(words))) => Err(raise(py, "ShutdownError", &words, &[])),
@@ -77,7 +91,7 @@ impl Owner {
     pub fn step(&self, cycles: u64) -> Option<u64> {
         match &*lock(&self.owned) {
             Some(Owned::Virtual(controller)) => Some(controller.step(cycles)),
-            Some(Owned::Real(_)) | None => None,
+            Some(Owned::Real(_) | Owned::Served(_)) | None => None,
         }
     }
 }

@@ -1,4 +1,5 @@
-//! Recordings of every cycle, as arrays. They are filled by the logger's thread of the library, which knows nothing of Python.
+//! Recordings of every cycle, as arrays. They are filled by the logger's thread of the library, or of a controller of another process by
+//! a thread that waits for its cycles; neither knows anything of Python.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -9,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use takt::rt::{AxisRecord, CycleRecord};
 use takt::telemetry::EachCycle;
+use takt::{AxisSnapshot, RunningController, Snapshot, WaitError};
 
 use crate::array::{array, array_of_rows};
 use crate::link::{Link, seconds};
@@ -31,6 +33,21 @@ const QUANTITIES: [(&str, Quantity); 9] = [
 ];
 /// The pause between two looks at what the logger has written.
 const LOOK: Duration = Duration::from_millis(2);
+/// How long a recording of a controller of another process waits for a cycle before it looks whether it has ended.
+const SILENCE: Duration = Duration::from_millis(50);
+
+/// The quantities, as a state has them. What it has not is nan.
+const SHOWN: [fn(&AxisSnapshot) -> f64; QUANTITIES.len()] = [
+    |axis| axis.position,
+    |axis| axis.velocity,
+    |axis| axis.torque.unwrap_or(f64::NAN),
+    |axis| axis.position_set,
+    |axis| axis.velocity_set,
+    |_| f64::NAN,
+    |axis| axis.torque_set,
+    |axis| axis.following_error,
+    |axis| axis.feedback_age.into(),
+];
 
 /// Hands the records of the cycles to the recordings that are made at present.
 #[derive(Clone, Default)]
@@ -51,11 +68,33 @@ impl Recorder {
     }
 
     /// A recording of these axes, of at most so many cycles, from the next cycle on.
-    pub fn begin(&self, link: Link, axes: Vec<usize>, at_most: usize) -> Recording {
+    pub fn begin(&self, py: Python<'_>, link: Link, axes: Vec<usize>, at_most: usize) -> PyResult<Recording> {
         let tape = Arc::new(Tape { axes, at_most, columns: Mutex::default() });
         lock(&self.0.tapes).push(Arc::downgrade(&tape));
         self.0.any.store(true, Ordering::Release);
-        Recording { link, tape, recorder: self.clone() }
+        if !link.is_own() {
+            let (watched, after) = (link.shared(py)?, link.controller(py)?.state().slot);
+            let (recorder, of) = (self.clone(), Arc::downgrade(&tape));
+            let watch = move || recorder.watch(&*watched, &of, after);
+            thread::Builder::new().name("takt-record".into()).spawn(watch)?;
+        }
+        Ok(Recording { link, tape, recorder: self.clone() })
+    }
+
+    /// Writes each cycle of a controller that hands over no records, until the recording ends. A cycle that this thread sleeps through is
+    /// not in it.
+    fn watch(&self, controller: &dyn RunningController, tape: &Weak<Tape>, mut after: u64) {
+        while lock(&self.0.tapes).iter().any(|own| own.ptr_eq(tape)) {
+            match controller.cycle_after(after, SILENCE) {
+                Ok(state) => {
+                    after = state.slot;
+                    let Some(tape) = tape.upgrade() else { return };
+                    tape.write_state(&state);
+                }
+                Err(WaitError::NotInTime) => {}
+                Err(WaitError::Ended) => return,
+            }
+        }
     }
 
     fn end(&self, tape: &Arc<Tape>) {
@@ -90,14 +129,23 @@ struct Columns {
 
 impl Tape {
     fn write(&self, record: &CycleRecord) {
+        let (of, timing) = (QUANTITIES.map(|(_, of)| of), &record.timing);
+        self.add(timing.slot, timing.slot_start_ns, record.axes(), of);
+    }
+
+    fn write_state(&self, state: &Snapshot) {
+        self.add(state.slot, state.at_ns, state.axes(), SHOWN);
+    }
+
+    fn add<T>(&self, slot: u64, at_ns: u64, axes: &[T], of: [fn(&T) -> f64; QUANTITIES.len()]) {
         let mut columns = lock(&self.columns);
         if columns.times.len() >= self.at_most {
             return;
         }
-        columns.times.push(seconds(record.timing.slot_start_ns));
-        columns.slots.push(record.timing.slot);
-        for (values, (_, of)) in columns.values.iter_mut().zip(QUANTITIES) {
-            values.extend(self.axes.iter().filter_map(|axis| record.axes().get(*axis)).map(of));
+        columns.times.push(seconds(at_ns));
+        columns.slots.push(slot);
+        for (values, of) in columns.values.iter_mut().zip(of) {
+            values.extend(self.axes.iter().filter_map(|axis| axes.get(*axis)).map(of));
         }
     }
 
@@ -129,12 +177,11 @@ impl Recording {
 impl Recording {
     /// Ends it, when everything up to now has been written down.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        let handle = self.link.handle(py)?;
-        let now = handle.state().slot;
+        let now = self.link.controller(py)?.state().slot;
         let late = "the logger is far behind: the recording lacks its last cycles";
-        until(py, &self.link, Some(5.0), late, |handle, at_most| {
+        until(py, &self.link, Some(5.0), late, |controller, at_most| {
             let is_written = self.tape.is_full()
-                || handle.has_ended()
+                || controller.has_ended()
                 || lock(&self.tape.columns).slots.last().is_some_and(|slot| *slot >= now);
             if !is_written {
                 thread::sleep(LOOK.min(at_most));

@@ -45,7 +45,7 @@ impl Simulation {
     #[pyo3(signature = (cycles=1))]
     fn step(slf: PyRef<'_, Self>, py: Python<'_>, cycles: u64) -> PyResult<()> {
         let arm = slf.as_super();
-        let handle = arm.as_super().link.handle(py)?;
+        let controller = arm.as_super().link.controller(py)?;
         let owner = &arm.owner;
         let mut left = cycles;
         while left > 0 {
@@ -54,7 +54,7 @@ impl Simulation {
                 return Err(raise_ended(py));
             }
             left -= slice;
-            look_for_signals(py, handle)?;
+            look_for_signals(py, controller)?;
         }
         Ok(())
     }
@@ -62,7 +62,7 @@ impl Simulation {
     /// Lets a time pass, rounded up to whole cycles.
     fn run(slf: PyRef<'_, Self>, py: Python<'_>, seconds: f64) -> PyResult<()> {
         let time = duration("seconds", seconds)?;
-        let period_ns = slf.as_super().as_super().link.handle(py)?.machine().cycle_ns.max(1);
+        let period_ns = slf.as_super().as_super().link.controller(py)?.period_ns().max(1);
         let cycles = u64::try_from(time.as_nanos().div_ceil(period_ns.into()));
         let cycles =
             cycles.map_err(|_| raise(py, "ArgumentError", &format!("{seconds} s is too long"), &[]))?;

@@ -2,8 +2,9 @@
 
 use pyo3::prelude::*;
 use takt::config::mode_word;
+use takt::rt::RequestTarget;
 use takt::telemetry::phase_words;
-use takt::{AxisSnapshot, Handle, OperationMode};
+use takt::{AxisSnapshot, OperationMode, RunningController};
 
 use crate::array::{array, array_of_bools};
 use crate::link::seconds;
@@ -23,26 +24,28 @@ pub struct State {
 }
 
 impl State {
-    /// The state of the axes with these numbers, and of the group that is named; of all of them without a name.
-    pub fn of(handle: &Handle, axes: &[usize], group: Option<&str>) -> Self {
-        let snapshot = handle.state();
-        let names = match handle.groups() {
-            [] => vec![handle.machine().name.clone()],
-            groups => groups.iter().map(|group| group.name.clone()).collect(),
+    /// The state of the axes with these numbers, which are those of the target.
+    pub fn of(controller: &dyn RunningController, axes: &[usize], target: RequestTarget) -> Self {
+        let (snapshot, machine) = (controller.state(), controller.machine());
+        let names =
+            if machine.groups.is_empty() { vec![&machine.name] } else { machine.groups.iter().collect() };
+        let groups = names.into_iter().zip(snapshot.groups()).enumerate();
+        let is_meant = |number: usize| match target {
+            RequestTarget::All => true,
+            RequestTarget::Group(group) => usize::from(group) == number,
         };
-        let groups = names.into_iter().zip(snapshot.groups());
-        let meant: Vec<_> = groups.filter(|(name, _)| group.is_none_or(|group| group == name)).collect();
+        let meant: Vec<_> = groups.filter(|(number, _)| is_meant(*number)).map(|(_, group)| group).collect();
         let is_faulty = meant.iter().any(|(_, group)| group.stop.is_some_and(|stop| !stop.is_requested()));
-        let of = |axis: &usize| Some((handle.axes().get(*axis)?.name.clone(), *snapshot.axes().get(*axis)?));
+        let of = |axis: &usize| Some((machine.axes.get(*axis)?.name.clone(), *snapshot.axes().get(*axis)?));
         let (names, axes) = axes.iter().filter_map(of).unzip();
         Self {
             names,
             axes,
-            phases: meant.into_iter().map(|(name, group)| (name, phase_words(group.phase))).collect(),
-            fault: handle.fault().filter(|_| is_faulty).map(|fault| fault.to_string()),
+            phases: meant.into_iter().map(|(name, group)| (name.clone(), phase_words(group.phase))).collect(),
+            fault: is_faulty.then(|| controller.fault_in(target)).flatten().map(|fault| fault.to_string()),
             slot: snapshot.slot,
             at_ns: snapshot.at_ns,
-            now_ns: handle.now_ns(),
+            now_ns: controller.now_ns(),
             missed_slots: snapshot.missed_slots,
         }
     }

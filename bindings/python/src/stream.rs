@@ -4,17 +4,16 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use takt::rt::PositionPoint;
+use takt::rt::{PositionPoint, RequestTarget};
 use takt::{
-    AxisPoint, CommandError, Handle, MotionError, Snapshot, StopCategory, StreamError, StreamHandle,
+    AxisPoint, CommandError, MotionError, RunningController, Snapshot, StopCategory, StreamError,
     StreamState, WaitError,
 };
 
 use crate::array::{self, Table};
 use crate::error::{raise, raise_command, raise_ended, raise_motion, raise_stopped, raise_stream};
-use crate::group::Commanded;
 use crate::link::{Link, duration, seconds};
-use crate::waiting::until;
+use crate::waiting::{stop_and_wait, until};
 
 /// Slower than this an axis is at rest: rad/s or m/s. The last of a motion fades in the rounding of its numbers.
 const AT_REST: f64 = 1e-9;
@@ -26,8 +25,7 @@ const STANDSTILL_S: f64 = 30.0;
 #[pyclass(module = "takt", frozen)]
 pub struct Stream {
     link: Link,
-    commanded: Commanded,
-    stream: StreamHandle,
+    target: RequestTarget,
     axes: Vec<usize>,
 }
 
@@ -116,8 +114,8 @@ impl Parts {
 }
 
 impl Stream {
-    pub const fn new(link: Link, commanded: Commanded, stream: StreamHandle, axes: Vec<usize>) -> Self {
-        Self { link, commanded, stream, axes }
+    pub const fn new(link: Link, target: RequestTarget, axes: Vec<usize>) -> Self {
+        Self { link, target, axes }
     }
 
     fn names(&self) -> Vec<&str> {
@@ -125,13 +123,13 @@ impl Stream {
     }
 
     /// Points are for a group that follows them.
-    fn check_followed(&self, py: Python<'_>, handle: &Handle) -> PyResult<()> {
-        if self.stream.report().state != StreamState::Idle {
+    fn check_followed(&self, py: Python<'_>, controller: &dyn RunningController) -> PyResult<()> {
+        if controller.stream_report(self.target).state != StreamState::Idle {
             return Ok(());
         }
-        match self.commanded.fault(handle) {
+        match controller.fault_in(self.target) {
             Some(stopped) => Err(raise_stopped(py, &self.link.axis_names(), &stopped)),
-            None if handle.has_ended() => Err(raise_ended(py)),
+            None if controller.has_ended() => Err(raise_ended(py)),
             None => {
                 let words = "the axes no longer follow the stream: a stop or another motion has ended it; begin a new one";
                 Err(raise(py, "StreamError", words, &[]))
@@ -140,9 +138,9 @@ impl Stream {
     }
 
     /// A stamp in nanoseconds of the controller's clock.
-    fn stamp(&self, handle: &Handle, t: Option<f64>) -> PyResult<u64> {
+    fn stamp(&self, controller: &dyn RunningController, t: Option<f64>) -> PyResult<u64> {
         match t {
-            None => Ok(handle.now_ns()),
+            None => Ok(controller.now_ns()),
             Some(t) => Ok(duration("t", t)?.as_nanos() as u64),
         }
     }
@@ -153,10 +151,9 @@ impl Stream {
 
     /// Stops the axes and waits until they hold, or are off.
     fn stop(&self, py: Python<'_>) -> PyResult<()> {
-        match self.commanded.stop(self.link.handle(py)?, StopCategory::Two) {
-            Ok(()) => self.commanded.wait_until_still(py, &self.link, &self.axes, Some(STANDSTILL_S)),
+        match stop_and_wait(py, &self.link, self.target, StopCategory::Two, Some(STANDSTILL_S))? {
             // The end of the run has stopped them.
-            Err(CommandError::Ended) => Ok(()),
+            Ok(()) | Err(CommandError::Ended) => Ok(()),
             Err(error) => Err(raise_command(py, &self.names(), &error)),
         }
     }
@@ -178,16 +175,17 @@ impl Stream {
         kp: Option<&Bound<'_, PyAny>>,
         kd: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let handle = self.link.handle(py)?;
+        let controller = self.link.controller(py)?;
         let row = |what: &str, given: &Bound<'_, PyAny>| {
             let values = array::vector(what, given)?;
             Ok(Table { rows: 1, columns: values.len(), values })
         };
         let parts = Given { q, qd, qdd, torque, kp, kd }.read(self.axes.len(), row)?;
         let points = parts.points(py, self.axes.len())?;
-        self.check_followed(py, handle)?;
-        let at_ns = self.stamp(handle, t)?;
-        let handed = py.detach(|| points.iter().try_for_each(|point| self.stream.push(at_ns, point)));
+        self.check_followed(py, controller)?;
+        let at_ns = self.stamp(controller, t)?;
+        let handed = py
+            .detach(|| points.iter().try_for_each(|point| controller.push_point(self.target, at_ns, point)));
         self.handed(py, handed)
     }
 
@@ -207,35 +205,32 @@ impl Stream {
         kp: Option<&Bound<'_, PyAny>>,
         kd: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        let handle = self.link.handle(py)?;
+        let controller = self.link.controller(py)?;
         let interval = duration("dt", dt)?;
         let parts = Given { q, qd, qdd, torque, kp, kd }.read(self.axes.len(), array::table)?;
         let points = parts.points(py, self.axes.len())?;
-        self.check_followed(py, handle)?;
-        let from_ns = self.stamp(handle, t0)?;
-        let handed = py.detach(|| self.stream.push_chunk(from_ns, interval, &points));
+        self.check_followed(py, controller)?;
+        let from_ns = self.stamp(controller, t0)?;
+        let handed = py.detach(|| controller.push_chunk(self.target, from_ns, interval, &points));
         self.handed(py, handed)
     }
 
     /// What it is doing: "awaited", "following", "dry", "idle".
     #[getter]
     fn state(&self, py: Python<'_>) -> PyResult<&'static str> {
-        self.link.handle(py)?;
-        Ok(self.stream.report().state.name())
+        Ok(self.link.controller(py)?.stream_report(self.target).state.name())
     }
 
     /// How far the set-points are behind the stamps now, in seconds.
     #[getter]
     fn lag(&self, py: Python<'_>) -> PyResult<f64> {
-        self.link.handle(py)?;
-        Ok(self.stream.lag().as_secs_f64())
+        Ok(seconds(self.link.controller(py)?.stream_report(self.target).counts.lag_ns))
     }
 
     /// The points that have come, that came too late for their time, and that were lost.
     #[getter]
     fn counts(&self, py: Python<'_>) -> PyResult<(u64, u64, u64)> {
-        self.link.handle(py)?;
-        let counts = self.stream.report().counts;
+        let counts = self.link.controller(py)?.stream_report(self.target).counts;
         Ok((counts.points, counts.late_points, counts.lost_points))
     }
 
@@ -247,25 +242,31 @@ impl Stream {
             let mut axes = self.axes.iter().filter_map(|axis| state.axes().get(*axis));
             axes.all(|axis| axis.velocity_set.abs() < AT_REST)
         };
-        let is_over = until(py, &self.link, timeout, late, |handle, at_most| {
-            let over = handle.wait_until(at_most, |state| match self.stream.report().state {
-                StreamState::Following => None,
-                StreamState::Dry => is_at_rest(state).then_some(()),
-                StreamState::Idle | StreamState::Awaited | StreamState::Callback => Some(()),
+        let is_over = until(py, &self.link, timeout, late, |controller, at_most| {
+            let over = controller.wait_until_seen(at_most, &mut |state| match controller
+                .stream_report(self.target)
+                .state
+            {
+                StreamState::Following => false,
+                StreamState::Dry => is_at_rest(state),
+                StreamState::Idle | StreamState::Awaited | StreamState::Callback => true,
             });
             match over {
                 Err(WaitError::NotInTime) => None,
                 over => Some(over),
             }
         })?;
-        let handle = self.link.handle(py)?;
-        if let Some(stopped) = self.commanded.fault(handle) {
+        let controller = self.link.controller(py)?;
+        if let Some(stopped) = controller.fault_in(self.target) {
             return Err(raise_stopped(py, &self.link.axis_names(), &stopped));
         }
         if is_over.is_err() {
             return Err(raise_motion(py, &self.names(), &MotionError::Ended));
         }
-        if self.stream.report().state == StreamState::Idle { Ok(()) } else { self.stop(py) }
+        match controller.stream_report(self.target).state {
+            StreamState::Idle => Ok(()),
+            _ => self.stop(py),
+        }
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {
@@ -285,12 +286,13 @@ impl Stream {
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let handle = self.link.handle(py)?;
-        let age = Duration::from_nanos(self.stream.report().counts.lag_ns);
+        let controller = self.link.controller(py)?;
+        let report = controller.stream_report(self.target);
+        let age = Duration::from_nanos(report.counts.lag_ns);
         Ok(format!(
             "<stream {}, {age:?} behind, at {:.3} s>",
-            self.stream.report().state.name(),
-            seconds(handle.now_ns())
+            report.state.name(),
+            seconds(controller.now_ns())
         ))
     }
 }

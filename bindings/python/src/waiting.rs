@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use takt::{Handle, StopCategory};
+use takt::rt::RequestTarget;
+use takt::{CommandError, RunningController, StopCategory, WaitError};
 
 use crate::error::raise_timeout;
 use crate::link::{Link, duration};
@@ -20,19 +21,19 @@ pub fn until<T: Send>(
     link: &Link,
     timeout: Option<f64>,
     words: &str,
-    mut attempt: impl FnMut(&Handle, Duration) -> Option<T> + Send,
+    mut attempt: impl FnMut(&dyn RunningController, Duration) -> Option<T> + Send,
 ) -> PyResult<T> {
-    let handle = link.handle(py)?;
+    let controller = link.controller(py)?;
     let timeout = timeout.map(|seconds| duration("timeout", seconds)).transpose()?;
-    let begun_ns = handle.now_ns();
+    let begun_ns = controller.now_ns();
     loop {
-        let passed = Duration::from_nanos(handle.now_ns().saturating_sub(begun_ns));
+        let passed = Duration::from_nanos(controller.now_ns().saturating_sub(begun_ns));
         let left = timeout.map(|timeout| timeout.saturating_sub(passed));
         let slice = left.map_or(SLICE, |left| left.min(SLICE));
-        if let Some(found) = py.detach(|| attempt(handle, slice)) {
+        if let Some(found) = py.detach(|| attempt(controller, slice)) {
             return Ok(found);
         }
-        look_for_signals(py, handle)?;
+        look_for_signals(py, controller)?;
         if left.is_some_and(|left| left <= slice) {
             return Err(raise_timeout(py, words));
         }
@@ -40,9 +41,29 @@ pub fn until<T: Send>(
 }
 
 /// Runs the handlers of signals that have come. If one raises, the axes stop.
-pub fn look_for_signals(py: Python<'_>, handle: &Handle) -> PyResult<()> {
+pub fn look_for_signals(py: Python<'_>, controller: &dyn RunningController) -> PyResult<()> {
     py.check_signals().inspect_err(|_| {
         // It is refused only after the end.
-        let _ = handle.stop(StopCategory::Two);
+        let _ = controller.request_stop(RequestTarget::All, StopCategory::Two);
     })
+}
+
+/// Asks for a stop, and waits until the axes hold or are off. Why there is no stop is handed on.
+pub fn stop_and_wait(
+    py: Python<'_>,
+    link: &Link,
+    target: RequestTarget,
+    category: StopCategory,
+    timeout: Option<f64>,
+) -> PyResult<Result<(), CommandError>> {
+    let controller = link.controller(py)?;
+    let before = controller.newest_stop(target);
+    if let Err(error) = controller.request_stop(target, category) {
+        return Ok(Err(error));
+    }
+    until(py, link, timeout, "the axes have not come to rest in time", |controller, at_most| {
+        let still = controller.wait_until_still(target, before, at_most);
+        (still != Err(WaitError::NotInTime)).then_some(())
+    })?;
+    Ok(Ok(()))
 }

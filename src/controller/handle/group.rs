@@ -7,7 +7,7 @@ use takt_rt::{CallbackCycle, GroupSnapshot, OperationMode, Phase, Request, Reque
 use super::Handle;
 use super::in_loop::{CallbackHandle, CallbackOptions};
 use crate::channels::{CallbackCommand, CallbackState};
-use crate::command::{CommandError, MotionId, MoveOptions, Stopped, WaitError};
+use crate::command::{CommandError, MotionId, MoveOptions, RunningController, Stopped, WaitError};
 
 /// Commands and observes one group of a running controller, from any thread. Clones are cheap and equal. The drives in profile velocity
 /// and profile torque are commanded by [`Handle::velocity`] and [`Handle::torque`]: the axis names its group.
@@ -70,7 +70,7 @@ impl GroupHandle {
 
     /// As [`Handle::fault`], for the group.
     pub fn fault(&self) -> Option<Stopped> {
-        self.handle.fault_of(&self.handle.state(), |group| group == usize::from(self.number))
+        self.handle.fault_in(RequestTarget::Group(self.number))
     }
 
     /// As [`Handle::move_to`], with a target for each axis of the group, in the order of [`GroupHandle::axes`].

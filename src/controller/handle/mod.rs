@@ -43,13 +43,14 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use takt_rt::linux::ThreadReport;
-use takt_rt::{Phase, Snapshot, StopCategory};
+use takt_rt::{Snapshot, StopCategory};
 
 use super::outcome::{Interrupt, Outcome, Progress};
-use super::session::{self, RemoteHandles, Session, SessionError, SessionOptions};
+use super::session::{self, Remote, RemoteHandles, Session, SessionError, SessionOptions};
+use super::supervisor::AfterBringUp;
 use crate::channels::{ClientRequests, EventReader, MotionEnd, Observer, Streamer};
 use crate::config::{Axis, Config, Group};
-use crate::telemetry::{Machine, Notice};
+use crate::telemetry::{LoopTiming, Machine, Notice, ShownTiming};
 use in_loop::Callbacks;
 use life::Life;
 use messages::Messages;
@@ -63,7 +64,7 @@ pub use start_failure::StartFailure;
 pub use stream::StreamHandle;
 pub use virtual_controller::VirtualController;
 
-/// The drives must be enabled within this time. It covers the power-up time of all drives.
+/// The drives must be brought up and enabled within this time. It covers the power-up time of all drives.
 const ENABLE_TIMEOUT: Duration = Duration::from_secs(60);
 
 /// The owner of a running controller. Dropping it brings the axes to rest, and disables and shuts down the drives.
@@ -72,6 +73,7 @@ const ENABLE_TIMEOUT: Duration = Duration::from_secs(60);
 pub struct Controller {
     handle: Handle,
     thread: Option<JoinHandle<Result<Session, SessionError>>>,
+    after_bring_up: AfterBringUp,
 }
 
 impl Controller {
@@ -81,6 +83,15 @@ impl Controller {
     /// See [`StartFailure`]; nothing has moved then.
     pub fn start(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
         Self::start_watched(config, options, |_| {}, |_, _| None)
+    }
+
+    /// Brings the drives up and leaves them disabled: nothing is under power, and nothing has moved. Returns when every drive reports its
+    /// position and none shows a fault. [`Handle::enable`] enables them.
+    ///
+    /// # Errors
+    /// See [`StartFailure`].
+    pub fn start_disabled(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
+        Self::begin_watched(config, options, AfterBringUp::StayDisabled, |_| {}, |_, _| None)?.brought_up()
     }
 
     /// As [`Controller::start`], with what [`session::run`] takes: `tell` is called with each notice, and `watch` about once in a
@@ -94,30 +105,35 @@ impl Controller {
         tell: impl FnMut(&Notice) + Send + 'static,
         watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt> + Send + 'static,
     ) -> Result<Self, StartFailure> {
-        let controller = Self::begin_watched(config, options, tell, watch)?;
-        match controller.wait_for(Phase::Holding, ENABLE_TIMEOUT) {
-            Ok(()) => Ok(controller),
-            Err(_) => Err(controller.into_failure()),
+        Self::begin_watched(config, options, AfterBringUp::Enable, tell, watch)?.brought_up()
+    }
+
+    fn brought_up(self) -> Result<Self, StartFailure> {
+        match self.wait_until_brought_up(self.after_bring_up) {
+            Ok(()) => Ok(self),
+            Err(_) => Err(self.into_failure()),
         }
     }
 
     /// As [`Controller::start`], but returns when the loop runs, while the drives are being brought up: for a program that wants to watch
-    /// or to interrupt that. When [`Handle::wait_for`] of [`Phase::Holding`] has succeeded, the axes hold their position; when it says
+    /// or to interrupt that. When [`Handle::wait_for`] of [`Phase::Holding`](crate::Phase::Holding) has succeeded, the axes hold their position; when it says
     /// that the run has ended, [`Controller::into_failure`] says why.
     ///
     /// # Errors
     /// See [`StartFailure`]; nothing was sent to the drives then.
     pub fn begin(config: Config, options: SessionOptions) -> Result<Self, StartFailure> {
-        Self::begin_watched(config, options, |_| {}, |_, _| None)
+        Self::begin_watched(config, options, AfterBringUp::Enable, |_| {}, |_, _| None)
     }
 
     fn begin_watched(
         config: Config,
         options: SessionOptions,
+        after_bring_up: AfterBringUp,
         mut tell: impl FnMut(&Notice) + Send + 'static,
         mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt> + Send + 'static,
     ) -> Result<Self, StartFailure> {
-        let (handles_in, handles_out) = mpsc::sync_channel(1);
+        let (handles, handles_out) = mpsc::sync_channel(1);
+        let remote = Remote { handles, after_bring_up };
         let (life, messages) = (Arc::<Life>::default(), Arc::<Messages>::default());
         let (axes, groups) = (config.axes.clone(), config.groups.clone());
         let machine = Machine::of(&config);
@@ -136,20 +152,30 @@ impl Controller {
                 let watch = |state: &Snapshot, progress| {
                     life.is_ending().then_some(Interrupt::Controlled).max(watch(state, progress))
                 };
-                session::run_with(&config, options, Box::new(notify), watch, Some(handles_in))
+                session::run_with(&config, options, Box::new(notify), watch, Some(remote))
             };
             thread::Builder::new().name("takt-session".into()).spawn(run)
         };
         let thread = thread.map_err(SessionError::Logger)?;
         let Ok(remote) = handles_out.recv() else { return Err(failed(thread)) };
-        let RemoteHandles { observer, streamer, clients, trajectories, callbacks, plan, events, realtime } =
-            remote;
+        let RemoteHandles {
+            observer,
+            streamer,
+            clients,
+            trajectories,
+            callbacks,
+            plan,
+            events,
+            realtime,
+            timing,
+        } = remote;
         let trajectories = Trajectories::new(trajectories);
         let handle = Handle(Arc::new(Shared {
             axes,
             groups,
             machine,
             realtime,
+            timing,
             clients,
             observer,
             events,
@@ -160,7 +186,7 @@ impl Controller {
             life,
             pace: Pace::Real,
         }));
-        Ok(Self { handle, thread: Some(thread) })
+        Ok(Self { handle, thread: Some(thread), after_bring_up })
     }
 
     /// Ends a run that [`Controller::begin`] has begun and whose drives have not been enabled, and returns why not.
@@ -241,6 +267,7 @@ struct Shared {
     groups: Vec<Group>,
     machine: Machine,
     realtime: ThreadReport,
+    timing: ShownTiming,
     clients: ClientRequests,
     observer: Observer,
     events: EventReader,
@@ -278,6 +305,11 @@ impl Handle {
     /// [`is_stale`](takt_rt::AxisSnapshot::is_stale), [`feedback_age_ns`](takt_rt::AxisSnapshot::feedback_age_ns).
     pub fn state(&self) -> Snapshot {
         self.0.observer.snapshot()
+    }
+
+    /// How punctual all cycles since the start were; a few milliseconds old. All times are 0 in virtual time.
+    pub fn timing(&self) -> LoopTiming {
+        self.0.timing.newest()
     }
 
     /// The events from now on. Each observer has its own place among them.

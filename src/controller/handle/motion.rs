@@ -5,7 +5,7 @@ use std::time::Duration;
 use takt_rt::{RequestId, RequestTarget, Snapshot};
 
 use super::Handle;
-use crate::command::{MotionError, MotionId, Stopped, WaitError, motion};
+use crate::command::{MotionError, MotionId, RunningController, Stopped, WaitError, motion};
 
 impl Handle {
     /// Waits until a motion has reached its targets: until the axes are at rest there, or a velocity or torque is reached. The
@@ -39,14 +39,7 @@ impl Handle {
 
     /// The fault that has stopped a group and has not been reset: the first, of several groups.
     pub fn fault(&self) -> Option<Stopped> {
-        self.fault_of(&self.state(), |_| true)
-    }
-
-    /// The fault that has stopped one of these groups.
-    pub(super) fn fault_of(&self, state: &Snapshot, is_meant: impl Fn(usize) -> bool) -> Option<Stopped> {
-        let groups = state.groups().iter().enumerate().filter(|(group, _)| is_meant(*group));
-        let faults = groups.filter_map(|(_, group)| group.stop).filter(|stop| !stop.is_requested());
-        faults.min_by_key(|stop| stop.slot).map(|stop| Stopped::new(stop, self.machine()))
+        self.fault_in(RequestTarget::All)
     }
 
     /// Whether a stop has discarded a request that has no answer in this state.

@@ -3,15 +3,15 @@
 use std::time::Duration;
 
 use takt_rt::{
-    AxisLimits, AxisPoint, Event, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot,
-    StopCategory,
+    AxisPoint, Event, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot, StopCategory,
 };
 
 use super::{Events, GroupHandle, Handle};
 use crate::command::{
-    CommandError, EventSource, MotionError, MotionId, MoveOptions, RunningController, StreamError, WaitError,
+    AxisProperties, CommandError, EventSource, LeaseHolder, MotionError, MotionId, MoveOptions,
+    RunningController, StreamError, TrajectoryProgress, WaitError,
 };
-use crate::telemetry::Machine;
+use crate::telemetry::{LoopTiming, Machine};
 use crate::trajectory::TrajectoryPoint;
 
 impl Handle {
@@ -38,12 +38,20 @@ impl RunningController for Handle {
         }
     }
 
-    fn limits(&self, axis: usize) -> Option<AxisLimits> {
-        self.axes().get(axis).map(|axis| axis.limits)
+    fn axis_properties(&self, axis: usize) -> Option<AxisProperties> {
+        self.axes().get(axis).map(AxisProperties::of)
     }
 
     fn state(&self) -> Snapshot {
         Self::state(self)
+    }
+
+    fn now_ns(&self) -> Nanoseconds {
+        Self::now_ns(self)
+    }
+
+    fn timing(&self) -> LoopTiming {
+        Self::timing(self)
     }
 
     fn has_ended(&self) -> bool {
@@ -58,6 +66,18 @@ impl RunningController for Handle {
         Self::cycle_after(self, slot, at_most)
     }
 
+    fn advance(&self, cycles: u64) -> Result<Snapshot, WaitError> {
+        Self::advance(self, cycles)
+    }
+
+    fn wait_until_seen(
+        &self,
+        at_most: Duration,
+        look: &mut dyn FnMut(&Snapshot) -> bool,
+    ) -> Result<(), WaitError> {
+        self.wait_until(at_most, |state| look(state).then_some(()))
+    }
+
     fn event_source(&self) -> Box<dyn EventSource> {
         Box::new(self.events())
     }
@@ -69,6 +89,16 @@ impl RunningController for Handle {
         options: MoveOptions,
     ) -> Result<MotionId, CommandError> {
         self.move_axes(target, &self.axes_of(target), positions, options)
+    }
+
+    fn begin_move_by(
+        &self,
+        target: RequestTarget,
+        distances: &[f64],
+        options: MoveOptions,
+    ) -> Result<MotionId, CommandError> {
+        let axes = self.axes_of(target);
+        self.move_axes(target, &axes, &self.beyond_set_points(&axes, distances), options)
     }
 
     fn begin_trajectory(
@@ -93,6 +123,10 @@ impl RunningController for Handle {
 
     fn resume(&self, motion: MotionId) -> Result<(), CommandError> {
         Self::resume(self, motion)
+    }
+
+    fn trajectory_progress(&self, motion: MotionId) -> Result<Option<TrajectoryProgress>, CommandError> {
+        Ok(Self::trajectory_progress(self, motion))
     }
 
     fn velocity(&self, axis: usize, velocity: f64, valid_for: Duration) -> Result<MotionId, CommandError> {
@@ -128,10 +162,7 @@ impl RunningController for Handle {
         at_ns: Nanoseconds,
         axes: &[AxisPoint],
     ) -> Result<(), StreamError> {
-        match target {
-            RequestTarget::All => self.stream().push(at_ns, axes),
-            RequestTarget::Group(number) => self.group_of_number(number).stream().push(at_ns, axes),
-        }
+        self.stream_of(target).push(at_ns, axes)
     }
 
     fn push_chunk(
@@ -141,12 +172,7 @@ impl RunningController for Handle {
         interval: Duration,
         points: &[Vec<AxisPoint>],
     ) -> Result<(), StreamError> {
-        match target {
-            RequestTarget::All => self.stream().push_chunk(from_ns, interval, points),
-            RequestTarget::Group(number) => {
-                self.group_of_number(number).stream().push_chunk(from_ns, interval, points)
-            }
-        }
+        self.stream_of(target).push_chunk(from_ns, interval, points)
     }
 
     fn request_stop(&self, target: RequestTarget, category: StopCategory) -> Result<(), CommandError> {
@@ -171,6 +197,22 @@ impl RunningController for Handle {
 
     fn wait(&self, motion: MotionId, at_most: Duration) -> Result<(), MotionError> {
         Self::wait(self, motion, at_most)
+    }
+
+    fn lease(&self) -> Option<LeaseHolder> {
+        None
+    }
+
+    fn take_lease(&self) -> Result<(), CommandError> {
+        Ok(())
+    }
+
+    fn take_over(&self) -> Result<(), CommandError> {
+        Ok(())
+    }
+
+    fn release(&self) -> Result<(), CommandError> {
+        Ok(())
     }
 }
 

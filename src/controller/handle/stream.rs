@@ -4,13 +4,12 @@ use std::cell::OnceCell;
 use std::time::Duration;
 
 use takt_rt::{
-    AxisPoint, GroupSnapshot, MAX_AXES, Nanoseconds, PointRole, Request, Snapshot, StreamPoint, StreamReport,
-    StreamState,
+    AxisPoint, MAX_AXES, Nanoseconds, PointRole, Request, RequestTarget, Snapshot, StreamPoint, StreamReport,
 };
 
 use super::{GroupHandle, Handle};
 use crate::channels::chunk;
-use crate::command::{CommandError, StreamError, check_point};
+use crate::command::{CommandError, RunningController, StreamError, check_point};
 
 /// Hands points to the stream of a group, or to those of all groups, from any thread. Clones are cheap and equal.
 ///
@@ -95,15 +94,10 @@ impl StreamHandle {
     /// What the stream is doing, how far it is behind the stamps, and how many points have come, came late or were lost. Of the
     /// streams of several groups, it is the first that a group follows.
     pub fn report(&self) -> StreamReport {
-        let state = self.handle.state();
-        let first = match self.to {
-            StreamTarget::Group { number, .. } => state.groups().get(usize::from(number)),
-            StreamTarget::All => {
-                let followed = |group: &&GroupSnapshot| group.stream.state != StreamState::Idle;
-                state.groups().iter().find(followed).or(state.groups().first())
-            }
-        };
-        first.map_or_else(StreamReport::default, |group| group.stream)
+        self.handle.stream_report(match self.to {
+            StreamTarget::All => RequestTarget::All,
+            StreamTarget::Group { number, .. } => RequestTarget::Group(number),
+        })
     }
 
     /// How far the set-points are behind the stamps now.
@@ -190,7 +184,20 @@ impl Handle {
 
     /// A handle to stream points for all axes by, for any thread.
     pub fn stream(&self) -> StreamHandle {
-        StreamHandle { handle: self.clone(), to: StreamTarget::All }
+        self.stream_of(RequestTarget::All)
+    }
+
+    /// The stream of a target. It allocates nothing.
+    pub(super) fn stream_of(&self, target: RequestTarget) -> StreamHandle {
+        let to = match target {
+            RequestTarget::All => StreamTarget::All,
+            RequestTarget::Group(number) => {
+                let group = self.groups().get(usize::from(number));
+                let axes = group.map_or(self.axes().len(), |group| group.axes.len());
+                StreamTarget::Group { number, axes }
+            }
+        };
+        StreamHandle { handle: self.clone(), to }
     }
 }
 
@@ -205,7 +212,6 @@ impl GroupHandle {
 
     /// A handle to stream points for the axes of the group by, in the order of [`GroupHandle::axes`], for any thread.
     pub fn stream(&self) -> StreamHandle {
-        let to = StreamTarget::Group { number: self.number, axes: self.axes.len() };
-        StreamHandle { handle: self.handle.clone(), to }
+        self.handle.stream_of(RequestTarget::Group(self.number))
     }
 }

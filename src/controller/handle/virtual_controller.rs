@@ -4,23 +4,24 @@ use std::ops::Deref;
 use std::sync::Arc;
 use std::time::Duration;
 
+use takt_rt::StopCategory;
 use takt_rt::linux::ThreadReport;
-use takt_rt::{Phase, StopCategory};
 
 use super::in_loop::Callbacks;
 use super::life::Life;
 use super::pace::{Pace, VirtualPace};
 use super::start_failure::StartFailure;
 use super::trajectory::Trajectories;
-use super::{ENABLE_TIMEOUT, Handle, Shared};
+use super::{Handle, Shared};
 use crate::channels::MotionEnd;
 use crate::config::Config;
 use crate::controller::assemble;
 use crate::controller::outcome::Outcome;
 use crate::controller::session::SessionError;
+use crate::controller::supervisor::AfterBringUp;
 use crate::controller::virtual_time::VirtualRun;
 use crate::sim::SimulatedBus;
-use crate::telemetry::{EachCycle, Machine};
+use crate::telemetry::{EachCycle, Machine, shown_timing};
 
 /// A controller of simulated drives in virtual time, with the commands of a [`Controller`](super::Controller).
 ///
@@ -52,15 +53,35 @@ impl VirtualController {
     /// # Errors
     /// See [`StartFailure`].
     pub fn start(config: &Config, each_cycle: Option<EachCycle>) -> Result<Self, StartFailure> {
+        Self::begin(config, each_cycle, AfterBringUp::Enable)
+    }
+
+    /// As [`VirtualController::start`], but leaves the drives disabled, as [`Controller::start_disabled`](super::Controller::start_disabled)
+    /// does.
+    ///
+    /// # Errors
+    /// See [`StartFailure`].
+    pub fn start_disabled(config: &Config, each_cycle: Option<EachCycle>) -> Result<Self, StartFailure> {
+        Self::begin(config, each_cycle, AfterBringUp::StayDisabled)
+    }
+
+    fn begin(
+        config: &Config,
+        each_cycle: Option<EachCycle>,
+        after_bring_up: AfterBringUp,
+    ) -> Result<Self, StartFailure> {
         config.validate().map_err(|error| SessionError::Assemble(error.into()))?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
-        let (mut run, log) = VirtualRun::serving(config, ports).map_err(SessionError::Assemble)?;
+        let begun = VirtualRun::serving(config, ports, after_bring_up);
+        let (mut run, log) = begun.map_err(SessionError::Assemble)?;
         let host = run.host();
         let shared = Shared {
             axes: config.axes.clone(),
             groups: config.groups.clone(),
             machine: Machine::of(config),
             realtime: ThreadReport::of_ordinary_thread(),
+            // Nothing is ever counted: no time passes within a virtual cycle.
+            timing: shown_timing().1,
             clients: host.clients(),
             observer: host.observer(),
             events: host.events(),
@@ -72,7 +93,7 @@ impl VirtualController {
             pace: Pace::Virtual(Box::new(VirtualPace::new(run, log, each_cycle))),
         };
         let controller = Self { handle: Handle(Arc::new(shared)) };
-        match controller.wait_for(Phase::Holding, ENABLE_TIMEOUT) {
+        match controller.wait_until_brought_up(after_bring_up) {
             Ok(()) => Ok(controller),
             Err(_) => {
                 let words = controller.end().words(controller.machine());

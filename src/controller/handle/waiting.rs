@@ -7,10 +7,11 @@
 use std::time::Duration;
 
 use takt_rt::linux::MonotonicClock;
-use takt_rt::{Clock, Nanoseconds, Phase, Snapshot};
+use takt_rt::{AxisSnapshot, Clock, Nanoseconds, Phase, Snapshot};
 
-use super::Handle;
+use super::{ENABLE_TIMEOUT, Handle};
 use crate::command::WaitError;
+use crate::controller::supervisor::AfterBringUp;
 
 /// How much later than the last one the next state is looked for, beyond the period. It covers the usual jitter of a cycle.
 const MARGIN_NS: Nanoseconds = 20_000;
@@ -91,6 +92,22 @@ impl Handle {
     pub fn wait_for(&self, phase: Phase, at_most: Duration) -> Result<(), WaitError> {
         let is_there = |state: &Snapshot| state.groups().iter().all(|group| group.phase == phase);
         self.wait_until(at_most, |state| is_there(state).then_some(()))
+    }
+
+    /// Waits until the drives are as they are to be before the first command.
+    pub(super) fn wait_until_brought_up(&self, after_bring_up: AfterBringUp) -> Result<(), WaitError> {
+        match after_bring_up {
+            AfterBringUp::Enable => self.wait_for(Phase::Holding, ENABLE_TIMEOUT),
+            AfterBringUp::StayDisabled => self.wait_until(ENABLE_TIMEOUT, |state| {
+                // A drive of bit fields may have had power since it was switched on, until its first command stops it.
+                let is_ready = |axis: &AxisSnapshot| {
+                    let state = axis.drive_state;
+                    axis.is_heard && !state.is_faulted() && !state.has_torque()
+                };
+                let are_disabled = state.groups().iter().all(|group| group.phase == Phase::Disabled);
+                (are_disabled && state.axes().iter().all(is_ready)).then_some(())
+            }),
+        }
     }
 
     /// Waits until `find` finds something in a state. It looks at one state of each cycle, or of each millisecond if the period is

@@ -15,6 +15,7 @@ use takt_rt::{OffCycleReport, Snapshot};
 use crate::channels::HostSide;
 use crate::config::{Config, Interface};
 use crate::family::{self, OffCycleLine, OffCycleTarget};
+use crate::faults::{FaultInjector, LineFaults};
 use crate::link::serial_line::SerialSettings;
 use crate::link::{OpenError, SerialLineError};
 pub use port::LinePort;
@@ -45,34 +46,37 @@ enum LineEnd {
 }
 
 impl Lines {
-    /// Every line with simulated drives, whatever it is connected to.
-    pub fn simulated(config: &Config) -> Self {
+    /// Every line with simulated drives, whatever it is connected to, and with injected faults.
+    pub fn simulated(config: &Config, injector: Option<&FaultInjector>) -> Self {
         let lines = (0..config.buses.len()).filter_map(|bus| {
-            let end =
-                |line, _: &Arc<LineStatus>| Some(LineEnd::Simulated(SimulatedEnd::new(line, config, bus)?));
+            let faults = faults_of(injector, bus);
+            let end = |line, _: &Arc<LineStatus>| {
+                Some(LineEnd::Simulated(SimulatedEnd::new(line, config, bus, faults)?))
+            };
             Line::new(config, bus, end)
         });
         Self { lines: lines.collect() }
     }
 
-    /// Opens every line that is one of this machine, and starts its thread. The others are simulated.
+    /// Opens every line that is one of this machine, and starts its thread. The others are simulated. Faults are injected into both.
     ///
     /// # Errors
     /// A line cannot be opened, or has no thread.
-    pub fn open(config: &Config) -> Result<Self, OpenError> {
+    pub fn open(config: &Config, injector: Option<&FaultInjector>) -> Result<Self, OpenError> {
         let mut lines = vec![];
         for (bus, settings) in config.buses.iter().enumerate() {
+            let faults = faults_of(injector, bus);
             let Interface::Serial(device) = &settings.interface else {
                 let end = |line, _: &Arc<LineStatus>| {
-                    Some(LineEnd::Simulated(SimulatedEnd::new(line, config, bus)?))
+                    Some(LineEnd::Simulated(SimulatedEnd::new(line, config, bus, faults)?))
                 };
                 lines.extend(Line::new(config, bus, end));
                 continue;
             };
             let mut refused = None;
-            let mut open = |line, status: &Arc<LineStatus>| {
+            let open = |line, status: &Arc<LineStatus>| {
                 let serial = SerialSettings::new(settings.bit_rate);
-                match ThreadEnd::start(&device.device, serial, line, Arc::clone(status)) {
+                match ThreadEnd::start(&device.device, serial, line, Arc::clone(status), faults) {
                     Ok(end) => Some(LineEnd::Thread(end)),
                     Err(error) => {
                         refused = Some(error);
@@ -80,7 +84,7 @@ impl Lines {
                     }
                 }
             };
-            let line = Line::new(config, bus, &mut open);
+            let line = Line::new(config, bus, open);
             if let Some(error) = refused {
                 return Err(OpenError::Line { bus: settings.name.clone(), error });
             }
@@ -149,6 +153,11 @@ impl Line {
         let end = end(line, &status)?;
         Some(Self { bus, targets: vec![OffCycleTarget::default(); axes.len()], axes, status, end })
     }
+}
+
+/// The faults that are injected into a line.
+fn faults_of(injector: Option<&FaultInjector>, bus: usize) -> LineFaults {
+    injector.map(|injector| injector.of_line(bus)).unwrap_or_default()
 }
 
 /// What the newest cycle wants of an axis.

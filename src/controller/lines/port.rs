@@ -13,6 +13,8 @@ use crate::faults::{Delivery, DriveEffect, InjectError, Injectable};
 #[derive(Debug, Default)]
 pub(super) struct LineStatus {
     is_down: AtomicBool,
+    /// Whether an injected fault has taken the line away.
+    is_taken_away: AtomicBool,
     requests: AtomicU64,
     replies: AtomicU64,
     failures: AtomicU64,
@@ -34,8 +36,13 @@ impl LineStatus {
         self.is_down.store(is_down, Ordering::Relaxed);
     }
 
+    /// Shows whether an injected fault has taken the line away.
+    pub fn set_taken_away(&self, is_taken_away: bool) {
+        self.is_taken_away.store(is_taken_away, Ordering::Relaxed);
+    }
+
     fn health(&self) -> BusHealth {
-        let is_down = self.is_down.load(Ordering::Relaxed);
+        let is_down = self.is_down.load(Ordering::Relaxed) || self.is_taken_away.load(Ordering::Relaxed);
         BusHealth {
             state: if is_down { BusState::Down } else { BusState::ErrorActive },
             tx_frames: self.requests.load(Ordering::Relaxed),

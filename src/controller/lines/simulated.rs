@@ -7,6 +7,7 @@ use takt_rt::{Nanoseconds, OffCycleReport};
 use super::port::LineStatus;
 use crate::config::Config;
 use crate::family::{self, OffCycleLine, OffCycleTarget};
+use crate::faults::LineFaults;
 use crate::sim::SimulatedLineDevices;
 
 /// The master looks at its line so often, as the thread of a real line does.
@@ -29,15 +30,16 @@ impl SharedLine {
 pub(super) struct SimulatedEnd {
     line: Box<dyn OffCycleLine>,
     devices: SharedLine,
+    faults: LineFaults,
     polled_ns: Option<Nanoseconds>,
 }
 
 impl SimulatedEnd {
     /// `None` if the family of its drives simulates none.
-    pub fn new(line: Box<dyn OffCycleLine>, config: &Config, bus: usize) -> Option<Self> {
+    pub fn new(line: Box<dyn OffCycleLine>, config: &Config, bus: usize, faults: LineFaults) -> Option<Self> {
         let devices = family::of_line(config, bus)?.simulated_axes_on_line(config, bus)?;
         let devices = SharedLine(Arc::new(Mutex::new(SimulatedLineDevices::new(devices))));
-        Some(Self { line, devices, polled_ns: None })
+        Some(Self { line, devices, faults, polled_ns: None })
     }
 
     pub fn devices(&self) -> SharedLine {
@@ -66,6 +68,7 @@ impl SimulatedEnd {
         self.step(now_ns, targets, report);
         self.polled_ns = Some(now_ns);
         status.show(self.line.counts());
+        status.set_taken_away(self.faults.is_gone());
     }
 
     fn step(
@@ -75,8 +78,10 @@ impl SimulatedEnd {
         report: &mut dyn FnMut(usize, OffCycleReport),
     ) {
         let mut devices = self.devices.lock();
-        self.line.receive(&devices.receive(at_ns));
-        if let Some(bytes) = self.line.poll(at_ns, targets, report) {
+        self.faults.advance(at_ns);
+        self.line.receive(&self.faults.receive(at_ns, devices.receive(at_ns)));
+        let request = self.line.poll(at_ns, targets, report);
+        for bytes in self.faults.send(at_ns, request) {
             devices.send(at_ns, &bytes);
         }
     }

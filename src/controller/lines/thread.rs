@@ -13,6 +13,7 @@ use tracing::{info, warn};
 use super::lost;
 use super::port::LineStatus;
 use crate::family::{OffCycleLine, OffCycleTarget, OffCycleWish};
+use crate::faults::LineFaults;
 use crate::link::SerialLineError;
 use crate::link::serial_line::{SerialLine, SerialSettings};
 
@@ -51,6 +52,7 @@ impl ThreadEnd {
         settings: SerialSettings,
         line: Box<dyn OffCycleLine>,
         status: Arc<LineStatus>,
+        faults: LineFaults,
     ) -> Result<Self, SerialLineError> {
         let serial = SerialLine::open(device, &settings)?;
         let (sender, reports) = mpsc::sync_channel(REPORTS);
@@ -64,6 +66,7 @@ impl ThreadEnd {
             targets: Arc::clone(&targets),
             shared: Arc::clone(&shared),
             status,
+            faults,
         };
         let thread = thread::Builder::new().name("takt-line".to_owned()).spawn(move || master.run(serial));
         let thread = thread.map_err(|error| SerialLineError::System {
@@ -107,6 +110,7 @@ struct LineMaster {
     targets: Arc<Mutex<Vec<OffCycleTarget>>>,
     shared: Arc<Shared>,
     status: Arc<LineStatus>,
+    faults: LineFaults,
 }
 
 impl LineMaster {
@@ -151,8 +155,10 @@ impl LineMaster {
     ) -> Result<(), SerialLineError> {
         let mut bytes = [0; 512];
         let count = serial.read(&mut bytes, TICK)?;
-        self.line.receive(bytes.get(..count).unwrap_or_default());
         let now_ns = clock.now_ns();
+        self.faults.advance(now_ns);
+        let arrived = bytes.get(..count).unwrap_or_default().to_vec();
+        self.line.receive(&self.faults.receive(now_ns, arrived));
         let mut targets = self.targets.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if is_over {
             for target in &mut targets {
@@ -164,14 +170,16 @@ impl LineMaster {
         let mut report = |place, news| {
             let _ = reports.try_send((place, news));
         };
-        if let Some(frame) = self.line.poll(now_ns, &targets, &mut report) {
-            serial.write(&frame)?;
+        let request = self.line.poll(now_ns, &targets, &mut report);
+        for bytes in self.faults.send(now_ns, request) {
+            serial.write(&bytes)?;
         }
         let is_unsettled = |place: &usize| !self.line.is_settled(*place);
         let unsettled =
             (0..targets.len().min(64)).filter(is_unsettled).fold(0, |bits, place| bits | 1 << place);
         self.shared.unsettled.store(unsettled, Ordering::Relaxed);
         self.status.show(self.line.counts());
+        self.status.set_taken_away(self.faults.is_gone());
         Ok(())
     }
 }

@@ -12,7 +12,7 @@ Angles are in rad, lengths in m, times in seconds, torques in N·m (forces in N)
 import atexit as _atexit
 
 from . import _takt
-from ._takt import Arm, Axis, Event, Events, Group, Motion, Recording, Simulation, State, Stream, simulate
+from ._takt import Arm, Axis, Event, Events, Group, Motion, Recording, Server, Simulation, State, Stream, connect, simulate
 from .errors import (
     ArgumentError,
     CommandError,
@@ -20,8 +20,10 @@ from .errors import (
     ConfigWarning,
     EndedError,
     Error,
+    LeaseError,
     LimitError,
     MotionError,
+    OwnerError,
     RefusedError,
     ReplacedError,
     ShutdownError,
@@ -33,8 +35,8 @@ from .errors import (
 )
 
 __all__ = [
-    "Arm",
     "ArgumentError",
+    "Arm",
     "Axis",
     "CommandError",
     "ConfigError",
@@ -44,10 +46,13 @@ __all__ = [
     "Event",
     "Events",
     "Group",
+    "LeaseError",
     "LimitError",
     "Motion",
     "MotionError",
+    "OwnerError",
     "Recording",
+    "Server",
     "RefusedError",
     "ReplacedError",
     "ShutdownError",
@@ -59,6 +64,7 @@ __all__ = [
     "StreamError",
     "TimeoutError",
     "TrajectoryError",
+    "connect",
     "simulate",
 ]
 

@@ -20,7 +20,9 @@ __all__ = [
     "Motion",
     "_close_all",
     "Recording",
+    "Server",
     "Simulation",
+    "connect",
     "simulate",
     "State",
     "Stream",
@@ -194,7 +196,21 @@ class Arm(Group):
     def not_written(self) -> list[str]:
         """The recordings that could not be written. The motion goes on after them."""
     @property
-    def has_ended(self) -> bool: ...
+    def has_ended(self) -> bool:
+        """Whether the run has ended, or the process of the controller."""
+    @property
+    def lease(self) -> tuple[int, float] | None:
+        """Of a controller that is served: the process that commands, and the seconds until another one may follow it; None if nobody does."""
+    def serve(self, name: str, *, mode: int = 0o600, lease: float = 1.0) -> Server:
+        """Lets other processes observe and command the controller by this name, as `takt run --serve` does: see `connect`.
+
+        `mode` is read as file permissions: who may read observes, who may write commands. `lease` is how long after its last command a
+        client keeps the lease, in seconds. The program itself needs none.
+        """
+    def take_over(self) -> None:
+        """Commands a controller of another process in place of whoever commands it; that one gets a `LeaseError` from then on."""
+    def release(self) -> None:
+        """Lets another process command. One's own controller needs neither."""
     def __enter__(self) -> Self: ...
     def __exit__(self, *exception: object) -> None: ...
 
@@ -213,6 +229,26 @@ def simulate(config: _Config) -> Simulation:
 
     Its time passes only in `step`, `run`, and each call that waits, by as many cycles as the wait takes. The same calls give the same
     motion bit for bit.
+    """
+
+@final
+class Server:
+    """Lets other processes observe and command a controller, until it is closed. Use it as a context manager."""
+
+    def close(self) -> None:
+        """The clients' calls raise `EndedError` from then on. The controller goes on."""
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *_exception: object) -> None: ...
+
+def connect(name: str, *, take_over: bool = False) -> Arm:
+    """Connects to a controller that another process of this computer serves: `takt run CONFIG --serve NAME`.
+
+    The arm has the same calls. Any number of processes observe, and one commands: the first command takes the lease, each command renews it,
+    and it ends 1 s after the last one; others get a `LeaseError` until then, or `take_over`. `stop` needs no lease. `close` ends the
+    connection, and not the controller: what moves goes on. `record` has the cycles that this process sees, without accelerations. `realtime` and
+    `not_written` raise `OwnerError`. When the process of the controller ends, calls raise `EndedError`.
+
+    Raises `StartError` if no controller is served by the name, or its permissions do not let this process observe it.
     """
 
 @final

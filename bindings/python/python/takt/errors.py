@@ -57,6 +57,17 @@ class TrajectoryError(ArgumentError):
     limit: "float | None" = None
 
 
+class LeaseError(CommandError):
+    """Another process commands the controller, or this one may only observe it."""
+
+    #: The process that commands, or that has taken over; None where it is the permissions.
+    process: "int | None"
+
+
+class OwnerError(CommandError):
+    """Only the program that runs the controller can say or do this."""
+
+
 class RefusedError(CommandError):
     """The real-time thread has refused a request: in this phase, or while a fault is latched."""
 

@@ -1,0 +1,154 @@
+//! Processes that end at any instant.
+
+use super::*;
+
+#[test]
+fn clients_that_are_killed_at_any_instant_leave_a_controller_that_takes_commands() {
+    let served = Served::start("arm6-erob.toml");
+    let watching = served.connect();
+    let mut random = Random(0x5EED);
+    for round in 0..25 {
+        let mut other = other_process("deaths::command_without_end", &served.name());
+        let begun = served.connect();
+        // From before its first command on.
+        thread::sleep(Duration::from_millis(random.below(60)));
+        if round % 2 == 0 {
+            let _ = begun.wait_until(LONG, |_| begun.lease().map(drop));
+            thread::sleep(Duration::from_micros(random.below(20_000)));
+        }
+        other.0.kill().unwrap();
+        other.0.wait().unwrap();
+        within_limits(&watching);
+        let next = served.connect();
+        next.take_over().unwrap();
+        assert!(
+            served.controller.state().groups[0].stop.is_none_or(|stop| stop.rule() == takt::Rule::Requested)
+        );
+        next.stop(StopCategory::Two).unwrap();
+        // It is handed to the loop then, which takes it in one of these cycles.
+        insist(&next, || next.take_lease());
+        next.next_cycle(LONG).unwrap();
+        next.next_cycle(LONG).unwrap();
+        next.wait_for(Phase::Holding, LONG).unwrap();
+        let motion = insist(&next, || next.move_to(&[0.0; 6]));
+        assert_eq!(next.wait(motion, LONG), Ok(()), "round {round}");
+        within_limits(&watching);
+    }
+    assert!(!served.controller.has_ended());
+}
+
+/// A command of a client that takes over again where it was taken over from. What a killed process has sent is whole, and may be carried
+/// out after its end, its take-over too.
+fn insist<T>(client: &Client, command: impl Fn() -> Result<T, CommandError>) -> T {
+    loop {
+        match command() {
+            Err(CommandError::Lease(LeaseError::TakenOver { .. })) => client.take_over().unwrap(),
+            done => return done.unwrap(),
+        }
+    }
+}
+
+#[test]
+#[ignore = "it is the other process of another test"]
+fn command_without_end() {
+    let client = connect(&env::var(NAME).unwrap()).unwrap();
+    let mut random = Random(u64::from(std::process::id()) << 20 | 1);
+    client.take_over().unwrap();
+    loop {
+        let away = 0.2 * random.below(1000) as f64 / 1000.0 - 0.1;
+        let target = vec![away; 6];
+        let _ = match random.below(6) {
+            0 => client.move_to(&target).map(drop),
+            1 => client.move_through(&[vec![away / 2.0; 6], target]).map(drop),
+            2 => {
+                let point = TrajectoryPoint { time_s: 3.0, positions: target, ..TrajectoryPoint::default() };
+                client.execute(&vec![point; 500]).map(drop)
+            }
+            3 => client.begin_stream(),
+            4 => {
+                let chunk: Vec<Vec<f64>> = (0..40).map(|_| target.clone()).collect();
+                let _ = client.stream().push_chunk(ClientStream::now_ns(), Duration::from_millis(5), &chunk);
+                Ok(())
+            }
+            _ => client.stop(StopCategory::Two),
+        };
+    }
+}
+
+/// `takt run --serve`, as a user starts it.
+fn takt_serves(folder: &TempDir) -> Other {
+    let child = Command::new(env!("CARGO_BIN_EXE_takt"))
+        .args(["run", "configs/arm6-erob.toml", "--serve", &path_in(folder), "--record"])
+        .arg(folder.path().join("run.mcap"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    Other(child.unwrap())
+}
+
+/// As soon as it is served.
+fn connected(folder: &TempDir) -> Client {
+    let begun = Instant::now();
+    loop {
+        match connect(&path_in(folder)) {
+            Ok(client) => return client,
+            Err(ConnectError::NotServed { .. }) if begun.elapsed() < LONG => {
+                thread::sleep(Duration::from_millis(10));
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+}
+
+#[test]
+fn every_call_returns_when_the_process_of_the_controller_is_killed_and_a_new_one_is_found_again() {
+    let folder = TempDir::new().unwrap();
+    let mut random = Random(0xD1E);
+    for _ in 0..5 {
+        let mut takt = takt_serves(&folder);
+        let client = connected(&folder);
+        thread::scope(|scope| {
+            let commanding = scope.spawn(|| {
+                client.begin_stream().unwrap();
+                loop {
+                    match client.stream().push_now(&[0.0; 6]) {
+                        Ok(()) | Err(StreamError::Full) => {}
+                        Err(error) => return error,
+                    }
+                }
+            });
+            let waiting = scope.spawn(|| client.wait_for(Phase::Moving, Duration::MAX));
+            let listening = scope.spawn(|| {
+                let mut events = client.events();
+                loop {
+                    if let Err(error) = events.wait(Duration::MAX) {
+                        return error;
+                    }
+                }
+            });
+            thread::sleep(Duration::from_millis(50 + random.below(100)));
+            takt.0.kill().unwrap();
+            takt.0.wait().unwrap();
+            assert_eq!(commanding.join().unwrap(), StreamError::Ended);
+            assert_eq!(waiting.join().unwrap(), Err(WaitError::Ended));
+            assert_eq!(listening.join().unwrap(), WaitError::Ended);
+        });
+        assert_eq!(client.stop(StopCategory::One), Err(CommandError::Ended));
+        assert!(client.has_ended() && client.state().slot > 0, "the last state is still there");
+        assert!(matches!(connect(&path_in(&folder)), Err(ConnectError::NotServed { .. })));
+    }
+}
+
+#[test]
+fn ctrl_c_brings_a_served_arm_to_rest_and_its_clients_are_told() {
+    let folder = TempDir::new().unwrap();
+    let mut takt = takt_serves(&folder);
+    let client = connected(&folder);
+    let motion = client.move_to(&moved(&client, 1.0)).unwrap();
+    client.wait_until(LONG, |state| (state.groups()[0].phase == Phase::Moving).then_some(())).unwrap();
+    kill(Pid::from_raw(takt.0.id() as i32), Signal::SIGINT).unwrap();
+    let Err(MotionError::Stopped(stopped)) = client.wait(motion, LONG) else { panic!("it has not stopped") };
+    assert_eq!(stopped.reason.category, StopCategory::Two);
+    assert_eq!(client.wait_for(Phase::Moving, LONG), Err(WaitError::Ended));
+    assert_eq!(takt.0.wait().unwrap().code(), Some(130));
+}
