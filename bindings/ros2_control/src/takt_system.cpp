@@ -35,8 +35,19 @@ void TaktSystem::complain(const std::string &words) const {
     RCLCPP_ERROR(rclcpp::get_logger("takt"), "%s", words.c_str());
 }
 
+#if TAKT_ROS2_CONTROL_HANDLES
+TaktSystem::CallbackReturn TaktSystem::on_init(const hardware_interface::HardwareComponentInterfaceParams &params) {
+    if (SystemInterface::on_init(params) != CallbackReturn::SUCCESS) return CallbackReturn::ERROR;
+    return read_tag(info_);
+}
+#else
 TaktSystem::CallbackReturn TaktSystem::on_init(const hardware_interface::HardwareInfo &info) {
     if (SystemInterface::on_init(info) != CallbackReturn::SUCCESS) return CallbackReturn::ERROR;
+    return read_tag(info_);
+}
+#endif
+
+TaktSystem::CallbackReturn TaktSystem::read_tag(const hardware_interface::HardwareInfo &info) {
     const auto parameter = [&](const char *name, const char *otherwise) {
         const auto found = info.hardware_parameters.find(name);
         return found == info.hardware_parameters.end() ? std::string(otherwise) : found->second;
@@ -70,18 +81,39 @@ TaktSystem::CallbackReturn TaktSystem::on_init(const hardware_interface::Hardwar
         joint.name = component.name;
         joints_.push_back(joint);
     }
-    return CallbackReturn::SUCCESS;
+    const std::string limits = parameter("urdf_limits", "checked");
+    if (limits != "checked" && limits != "ignored") {
+        complain("<param name=\"urdf_limits\"> is \"" + limits + "\"; it is checked or ignored");
+        return CallbackReturn::ERROR;
+    }
+    if (limits == "ignored") return CallbackReturn::SUCCESS;
+    const auto fits = takt::check_urdf(configuration_, info.original_xml);
+    if (fits) return CallbackReturn::SUCCESS;
+    complain(fits.words());
+    return CallbackReturn::ERROR;
 }
 
 TaktSystem::CallbackReturn TaktSystem::on_configure(const rclcpp_lifecycle::State &) {
     try {
+        options_.is_left_disabled = true;
         arm_.emplace(takt::controller::open(configuration_, options_));
     } catch (const takt::error &why) {
         complain(why.what());
         return CallbackReturn::FAILURE;
     }
+    if (!find_axes() || !bind()) {
+        close();
+        return CallbackReturn::FAILURE;
+    }
     period_s_ = static_cast<double>(arm_->period_ns()) / 1e9;
     targets_.assign(arm_->size(), takt::target());
+    state_ = arm_->state();
+    take_state();
+    hold_all();
+    return CallbackReturn::SUCCESS;
+}
+
+bool TaktSystem::find_axes() {
     for (auto &joint : joints_) {
         bool is_found = false;
         for (std::uint32_t axis = 0; axis < arm_->size() && !is_found; axis++) {
@@ -91,13 +123,10 @@ TaktSystem::CallbackReturn TaktSystem::on_configure(const rclcpp_lifecycle::Stat
         }
         if (!is_found) {
             complain(joint.name + " is no axis of " + configuration_);
-            arm_.reset();
-            return CallbackReturn::FAILURE;
+            return false;
         }
     }
-    state_ = arm_->state();
-    take_state();
-    return come_to_rest_and_disable() ? CallbackReturn::SUCCESS : CallbackReturn::FAILURE;
+    return true;
 }
 
 TaktSystem::CallbackReturn TaktSystem::on_activate(const rclcpp_lifecycle::State &) {
@@ -105,6 +134,8 @@ TaktSystem::CallbackReturn TaktSystem::on_activate(const rclcpp_lifecycle::State
     for (const auto &step : {arm_->enable(), arm_->wait_phase(TAKT_PHASE_HOLDING, patience_s)}) {
         if (step) continue;
         complain(step.words());
+        // None of them keeps its power while the system is inactive.
+        come_to_rest_and_disable();
         return CallbackReturn::FAILURE;
     }
     state_ = arm_->state();
@@ -113,6 +144,7 @@ TaktSystem::CallbackReturn TaktSystem::on_activate(const rclcpp_lifecycle::State
     // The first point comes with the next write(). From now on no call of the controller manager waits.
     if (const auto begun = arm_->begin_stream(); !begun) {
         complain(begun.words());
+        come_to_rest_and_disable();
         return CallbackReturn::FAILURE;
     }
     is_active_ = true;
@@ -139,6 +171,7 @@ TaktSystem::CallbackReturn TaktSystem::close() {
     if (!arm_) return CallbackReturn::SUCCESS;
     const auto closed = arm_->close();
     arm_.reset();
+    for (auto &joint : joints_) joint.kind = Kind::hold;
     if (closed) return CallbackReturn::SUCCESS;
     complain(closed.words());
     return CallbackReturn::FAILURE;
@@ -155,15 +188,48 @@ bool TaktSystem::come_to_rest_and_disable() {
     return true;
 }
 
+#if TAKT_ROS2_CONTROL_HANDLES
+bool TaktSystem::bind() {
+    shown_.clear();
+    commanded_.clear();
+    try {
+        for (std::size_t number = 0; number < joints_.size(); number++) {
+            Joint &joint = joints_[number];
+            for (const auto &interface : info_.joints[number].state_interfaces)
+                shown_.emplace_back(get_state_interface_handle(joint.name + "/" + interface.name), joint.state(interface.name));
+            for (const auto &interface : info_.joints[number].command_interfaces)
+                commanded_.emplace_back(get_command_interface_handle(joint.name + "/" + interface.name), joint.command(interface.name));
+        }
+    } catch (const std::exception &why) {
+        complain(why.what());
+        return false;
+    }
+    return true;
+}
+
+void TaktSystem::show_state() {
+    for (const auto &[handle, value] : shown_) static_cast<void>(set_state(handle, *value, false));
+}
+
+void TaktSystem::take_commands() {
+    for (const auto &[handle, value] : commanded_) static_cast<void>(get_command(handle, *value, false));
+}
+
+void TaktSystem::show_commands() {
+    for (const auto &[handle, value] : commanded_) static_cast<void>(set_command(handle, *value, true));
+}
+#else
+bool TaktSystem::bind() { return true; }
+void TaktSystem::show_state() {}
+void TaktSystem::take_commands() {}
+void TaktSystem::show_commands() {}
+
 std::vector<hardware_interface::StateInterface> TaktSystem::export_state_interfaces() {
     std::vector<hardware_interface::StateInterface> exported;
     for (std::size_t number = 0; number < joints_.size(); number++) {
         Joint &joint = joints_[number];
         for (const auto &interface : info_.joints[number].state_interfaces) {
-            double *value = interface.name == HW_IF_POSITION   ? &joint.position
-                            : interface.name == HW_IF_VELOCITY ? &joint.velocity
-                                                               : &joint.effort;
-            exported.emplace_back(joint.name, interface.name, value);
+            exported.emplace_back(joint.name, interface.name, joint.state(interface.name));
         }
     }
     return exported;
@@ -174,18 +240,25 @@ std::vector<hardware_interface::CommandInterface> TaktSystem::export_command_int
     for (std::size_t number = 0; number < joints_.size(); number++) {
         Joint &joint = joints_[number];
         for (const auto &interface : info_.joints[number].command_interfaces) {
-            double *value = interface.name == HW_IF_POSITION   ? &joint.position_command
-                            : interface.name == HW_IF_VELOCITY ? &joint.velocity_command
-                                                               : &joint.effort_command;
-            exported.emplace_back(joint.name, interface.name, value);
+            exported.emplace_back(joint.name, interface.name, joint.command(interface.name));
         }
     }
     return exported;
+}
+#endif
+
+double *TaktSystem::Joint::state(const std::string &interface) {
+    return interface == HW_IF_POSITION ? &position : interface == HW_IF_VELOCITY ? &velocity : &effort;
+}
+
+double *TaktSystem::Joint::command(const std::string &interface) {
+    return interface == HW_IF_POSITION ? &position_command : interface == HW_IF_VELOCITY ? &velocity_command : &effort_command;
 }
 
 std::optional<std::vector<TaktSystem::Kind>> TaktSystem::switched(
     const std::vector<std::string> &start, const std::vector<std::string> &stop) const {
     std::vector<Kind> kinds;
+    if (!arm_) return kinds;
     for (const auto &joint : joints_) {
         Kind kind = joint.kind;
         const auto is_of = [&](const std::string &key, const char *interface) { return key == joint.name + "/" + interface; };
@@ -218,9 +291,10 @@ return_type TaktSystem::prepare_command_mode_switch(const std::vector<std::strin
 }
 
 return_type TaktSystem::perform_command_mode_switch(const std::vector<std::string> &start, const std::vector<std::string> &stop) {
+    take_commands();
     const auto kinds = switched(start, stop);
     if (!kinds) return return_type::ERROR;
-    for (std::size_t number = 0; number < joints_.size(); number++) {
+    for (std::size_t number = 0; number < kinds->size(); number++) {
         Joint &joint = joints_[number];
         if (joint.kind == (*kinds)[number]) continue;
         joint.kind = (*kinds)[number];
@@ -230,6 +304,7 @@ return_type TaktSystem::perform_command_mode_switch(const std::vector<std::strin
         joint.velocity_command = 0.0;
         joint.effort_command = axis.torque_set;
     }
+    show_commands();
     return return_type::OK;
 }
 
@@ -255,6 +330,7 @@ return_type TaktSystem::read(const rclcpp::Time &, const rclcpp::Duration &perio
 
 return_type TaktSystem::write(const rclcpp::Time &, const rclcpp::Duration &) {
     if (!is_active_) return return_type::OK;
+    take_commands();
     for (const auto &joint : joints_) {
         takt::target &target = targets_[joint.axis];
         switch (joint.kind) {
@@ -278,6 +354,7 @@ void TaktSystem::take_state() {
         joint.velocity = axis.velocity;
         joint.effort = axis.torque;
     }
+    show_state();
 }
 
 void TaktSystem::hold_all() {
@@ -287,6 +364,7 @@ void TaktSystem::hold_all() {
         joint.velocity_command = 0.0;
         joint.effort_command = 0.0;
     }
+    show_commands();
 }
 
 } // namespace takt_ros2_control

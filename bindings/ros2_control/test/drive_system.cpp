@@ -11,6 +11,12 @@
 
 #include <hardware_interface/system_interface.hpp>
 #include <pluginlib/class_list_macros.hpp>
+#if __has_include(<hardware_interface/types/hardware_component_interface_params.hpp>)
+#define HANDLES 1
+#include <hardware_interface/types/hardware_component_interface_params.hpp>
+#else
+#define HANDLES 0
+#endif
 
 namespace pluginlib_stand_in {
 template <>
@@ -37,8 +43,10 @@ hardware_interface::HardwareInfo parsed(const std::string &path) {
     std::ifstream file(path);
     CHECK(file.good());
     const std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
-    hardware_interface::HardwareInfo info;
+    hardware_interface::HardwareInfo info{};
     info.type = "system";
+    info.original_xml = text;
+    bool is_in_tag = false;
     for (std::size_t begin = text.find('<'); begin != std::string::npos; begin = text.find('<', begin + 1)) {
         const std::size_t end = text.find('>', begin), next = text.find('<', begin + 1);
         const std::string element = text.substr(begin + 1, end - begin - 1);
@@ -46,14 +54,16 @@ hardware_interface::HardwareInfo parsed(const std::string &path) {
         const std::size_t named = element.find("name=\"");
         const std::string name = named == std::string::npos ? "" : element.substr(named + 6, element.find('"', named + 6) - named - 6);
         const std::string content = next == std::string::npos ? "" : text.substr(end + 1, next - end - 1);
-        if (tag == "plugin") info.hardware_plugin_name = content;
+        if (tag == "ros2_control" || tag == "/ros2_control") is_in_tag = tag == "ros2_control";
+        if (!is_in_tag) continue;
+        if (tag == "plugin") CHECK(content == "takt_ros2_control/TaktSystem");
         if (tag == "param") info.hardware_parameters[name] = content;
         if (tag == "joint") {
             info.joints.emplace_back();
             info.joints.back().name = name;
             info.joints.back().type = "joint";
         }
-        hardware_interface::InterfaceInfo interface;
+        hardware_interface::InterfaceInfo interface{};
         interface.name = name;
         if (tag == "command_interface") info.joints.back().command_interfaces.push_back(interface);
         if (tag == "state_interface") info.joints.back().state_interfaces.push_back(interface);
@@ -63,19 +73,46 @@ hardware_interface::HardwareInfo parsed(const std::string &path) {
 
 struct Manager {
     std::unique_ptr<hardware_interface::SystemInterface> system = pluginlib_stand_in::make<hardware_interface::SystemInterface>();
+#if HANDLES
+    std::vector<hardware_interface::StateInterface::ConstSharedPtr> states{};
+    std::vector<hardware_interface::CommandInterface::SharedPtr> commands{};
+    static const hardware_interface::StateInterface &of(const hardware_interface::StateInterface::ConstSharedPtr &it) { return *it; }
+    static hardware_interface::CommandInterface &of(const hardware_interface::CommandInterface::SharedPtr &it) { return *it; }
+    static double value(const hardware_interface::StateInterface &interface) { return interface.get_optional().value(); }
+    static void set(hardware_interface::CommandInterface &interface, double value) { CHECK(interface.set_value(value, true)); }
+    void take_interfaces() {
+        states = system->on_export_state_interfaces();
+        commands = system->on_export_command_interfaces();
+    }
+    CallbackReturn init(const hardware_interface::HardwareInfo &info) const {
+        hardware_interface::HardwareComponentInterfaceParams params;
+        params.hardware_info = info;
+        return system->on_init(params);
+    }
+#else
     std::vector<hardware_interface::StateInterface> states{};
     std::vector<hardware_interface::CommandInterface> commands{};
+    template <class T>
+    static T &of(T &it) { return it; }
+    static double value(const hardware_interface::StateInterface &interface) { return interface.get_value(); }
+    static void set(hardware_interface::CommandInterface &interface, double value) { interface.set_value(value); }
+    void take_interfaces() {
+        states = system->export_state_interfaces();
+        commands = system->export_command_interfaces();
+    }
+    CallbackReturn init(const hardware_interface::HardwareInfo &info) const { return system->on_init(info); }
+#endif
     std::int64_t now_ns = 0;
 
     double state(const std::string &name) const {
         for (const auto &interface : states)
-            if (interface.get_name() == name) return interface.get_value();
+            if (of(interface).get_name() == name) return value(of(interface));
         std::fprintf(stderr, "there is no state %s\n", name.c_str());
         std::exit(1);
     }
     void command(const std::string &name, double value) {
         for (auto &interface : commands)
-            if (interface.get_name() == name) return interface.set_value(value);
+            if (of(interface).get_name() == name) return set(of(interface), value);
         std::fprintf(stderr, "there is no command %s\n", name.c_str());
         std::exit(1);
     }
@@ -112,30 +149,44 @@ int main(int count, char **arguments) {
     CHECK(count == 3);
     const std::string configuration = arguments[1];
     const auto tag = parsed(arguments[2]);
-    CHECK(tag.hardware_plugin_name == "takt_ros2_control/TaktSystem" && tag.joints.size() == 2);
+    CHECK(tag.joints.size() == 2);
     const auto info = with(with(tag, "configuration", configuration), "drives", "virtual");
 
     // What is wrong with a tag is said before anything is opened.
     {
         Manager manager;
-        CHECK(manager.system->on_init(with(info, "configuration", "")) == CallbackReturn::ERROR);
-        CHECK(manager.system->on_init(with(info, "drives", "imaginary")) == CallbackReturn::ERROR);
+        CHECK(manager.init(with(info, "configuration", "")) == CallbackReturn::ERROR);
+        CHECK(manager.init(with(info, "drives", "imaginary")) == CallbackReturn::ERROR);
+        CHECK(manager.init(with(info, "urdf_limits", "perhaps")) == CallbackReturn::ERROR);
         auto strange = info;
         strange.joints[0].command_interfaces[0].name = "temper";
-        CHECK(manager.system->on_init(strange) == CallbackReturn::ERROR);
-        CHECK(manager.system->on_init(with(info, "configuration", "no such file")) == CallbackReturn::SUCCESS);
-        CHECK(manager.system->on_configure(any_state) == CallbackReturn::FAILURE);
+        CHECK(manager.init(strange) == CallbackReturn::ERROR);
+        CHECK(manager.init(with(info, "configuration", "no such file")) == CallbackReturn::ERROR);
         strange = info;
         strange.joints[0].name = "no_such_joint";
-        CHECK(manager.system->on_init(strange) == CallbackReturn::SUCCESS);
+        CHECK(manager.init(strange) == CallbackReturn::SUCCESS);
+        manager.take_interfaces();
         CHECK(manager.system->on_configure(any_state) == CallbackReturn::FAILURE);
+    }
+
+    // A configuration that allows more than the joints of the URDF is refused, unless that is wanted.
+    {
+        Manager manager;
+        auto narrow = info;
+        const std::string wide = "velocity=\"2.5\"";
+        const std::size_t at = narrow.original_xml.find(wide);
+        CHECK(at != std::string::npos);
+        narrow.original_xml.replace(at, wide.size(), "velocity=\"0.1\"");
+        CHECK(manager.init(narrow) == CallbackReturn::ERROR);
+        CHECK(manager.init(with(narrow, "urdf_limits", "ignored")) == CallbackReturn::SUCCESS);
+        narrow.original_xml = "<robot";
+        CHECK(manager.init(narrow) == CallbackReturn::ERROR);
     }
 
     Manager manager;
     auto &system = *manager.system;
-    CHECK(system.on_init(info) == CallbackReturn::SUCCESS);
-    manager.states = system.export_state_interfaces();
-    manager.commands = system.export_command_interfaces();
+    CHECK(manager.init(info) == CallbackReturn::SUCCESS);
+    manager.take_interfaces();
     CHECK(manager.states.size() == 5 && manager.commands.size() == 5);
 
     // Inactive: states can be read, and nothing is sent.
@@ -143,6 +194,14 @@ int main(int count, char **arguments) {
     CHECK(manager.run(50) == return_type::OK);
     const double home = manager.state("joint1/position"), home2 = manager.state("joint2/position");
     CHECK(std::isfinite(home));
+
+#if HANDLES
+    // Whoever is at a value makes nobody wait: the value stays as it was.
+    {
+        const auto held = manager.states[0]->held();
+        CHECK(manager.run(2) == return_type::OK);
+    }
+#endif
 
     // Active: it holds until somebody claims it.
     CHECK(system.on_activate(any_state) == CallbackReturn::SUCCESS);

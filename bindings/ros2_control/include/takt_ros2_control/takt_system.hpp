@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <hardware_interface/handle.hpp>
@@ -16,20 +17,34 @@
 
 #include <takt.hpp>
 
+// Jazzy from 4.40 on, Kilted from 5.9 and Rolling from 6.1: the framework makes the handles of the interfaces. Humble, and the first releases of
+// Jazzy: the component exports pointers to its values.
+#if __has_include(<hardware_interface/types/hardware_component_interface_params.hpp>)
+#define TAKT_ROS2_CONTROL_HANDLES 1
+#include <hardware_interface/types/hardware_component_interface_params.hpp>
+#else
+#define TAKT_ROS2_CONTROL_HANDLES 0
+#endif
+
 namespace takt_ros2_control {
 
 /// The drives of a takt configuration. takt has a real-time thread of its own, which keeps every limit: the controller manager may be late,
 /// and its rate need not be that of the bus. write() stamps its points, read() never waits for a drive.
 ///
 /// Parameters of <hardware>: `configuration`, a file; `drives`, "configured" (the default), "simulated", or "virtual": simulated in virtual
-/// time, of which each read() lets its period pass. The joints are named as the axes of the configuration. An axis that is no joint holds.
+/// time, of which each read() lets its period pass; `urdf_limits`, "checked" (the default) or "ignored". The joints are named as the axes of the
+/// configuration. An axis that is no joint holds.
 class TaktSystem : public hardware_interface::SystemInterface {
 public:
     using CallbackReturn = rclcpp_lifecycle::node_interfaces::LifecycleNodeInterface::CallbackReturn;
 
-    /// Reads the tag: parameters, joints and their interfaces.
+    /// Reads the tag: parameters, joints and their interfaces. Refuses a configuration that allows more than the joints of the URDF.
+#if TAKT_ROS2_CONTROL_HANDLES
+    CallbackReturn on_init(const hardware_interface::HardwareComponentInterfaceParams &params) override;
+#else
     CallbackReturn on_init(const hardware_interface::HardwareInfo &info) override;
-    /// Brings the drives up. takt enables them to see that they can be; they are disabled again when this returns.
+#endif
+    /// Opens the buses and brings the drives up. They report their positions, and stay disabled.
     CallbackReturn on_configure(const rclcpp_lifecycle::State &previous) override;
     /// Enables the drives. The joints hold until a controller claims them.
     CallbackReturn on_activate(const rclcpp_lifecycle::State &previous) override;
@@ -40,8 +55,10 @@ public:
     CallbackReturn on_shutdown(const rclcpp_lifecycle::State &previous) override;
     CallbackReturn on_error(const rclcpp_lifecycle::State &previous) override;
 
+#if !TAKT_ROS2_CONTROL_HANDLES
     std::vector<hardware_interface::StateInterface> export_state_interfaces() override;
     std::vector<hardware_interface::CommandInterface> export_command_interfaces() override;
+#endif
 
     /// Refuses two interfaces of one joint at a time, and efforts of a joint that is not in cyclic synchronous torque.
     hardware_interface::return_type prepare_command_mode_switch(
@@ -65,8 +82,21 @@ private:
         double position_command = 0.0, velocity_command = 0.0, effort_command = 0.0;
         /// Where it stays while nobody has claimed it.
         double held = 0.0;
+
+        /// What a state interface or a command interface of this name is about.
+        double *state(const std::string &interface);
+        double *command(const std::string &interface);
     };
 
+    CallbackReturn read_tag(const hardware_interface::HardwareInfo &info);
+    bool find_axes();
+    /// Takes the handles that the framework has made.
+    bool bind();
+    /// Shows what was read, and takes what is commanded; a value that somebody else is at stays as it is until the next cycle.
+    void show_state();
+    void take_commands();
+    /// Shows what a joint begins at, so that no command of an earlier time is followed.
+    void show_commands();
     /// The kinds of the joints after a switch; none if it is not possible, with the reason in the log.
     std::optional<std::vector<Kind>> switched(const std::vector<std::string> &start, const std::vector<std::string> &stop) const;
     void take_state();
@@ -84,6 +114,11 @@ private:
     std::vector<takt::target> targets_;
     double period_s_ = 0.001;
     bool is_active_ = false;
+#if TAKT_ROS2_CONTROL_HANDLES
+    /// Each handle, with the value of a joint that it shows or commands.
+    std::vector<std::pair<hardware_interface::StateInterface::SharedPtr, const double *>> shown_;
+    std::vector<std::pair<hardware_interface::CommandInterface::SharedPtr, double *>> commanded_;
+#endif
 };
 
 } // namespace takt_ros2_control

@@ -1,4 +1,4 @@
-// A stand-in: see ../README.md.
+// A stand-in: see ../../README.md.
 #pragma once
 #include <string>
 

@@ -1,4 +1,4 @@
-// A stand-in: see ../README.md.
+// A stand-in: see ../../README.md.
 #pragma once
 #include <string>
 #include <unordered_map>
@@ -12,7 +12,7 @@ struct InterfaceInfo {
     std::string max;
     std::string initial_value;
     std::string data_type;
-    int size = 1;
+    int size;
 };
 
 struct ComponentInfo {
@@ -26,9 +26,7 @@ struct ComponentInfo {
 struct HardwareInfo {
     std::string name;
     std::string type;
-    unsigned int rw_rate = 0;
-    bool is_async = false;
-    std::string hardware_plugin_name;
+    std::string hardware_class_type;
     std::unordered_map<std::string, std::string> hardware_parameters;
     std::vector<ComponentInfo> joints;
     std::vector<ComponentInfo> sensors;

@@ -1,4 +1,4 @@
-// A stand-in: see ../README.md.
+// A stand-in: see ../../README.md.
 #pragma once
 #include <string>
 #include <vector>
@@ -18,14 +18,15 @@ class SystemInterface : public rclcpp_lifecycle::node_interfaces::LifecycleNodeI
 public:
     SystemInterface() = default;
     SystemInterface(const SystemInterface &) = delete;
-    SystemInterface(SystemInterface &&) = delete;
+    SystemInterface(SystemInterface &&) = default;
+    virtual ~SystemInterface() = default;
 
     virtual CallbackReturn on_init(const HardwareInfo &hardware_info) {
         info_ = hardware_info;
         return CallbackReturn::SUCCESS;
     }
-    virtual std::vector<StateInterface> export_state_interfaces() { return {}; }
-    virtual std::vector<CommandInterface> export_command_interfaces() { return {}; }
+    virtual std::vector<StateInterface> export_state_interfaces() = 0;
+    virtual std::vector<CommandInterface> export_command_interfaces() = 0;
     virtual return_type prepare_command_mode_switch(const std::vector<std::string> &, const std::vector<std::string> &) {
         return return_type::OK;
     }

@@ -1,4 +1,4 @@
-// A stand-in: see ../README.md. The class is made by its base, as pluginlib does.
+// A stand-in: see ../../README.md. The class is made by its base, as pluginlib does.
 #pragma once
 #include <memory>
 #include <type_traits>

@@ -1,0 +1,286 @@
+//! The session in zenoh, and the controller of another process.
+
+use std::sync::Mutex;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+
+use takt::rt::linux::MonotonicClock;
+use takt::rt::{Clock, StopCategory};
+use takt::telemetry::CdrEncoder;
+use takt::{Client, CommandError, ConnectError, Snapshot, WaitError};
+use thiserror::Error;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::{Publisher, Subscriber};
+use zenoh::{Session, Wait};
+
+use crate::attachment::attachment;
+use crate::messages::{JointState, JointTrajectory};
+use crate::motion::{AxisPlace, Unfit, Wanted, wanted};
+use crate::names::{Gid, JOINT_STATE, JOINT_TRAJECTORY, Kind, Node, gid, is_topic};
+
+/// Trajectories that wait to be carried out; one that comes while so many wait is lost, which is said.
+const WAITING_AT_MOST: usize = 8;
+/// How often the end is looked for.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// Where the controller is, and what it is in the graph.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// The name by which the controller is served.
+    pub controller: String,
+    /// `ROS_DOMAIN_ID`
+    pub domain: u32,
+    /// The name of the node.
+    pub node: String,
+    /// The topic of the joint states, from the root.
+    pub states: String,
+    /// The topic of the joint trajectories, from the root.
+    pub trajectories: String,
+    /// Joint states a second, at most one a cycle.
+    pub rate_hz: f64,
+    /// The endpoints that are connected to: `tcp/localhost:7447` is the router of rmw_zenoh.
+    pub connect: Vec<String>,
+    /// The endpoints that are listened at.
+    pub listen: Vec<String>,
+    /// Whether the other computers have ROS 2 Humble, which has no hashes of types.
+    pub is_humble: bool,
+}
+
+/// Why there is no bridge, or no longer.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum BridgeError {
+    /// The controller cannot be reached.
+    #[error(transparent)]
+    Controller(#[from] ConnectError),
+    /// The process of the controller has ended.
+    #[error("the controller {name:?} has ended")]
+    Ended {
+        /// The name by which it was served.
+        name: String,
+    },
+    /// A name that ROS 2 does not have.
+    #[error(
+        "{given:?} is no topic: write it from the root, in letters, digits and _, as in /arm/joint_states"
+    )]
+    Topic {
+        /// The name.
+        given: String,
+    },
+    /// A rate that cannot be.
+    #[error("the rate is {given} Hz; it is from 0.1 to 1000 Hz")]
+    Rate {
+        /// The rate.
+        given: f64,
+    },
+    /// zenoh has refused something.
+    #[error("zenoh: {what}: {reason}")]
+    Zenoh {
+        /// What it has refused.
+        what: &'static str,
+        /// What it said.
+        reason: String,
+    },
+}
+
+fn refused<E: ToString>(what: &'static str) -> impl Fn(E) -> BridgeError {
+    move |reason| BridgeError::Zenoh { what, reason: reason.to_string() }
+}
+
+/// A controller in the graph of ROS 2, until it is dropped.
+pub struct Bridge {
+    controller: Client,
+    options: Options,
+    axes: Vec<AxisPlace>,
+    publisher: Publisher<'static>,
+    gid: Gid,
+    received: Mutex<Receiver<Vec<u8>>>,
+    // In the graph for as long as they are here. The session closes after what it has declared.
+    _subscriber: Subscriber<()>,
+    _tokens: [LivelinessToken; 3],
+    _session: Session,
+}
+
+impl Bridge {
+    /// Connects to the controller and to the graph. Nothing is commanded.
+    ///
+    /// # Errors
+    /// See [`BridgeError`].
+    pub fn open(options: Options, lost: impl Fn() + Send + Sync + 'static) -> Result<Self, BridgeError> {
+        for topic in [&options.states, &options.trajectories] {
+            if !is_topic(topic) {
+                return Err(BridgeError::Topic { given: topic.clone() });
+            }
+        }
+        if !(0.1..=1000.0).contains(&options.rate_hz) {
+            return Err(BridgeError::Rate { given: options.rate_hz });
+        }
+        let controller = takt::connect(&options.controller)?;
+        let described = &controller.machine().axes;
+        let axes =
+            described.iter().map(|axis| AxisPlace { name: axis.name.clone(), group: axis.group }).collect();
+        let session = session(&options)?;
+        let node = Node {
+            domain: options.domain,
+            session: session.zid().to_string(),
+            namespace: "/".to_owned(),
+            name: options.node.clone(),
+            is_humble: options.is_humble,
+        };
+        let states = node.endpoint(1, Kind::Publisher, &options.states, &JOINT_STATE);
+        let trajectories = node.endpoint(2, Kind::Subscription, &options.trajectories, &JOINT_TRAJECTORY);
+        let gid = gid(&states);
+        let publisher = session
+            .declare_publisher(node.topic(&options.states, &JOINT_STATE))
+            .wait()
+            .map_err(refused("the topic of the joint states"))?;
+        let (sender, received) = mpsc::sync_channel(WAITING_AT_MOST);
+        let subscriber = session
+            .declare_subscriber(node.topic(&options.trajectories, &JOINT_TRAJECTORY))
+            .callback(move |sample| {
+                if sender.try_send(sample.payload().to_bytes().into_owned()).is_err() {
+                    lost();
+                }
+            })
+            .wait()
+            .map_err(refused("the topic of the trajectories"))?;
+        let token = |key: String| {
+            session.liveliness().declare_token(key).wait().map_err(refused("a liveliness token"))
+        };
+        let tokens = [token(node.token())?, token(states)?, token(trajectories)?];
+        Ok(Self {
+            controller,
+            options,
+            axes,
+            publisher,
+            gid,
+            received: Mutex::new(received),
+            _subscriber: subscriber,
+            _tokens: tokens,
+            _session: session,
+        })
+    }
+
+    /// Publishes joint states and carries trajectories out until `is_over`. `tell` is called with what people want to know: which trajectory
+    /// was begun, and why one was refused.
+    ///
+    /// # Errors
+    /// [`BridgeError::Ended`], and [`BridgeError::Zenoh`] when nothing can be published.
+    pub fn run(
+        &self,
+        is_over: impl Fn() -> bool + Sync,
+        tell: impl Fn(&str) + Sync,
+    ) -> Result<(), BridgeError> {
+        let is_either_over = || is_over() || self.controller.has_ended();
+        thread::scope(|scope| {
+            // Its own thread, since the states go on while a command waits for its answer.
+            scope.spawn(|| self.carry_out(&is_either_over, &tell));
+            self.publish(&is_over)
+        })
+    }
+
+    fn publish(&self, is_over: &impl Fn() -> bool) -> Result<(), BridgeError> {
+        let cycle_s = self.controller.machine().cycle_ns as f64 / 1e9;
+        let cycles = (1.0 / self.options.rate_hz / cycle_s).round().max(1.0) as u64;
+        let names: Vec<String> = self.axes.iter().map(|axis| axis.name.clone()).collect();
+        let (mut encoder, mut number, mut slot) = (CdrEncoder::default(), 0, self.controller.state().slot);
+        while !is_over() {
+            let state = match self.controller.cycle_after(slot + cycles - 1, LOOK) {
+                Ok(state) => state,
+                Err(WaitError::NotInTime) => continue,
+                Err(_) => return Err(BridgeError::Ended { name: self.options.controller.clone() }),
+            };
+            slot = state.slot;
+            if !state.axes().iter().all(|axis| axis.is_heard) {
+                continue;
+            }
+            number += 1;
+            let message = encode(&mut encoder, &names, &state);
+            let attached = attachment(number, time_of_day_ns(), self.gid);
+            let sent = self.publisher.put(message).attachment(attached).wait();
+            sent.map_err(refused("a joint state"))?;
+        }
+        Ok(())
+    }
+
+    fn carry_out(&self, is_over: &impl Fn() -> bool, tell: &impl Fn(&str)) {
+        // Only this thread takes it, and a thread that has panicked leaves it as it is.
+        let received = self.received.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        while !is_over() {
+            let message = match received.recv_timeout(LOOK) {
+                Ok(message) => message,
+                Err(RecvTimeoutError::Timeout) => continue,
+                Err(RecvTimeoutError::Disconnected) => return,
+            };
+            let decoded = JointTrajectory::decode(&message).ok_or(Unfit::NotCdr);
+            let groups = &self.controller.machine().groups;
+            let found = decoded.and_then(|trajectory| {
+                wanted(&trajectory, &self.axes, groups, &self.controller.state(), time_of_day_ns())
+            });
+            match found {
+                Err(reason) => tell(&format!("a trajectory was refused: {reason}")),
+                Ok(wanted) => match self.begin(&wanted) {
+                    Err(reason) => tell(&format!("a trajectory was refused: {reason}")),
+                    Ok(()) => tell(&words_of(&wanted)),
+                },
+            }
+        }
+    }
+
+    fn begin(&self, wanted: &Wanted) -> Result<(), CommandError> {
+        match wanted {
+            Wanted::Stop => self.controller.stop(StopCategory::Two),
+            Wanted::Execute { group, points } => match self.controller.machine().groups.get(*group) {
+                Some(group) => self.controller.group(group)?.execute(points).map(drop),
+                None => self.controller.execute(points).map(drop),
+            },
+        }
+    }
+}
+
+fn words_of(wanted: &Wanted) -> String {
+    match wanted {
+        Wanted::Stop => "a trajectory without points: the axes come to rest and hold".to_owned(),
+        Wanted::Execute { points, .. } => {
+            let seconds = points.last().map_or(0.0, |point| point.time_s);
+            format!("a trajectory of {} points has begun, {seconds:.3} s", points.len())
+        }
+    }
+}
+
+/// A peer of the endpoints, without scouting by multicast.
+fn session(options: &Options) -> Result<Session, BridgeError> {
+    let mut config = zenoh::Config::default();
+    let mut set = |key, value: &str| config.insert_json5(key, value).map_err(refused(key));
+    set("mode", "\"peer\"")?;
+    set("scouting/multicast/enabled", "false")?;
+    set("connect/endpoints", &format!("{:?}", options.connect))?;
+    set("listen/endpoints", &format!("{:?}", options.listen))?;
+    zenoh::open(config).wait().map_err(refused("a session"))
+}
+
+fn encode<'e>(encoder: &'e mut CdrEncoder, names: &[String], state: &Snapshot) -> &'e [u8] {
+    let axes = state.axes();
+    let efforts: Option<Vec<f64>> = axes.iter().map(|axis| axis.torque).collect();
+    let message = JointState {
+        at_ns: day_ns_of(state.at_ns),
+        names,
+        positions: &axes.iter().map(|axis| axis.position).collect::<Vec<_>>(),
+        velocities: &axes.iter().map(|axis| axis.velocity).collect::<Vec<_>>(),
+        efforts: &efforts.unwrap_or_default(),
+    };
+    message.encode(encoder)
+}
+
+/// The time of day in ns since 1970.
+fn time_of_day_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
+
+/// The time of day of a moment on the clock of the controller, which is that of this computer.
+fn day_ns_of(monotonic_ns: u64) -> u64 {
+    let age_ns = MonotonicClock::default().now_ns().saturating_sub(monotonic_ns);
+    u64::try_from(time_of_day_ns()).unwrap_or_default().saturating_sub(age_ns)
+}
