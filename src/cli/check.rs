@@ -7,7 +7,9 @@ mod unattended;
 
 use std::path::PathBuf;
 
-use crate::config::{Axis, Compliance, Config, Control, FeedForward, Group, PositionUnit, Travel, mode_word};
+use crate::config::{
+    Axis, Compliance, Config, Control, FeedForward, Group, PositionUnit, Travel, UrdfLimits, mode_word,
+};
 use crate::schedule::{self, BusSchedule};
 use clap::Args;
 use serde::Serialize;
@@ -54,6 +56,8 @@ struct Check {
     command_phase_ns: u64,
     /// The value of `command_phase = "auto"`; `None` where no command phase suits every bus.
     automatic_command_phase_ns: Option<u64>,
+    /// Until when set-points are held, so that they leave at the same moment of every slot; `None` where they leave as soon as they are made.
+    send_phase_ns: Option<u64>,
     /// The groups; none where all axes are one.
     groups: Vec<GroupCheck>,
     axes: Vec<AxisCheck>,
@@ -112,6 +116,8 @@ struct AxisCheck {
     /// `None` when it is not limited.
     jerk: Option<f64>,
     torque: f64,
+    /// Which of its limits a robot description has; `None` without one.
+    urdf: Option<UrdfLimits>,
     following_error: f64,
     following_error_time_ns: u64,
     /// What is sent beside the target.
@@ -163,6 +169,7 @@ impl Check {
             cycle_ns: config.cycle.period_ns,
             command_phase_ns: config.cycle.command_phase_ns,
             automatic_command_phase_ns: schedule::automatic_command_phase(config).ok(),
+            send_phase_ns: schedule::send_phase_ns(config),
             groups: config.groups.iter().map(|group| GroupCheck::of(config, group)).collect(),
             axes: config.axes.iter().map(|axis| AxisCheck::of(axis, config)).collect(),
             buses,
@@ -203,6 +210,7 @@ impl AxisCheck {
             deceleration: axis.limits.deceleration,
             jerk: Some(axis.limits.jerk).filter(|jerk| jerk.is_finite()),
             torque: axis.limits.torque,
+            urdf: axis.urdf.clone(),
             following_error: axis.following_error.limit,
             following_error_time_ns: axis.following_error.time_ns,
             feed_forward: match axis.feed_forward {

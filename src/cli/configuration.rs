@@ -4,7 +4,7 @@ use std::path::Path;
 use std::str::FromStr;
 use std::time::Duration;
 
-use crate::config::Config;
+use crate::config::{Config, ConfigSources};
 
 use super::usage_error::UsageError;
 
@@ -30,7 +30,12 @@ impl FromStr for BusOverride {
 
 /// Reads a configuration and applies the overrides.
 pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, UsageError> {
-    let mut config = Config::load(path)?;
+    load_with_sources(path, buses).map(|(config, _)| config)
+}
+
+/// The same, with the files that it was made of.
+pub fn load_with_sources(path: &Path, buses: &[BusOverride]) -> Result<(Config, ConfigSources), UsageError> {
+    let (mut config, mut sources) = ConfigSources::load(path)?;
     for (index, bus) in buses.iter().enumerate() {
         if buses.iter().take(index).any(|earlier| earlier.name == bus.name) {
             return Err(
@@ -40,8 +45,9 @@ pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, UsageError> {
         config
             .override_interface(&bus.name, &bus.interface)
             .map_err(|error| format!("--bus {}={}: {error}", bus.name, bus.interface))?;
+        sources.interfaces.push((bus.name.clone(), bus.interface.clone()));
     }
-    Ok(config)
+    Ok((config, sources))
 }
 
 /// Longer than thirty years is a slip, and would not fit the clock in nanoseconds.

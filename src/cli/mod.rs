@@ -18,16 +18,22 @@ mod jitter;
 mod log;
 mod lss;
 mod manual;
+mod metrics;
 mod monitor;
 mod ownership;
+mod panel;
 mod plan;
 mod play;
 mod print;
+mod replay;
 mod report;
 mod run;
+mod scan;
 mod send;
+mod service;
 mod sim;
 mod table;
+mod top;
 mod usage_error;
 
 use std::process::{ExitCode, Termination};
@@ -59,17 +65,21 @@ struct CommandLine {
 enum Command {
     Run(run::Arguments),
     Report(report::Arguments),
+    Replay(replay::Arguments),
     Check(check::Arguments),
     Plan(plan::Arguments),
     Play(play::Arguments),
+    Panel(panel::Arguments),
     Sim(sim::Arguments),
     Doctor(doctor::Arguments),
     Drive(drive::Arguments),
     Eds(eds::Arguments),
     Lss(lss::Arguments),
+    Scan(scan::Arguments),
     Monitor(monitor::Arguments),
     Send(send::Arguments),
     Jitter(jitter::Arguments),
+    Top(top::Arguments),
     Completions(completions::Arguments),
     Manual(manual::Arguments),
 }
@@ -81,17 +91,21 @@ impl CommandLine {
         match self.command {
             Command::Run(arguments) => run::run(arguments),
             Command::Report(arguments) => report::run(&arguments),
+            Command::Replay(arguments) => replay::run(&arguments),
             Command::Check(arguments) => check::run(&arguments),
             Command::Plan(arguments) => plan::run(&arguments),
             Command::Play(arguments) => play::run(&arguments),
+            Command::Panel(arguments) => panel::run(&arguments),
             Command::Sim(arguments) => sim::run(&arguments),
             Command::Doctor(arguments) => doctor::run(&arguments),
             Command::Drive(arguments) => drive::run(&arguments),
             Command::Eds(arguments) => eds::run(&arguments),
             Command::Lss(arguments) => lss::run(&arguments),
+            Command::Scan(arguments) => scan::run(&arguments),
             Command::Monitor(arguments) => monitor::run(&arguments),
             Command::Send(arguments) => send::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
+            Command::Top(arguments) => top::run(&arguments),
             Command::Completions(arguments) => completions::run(arguments),
             Command::Manual(arguments) => manual::run(&arguments),
         }

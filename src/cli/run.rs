@@ -1,9 +1,10 @@
 //! `takt run`: the main job.
 
 use std::io::{IsTerminal, stderr};
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use clap::Args;
@@ -16,10 +17,12 @@ use crate::controller::session::{self, Session, SessionError, SessionOptions};
 use crate::controller::{Controller, Interrupt, Outcome, Progress, StartFailure};
 use crate::family;
 use crate::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
+use crate::panel::{Listening, PanelError};
+use crate::remote::now_ns;
 use crate::schedule;
 use crate::serve::{self, ServeError, ServeOptions};
 use crate::telemetry::{
-    Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
+    EachCycle, Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
 };
 use takt_rt::{Event, EventKind, Fault, Snapshot, StopReason};
 
@@ -27,8 +30,11 @@ use super::configuration::{self, BusOverride};
 use super::exit::Exit;
 use super::full_queue::{self, FullQueues};
 use super::interruption;
+use super::metrics::{self, Metrics};
 use super::ownership;
+use super::panel::{self, AccessArguments};
 use super::print;
+use super::service::Notifier;
 use super::usage_error::UsageError;
 
 /// Bring the drives up, run the motion program of a configuration, stop in control, and report.
@@ -55,6 +61,16 @@ pub struct Arguments {
     /// Who may observe (read) and command (write) the served controller, as file permissions
     #[arg(long, value_name = "MODE", default_value = "600", requires = "serve", value_parser = permissions)]
     serve_mode: u32,
+    /// Tell Prometheus at http://ADDRESS/metrics how the run goes: HOST:PORT, or a port of this computer alone, as 9464. Whoever reaches the
+    /// address can read
+    #[arg(long, value_name = "ADDRESS", value_parser = metrics::address)]
+    metrics: Option<SocketAddr>,
+    /// Show and command the controller in the browser until Ctrl-C, instead of running the program: a host and a port, or a port on
+    /// loopback
+    #[arg(long, value_name = "ADDRESS", conflicts_with = "duration", value_parser = crate::panel::address)]
+    panel: Option<SocketAddr>,
+    #[command(flatten)]
+    panel_access: AccessArguments,
     /// Have another takt of this host that commands one of the buses stop in control first, and take them over
     #[arg(long)]
     take_over: bool,
@@ -97,8 +113,8 @@ struct PrintedRefusal<'a> {
 
 /// Runs it.
 pub fn run(arguments: Arguments) -> Exit {
-    let config = match configuration::load(&arguments.config, &arguments.buses) {
-        Ok(config) => config,
+    let (config, sources) = match configuration::load_with_sources(&arguments.config, &arguments.buses) {
+        Ok(loaded) => loaded,
         Err(error) => return error.print(arguments.json),
     };
     if let Err(refused) = schedule::verify(&config) {
@@ -109,11 +125,24 @@ pub fn run(arguments: Arguments) -> Exit {
     if let Some(Err(error)) = arguments.serve.as_ref().map(|name| serve::verify(name, &serve_options)) {
         return UsageError::from(error.to_string()).print(arguments.json);
     }
+    let listening = arguments.panel.map(|address| arguments.panel_access.listen(address)).transpose();
+    let listening = match listening {
+        Ok(listening) => listening,
+        Err(error) => return error.print(arguments.json),
+    };
     let fault_injector =
         match arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose() {
             Ok(fault_injector) => fault_injector,
             Err(error) => return error.print(arguments.json),
         };
+    let metrics = arguments.metrics.map(|_| Arc::new(Metrics::new(Machine::of(&config))));
+    // It answers until the report is printed.
+    let _answering = match arguments.metrics.zip(metrics.as_ref()).map(|(at, metrics)| answer_at(at, metrics))
+    {
+        None => None,
+        Some(Ok(server)) => Some(server),
+        Some(Err(error)) => return error.print(arguments.json),
+    };
     let signals = match Signals::watch() {
         Ok(signals) => signals,
         Err(error) => {
@@ -126,11 +155,15 @@ pub fn run(arguments: Arguments) -> Exit {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
         recording: arguments.record.map(RecordingDestination::File),
         is_realtime_required: arguments.require_realtime,
-        each_cycle: None,
+        each_cycle: metrics
+            .clone()
+            .map(|metrics| -> EachCycle { Box::new(move |cycle| metrics.cycle(cycle)) }),
         fault_injector: fault_injector.clone(),
         if_owned: ownership::if_owned(arguments.take_over),
+        sources,
     };
-    let notify = notices(&bar, Machine::of(&config));
+    let notify = notices(&bar, Machine::of(&config), metrics.clone());
+    let notifier = Arc::new(Mutex::new(Notifier::of_environment(&Machine::of(&config))));
     let mut watcher = Watcher {
         throttled_bar: ThrottledBar::new(bar.clone(), Machine::of(&config)),
         full_queues: FullQueues::new(&config),
@@ -138,63 +171,99 @@ pub fn run(arguments: Arguments) -> Exit {
         fault_events: FaultEvents::default(),
         signals,
         bar: bar.clone(),
+        metrics,
+        notifier: Arc::clone(&notifier),
     };
-    let session = match &arguments.serve {
-        None => {
-            let session = session::run(&config, options, notify, |snapshot, progress| {
-                watcher.watch(snapshot, &progress)
-            });
-            watcher.tell();
-            session.map_err(|error| NoSession::from(StartFailure::from(error)))
-        }
-        Some(name) => served(&config, options, notify, watcher, (name, serve_options)),
+    let session = if arguments.serve.is_none() && listening.is_none() {
+        let session =
+            session::run(&config, options, notify, |snapshot, progress| watcher.watch(snapshot, &progress));
+        watcher.tell();
+        session.map_err(|error| NoSession::from(StartFailure::from(error)))
+    } else {
+        let serve = arguments.serve.as_deref().map(|name| (name, serve_options));
+        offered(&config, options, notify, watcher, (serve, listening))
     };
+    tell_manager(&notifier, Notifier::stop);
     bar.finish_and_clear();
     match session {
         Ok(session) => report(&config, &session, arguments.json),
-        Err(NoSession::NotStarted(StartFailure::NotEnabled(session))) => {
-            report(&config, &session, arguments.json)
-        }
-        Err(NoSession::NotStarted(StartFailure::Session(error))) => refuse(&error, arguments.json),
-        Err(NoSession::NotStarted(error)) => {
+        Err(NoSession::Start(StartFailure::NotEnabled(session))) => report(&config, &session, arguments.json),
+        Err(NoSession::Start(StartFailure::Session(error))) => refuse(&error, arguments.json),
+        Err(NoSession::Start(error)) => {
             say!("takt: {error}");
             Exit::Stopped
         }
-        Err(NoSession::NotServed(error)) => UsageError::from(error.to_string()).print(arguments.json),
+        Err(NoSession::Serve(error)) => UsageError::from(error.to_string()).print(arguments.json),
+        Err(NoSession::Show(error)) => UsageError::from(error.to_string()).print(arguments.json),
+    }
+}
+
+/// Begins to answer scrapers.
+fn answer_at(address: SocketAddr, metrics: &Arc<Metrics>) -> Result<metrics::Server, UsageError> {
+    let (server, bound) = metrics
+        .serve(address)
+        .map_err(|error| format!("the metrics cannot be served at {address}: {error}"))?;
+    if !bound.ip().is_loopback() {
+        say!("takt: whoever reaches {bound} can read the metrics");
+    }
+    say!("takt: metrics at http://{bound}/metrics");
+    Ok(server)
+}
+
+/// Tells the service manager, if there is one.
+fn tell_manager(notifier: &Mutex<Option<Notifier>>, tell: impl FnOnce(&mut Notifier)) {
+    // A panic of another holder of the lock leaves what was told.
+    if let Some(notifier) = notifier.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+        tell(notifier);
     }
 }
 
 /// Why a run has no result.
 enum NoSession {
-    NotStarted(StartFailure),
-    NotServed(ServeError),
+    Start(StartFailure),
+    Serve(ServeError),
+    Show(PanelError),
 }
 
 impl From<StartFailure> for NoSession {
     fn from(error: StartFailure) -> Self {
-        Self::NotStarted(error)
+        Self::Start(error)
     }
 }
 
-/// Serves the controller until it is interrupted.
-fn served(
+/// Offers the controller to other processes, and in the browser, until it is interrupted.
+fn offered(
     config: &Config,
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
     mut watcher: Watcher,
-    (name, serve_options): (&str, ServeOptions),
+    (serve, listening): (Option<(&str, ServeOptions)>, Option<Listening>),
 ) -> Result<Session, NoSession> {
     let bar = watcher.bar.clone();
     let watch = move |snapshot: &Snapshot, progress| watcher.watch(snapshot, &progress);
     let controller = Controller::start_watched(config.clone(), options, notify, watch)?;
-    let _server = match serve::serve(controller.handle(), name, serve_options) {
-        Ok(server) => server,
-        Err(error) => {
+    let server = serve
+        .as_ref()
+        .map(|(name, options)| serve::serve(controller.handle(), name, options.clone()))
+        .transpose();
+    let panel = listening.map(|listening| listening.show(controller.handle(), None)).transpose();
+    let (_server, panel) = match (server, panel) {
+        (Ok(server), Ok(panel)) => (server, panel),
+        (Err(error), _) => {
             controller.finish()?;
-            return Err(NoSession::NotServed(error));
+            return Err(NoSession::Serve(error));
+        }
+        (_, Err(error)) => {
+            controller.finish()?;
+            return Err(NoSession::Show(error));
         }
     };
-    bar.suspend(|| say!("takt: served by the name {name}, until Ctrl-C"));
+    if let Some((name, _)) = serve {
+        bar.suspend(|| say!("takt: served by the name {name}, until Ctrl-C"));
+    }
+    if let Some(panel) = &panel {
+        bar.suspend(|| say!("takt: {}", panel::greeting(panel.address())));
+    }
     Ok(controller.ended()?)
 }
 
@@ -211,11 +280,18 @@ struct Watcher {
     fault_events: FaultEvents,
     signals: Signals,
     bar: ProgressBar,
+    metrics: Option<Arc<Metrics>>,
+    notifier: Arc<Mutex<Option<Notifier>>>,
 }
 
 impl Watcher {
     fn watch(&mut self, snapshot: &Snapshot, progress: &Progress) -> Option<Interrupt> {
-        self.throttled_bar.show(progress, snapshot);
+        if self.throttled_bar.show(progress, snapshot)
+            && let Some(metrics) = &self.metrics
+        {
+            metrics.state(snapshot);
+        }
+        tell_manager(&self.notifier, |notifier| notifier.look(now_ns(), snapshot, progress));
         let Self { full_queues, bar, .. } = self;
         full_queues.poll(snapshot).for_each(|hint| bar.suspend(|| say!("takt: {hint}")));
         self.tell();
@@ -289,7 +365,7 @@ fn report(config: &Config, session: &Session, as_json: bool) -> Exit {
     let report = RunReport::new(&session.log, &outcome);
     let named: Vec<&Axis> = session.unreached.iter().filter_map(|axis| config.axes.get(*axis)).collect();
     let (on_line, on_bus): (Vec<&Axis>, Vec<&Axis>) =
-        named.iter().partition(|axis| axis.drive.is_on_serial_line);
+        named.iter().partition(|axis| axis.drive.protocol.is_of_serial_line());
     let unreached: Vec<&str> = named.iter().map(|axis| axis.name.as_str()).collect();
     let on_bus: Vec<&str> = on_bus.iter().map(|axis| axis.name.as_str()).collect();
     if !on_bus.is_empty() {
@@ -438,9 +514,10 @@ impl ThrottledBar {
         Self { bar, machine, last: None }
     }
 
-    fn show(&mut self, progress: &Progress, snapshot: &Snapshot) {
+    /// Returns whether it was time for it.
+    fn show(&mut self, progress: &Progress, snapshot: &Snapshot) -> bool {
         if self.last.as_ref().is_some_and(|(at, _)| at.elapsed() < Self::INTERVAL) {
-            return;
+            return false;
         }
         if let Some(fraction) = progress.fraction {
             self.bar.set_position((fraction * BAR_STEPS as f64) as u64);
@@ -449,6 +526,7 @@ impl ThrottledBar {
             words::silence(snapshot, &self.machine).map_or(String::new(), |text| format!("; {text}"));
         self.bar.set_message(format!("{}{silence}", progress.what));
         self.last = Some((Instant::now(), progress.clone()));
+        true
     }
 }
 
@@ -458,9 +536,16 @@ fn is_urgent(event: &Event) -> bool {
 }
 
 /// Prints messages that must not wait for the end of the run.
-fn notices(bar: &ProgressBar, machine: Machine) -> Box<dyn FnMut(&Notice) + Send> {
+fn notices(
+    bar: &ProgressBar,
+    machine: Machine,
+    metrics: Option<Arc<Metrics>>,
+) -> Box<dyn FnMut(&Notice) + Send> {
     let bar = bar.clone();
     Box::new(move |notice| {
+        if let (Notice::Event(event), Some(metrics)) = (notice, &metrics) {
+            metrics.event(event);
+        }
         let text = match notice {
             Notice::NotWritten(text) => format!("takt: {text}"),
             Notice::Event(event) if is_urgent(event) => words::event(event, &machine),

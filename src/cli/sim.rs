@@ -21,6 +21,7 @@ use crate::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
 use crate::link::{OpenError, RealInterface, SocketCanOptions};
 use crate::sim::LiveDrives;
 use crate::sim::line_faults::LineFault;
+use crate::sim::serial_device::SerialDeviceKind;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -29,7 +30,6 @@ use super::lss::SimulatedDevice;
 use super::usage_error::UsageError;
 use adapters::AdapterLink;
 use data_sheet::DataSheetArguments;
-use serial::SerialKind;
 use serial_line::LineDrives;
 
 /// Put the drives of a configuration, simulated, on real interfaces or pseudo-terminals, for any master to talk to.
@@ -48,12 +48,13 @@ pub struct Arguments {
     /// path has a second name, which you choose. Needs no root and no CAN support in the kernel.
     #[arg(long = "pty", value_name = "[BUS=]LINK", num_args = 0..=1, default_missing_value = "")]
     adapters: Vec<AdapterLink>,
-    /// Simulate what is on a serial line instead, on a pseudo-terminal: FAMILY:ADDRESS[,ADDRESS…], or a device of the hollow-shaft motors
-    ///
-    /// Devices: hollow-rs485 (the RS-485 module with motors 1 to 4), hollow-modbus (the same in its Modbus mode), hollow-console,
-    /// hollow-encoder, hollow-pulse. Any master opens the line as it would
-    /// open /dev/ttyUSB0; --pty LINK gives it a second name.
-    #[arg(long, value_name = "DRIVES", conflicts_with_all = ["config", "buses", "lss_devices", "sheet"])]
+    /// Simulate what is on a serial line instead, on a pseudo-terminal: FAMILY:ADDRESS[,ADDRESS…], or a device
+    #[arg(
+        long,
+        value_name = "DRIVES",
+        conflicts_with_all = ["config", "buses", "lss_devices", "sheet"],
+        long_help = serial::help()
+    )]
     serial: Option<OnSerialLine>,
     /// Give the line of such a device a fault: disturbed=N (a wrong bit in each Nth byte), silent=S (nothing from S seconds after the first byte)
     #[arg(long = "line-fault", value_name = "FAULT", requires = "serial")]
@@ -73,7 +74,7 @@ enum OnSerialLine {
     /// Drives of a family.
     Drives(LineDrives),
     /// Another device.
-    Device(SerialKind),
+    Device(&'static SerialDeviceKind),
 }
 
 impl FromStr for OnSerialLine {
@@ -83,7 +84,7 @@ impl FromStr for OnSerialLine {
         if text.contains(':') {
             text.parse().map(Self::Drives)
         } else {
-            SerialKind::named(text).map(Self::Device)
+            serial::named(text).map(Self::Device)
         }
     }
 }
@@ -112,7 +113,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     match &arguments.serial {
         Some(OnSerialLine::Drives(drives)) => return serial_line::host(drives, &arguments.adapters),
         Some(OnSerialLine::Device(kind)) => {
-            return serial::run(*kind, &arguments.line_faults, &arguments.adapters);
+            return serial::run(kind, &arguments.line_faults, &arguments.adapters);
         }
         None => {}
     }

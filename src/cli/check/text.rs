@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::config::{Bus, Config};
+use crate::config::{Bus, Config, LimitOrigin};
 use crate::printable::printable_path;
 use crate::schedule::text::{message_name, microseconds, narrow, remedy, reserve, shortfall, sums};
 use crate::schedule::{BusSchedule, MessageSchedule};
@@ -15,12 +15,13 @@ use crate::cli::table::{Table, UNBROKEN};
 /// The whole text: the verdict first, then what is doubtful, then the tables.
 pub fn whole(check: &Check, config: &Config) -> String {
     let summary = format!(
-        "{} on {}, a cycle of {} with the command phase at {} µs{}",
+        "{} on {}, a cycle of {} with the command phase at {} µs{}{}",
         counted(check.axes.len(), "axis", "axes"),
         counted(check.buses.len(), "bus", "buses"),
         time(check.cycle_ns),
         microseconds(check.command_phase_ns),
         automatic(check),
+        send_phase(check),
     );
     let mut text = paragraph(&format!("{}: {}", check.name, verdict(check)), 0);
     let _ = writeln!(text, "\n{}", paragraph(&summary, 0));
@@ -32,6 +33,9 @@ pub fn whole(check: &Check, config: &Config) -> String {
     let axes = alike(&check.axes, is_shown_alike);
     let _ = write!(text, "\nAxes\n{}", axes_table(&axes));
     let _ = write!(text, "\nLimits\n{}", limits_table(&axes));
+    if let Some(table) = urdf_table(&check.axes) {
+        let _ = write!(text, "\nLimits of the robot description\n{table}");
+    }
     if let Some(table) = modes_table(&axes) {
         let _ = write!(text, "\nModes of operation\n{table}");
     }
@@ -138,6 +142,11 @@ fn automatic(check: &Check) -> String {
     }
 }
 
+fn send_phase(check: &Check) -> String {
+    let sent = |phase_ns| format!(", set-points held until {} µs", microseconds(phase_ns));
+    check.send_phase_ns.map(sent).unwrap_or_default()
+}
+
 /// The elements that follow each other and are alike.
 fn alike<T>(elements: &[T], are_alike: impl Fn(&T, &T) -> bool) -> Vec<&[T]> {
     elements.chunk_by(are_alike).collect()
@@ -161,8 +170,13 @@ fn counted_span<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
 }
 
 fn is_shown_alike(first: &AxisCheck, second: &AxisCheck) -> bool {
-    let anonymous =
-        |axis: &AxisCheck| AxisCheck { name: String::new(), bus: String::new(), node: 0, ..axis.clone() };
+    let anonymous = |axis: &AxisCheck| AxisCheck {
+        name: String::new(),
+        bus: String::new(),
+        node: 0,
+        urdf: None,
+        ..axis.clone()
+    };
     anonymous(first) == anonymous(second)
 }
 
@@ -214,6 +228,31 @@ fn limits_table(axes: &[&[AxisCheck]]) -> Table {
         ]);
     }
     table
+}
+
+/// Where the limits of each axis come from that has a joint in a robot description; `None` without one.
+fn urdf_table(axes: &[AxisCheck]) -> Option<Table> {
+    let mut table = Table::new(["axis", "joint", "position", "velocity", "torque", "file"]);
+    let described: Vec<_> = axes.iter().filter_map(|axis| Some((axis, axis.urdf.as_ref()?))).collect();
+    for (axis, urdf) in &described {
+        let from = |origin| {
+            match origin {
+                LimitOrigin::Configuration => "here",
+                LimitOrigin::Limit => "limit",
+                LimitOrigin::SafetyController => "soft limit",
+            }
+            .to_owned()
+        };
+        table.row([
+            axis.name.clone(),
+            urdf.joint.clone(),
+            from(urdf.position),
+            from(urdf.velocity),
+            from(urdf.torque),
+            printable_path(&urdf.file),
+        ]);
+    }
+    (!described.is_empty()).then_some(table)
 }
 
 /// The axes of which a stream may want a torque, an impedance, or a torque that is fed forward; `None` without one.

@@ -3,6 +3,7 @@
 use std::sync::atomic::Ordering;
 
 use crate::commission::bus_session::SessionEvent;
+use crate::commission::line_session::{self, LineEvent};
 use crate::commission::{DriveTask, Failure, ProcedureError, Report, TargetDrive, Task};
 use crate::link::modbus_line::ModbusLine;
 use crate::link::serial_line::SerialSettings;
@@ -24,7 +25,7 @@ pub fn run(
 ) -> Result<Result<Report, ProcedureError>, Exit> {
     let Line { device, bit_rate } = line;
     let refused = |failure| Ok(Err(ProcedureError { step: "command line", failure }));
-    let DriveTask { mut procedure, mut words } =
+    let DriveTask { procedure, mut words } =
         match target.family().commission_on_line(target.clone(), task, *bit_rate) {
             Some(Ok(task)) => task,
             Some(Err(failure)) => return refused(failure),
@@ -45,41 +46,24 @@ pub fn run(
             return Err(Exit::Stopped);
         }
     };
-    let mut show = |at_ns, direction: char, bytes: &Vec<u8>| {
-        if options.verbose && !bytes.is_empty() {
+    let see = |at_ns, event: LineEvent<'_>| {
+        let (direction, bytes) = match event {
+            LineEvent::Procedure(event) => {
+                // When the readings can no longer be printed, the procedure ends as after Ctrl-C.
+                let is_shown = output.see(at_ns, SessionEvent::Procedure(event.clone()));
+                interrupted.fetch_or(!is_shown, Ordering::Relaxed);
+                return;
+            }
+            LineEvent::Sent(bytes) => ('>', bytes),
+            LineEvent::Received(bytes) => ('<', bytes),
+        };
+        if options.verbose {
             say!("{:9.3} {direction} {bytes:02X?}  {}", at_ns as f64 * 1e-9, words(bytes));
         }
     };
-    let broken = |error: &dyn std::fmt::Display| {
+    let is_interrupted = || interrupted.swap(false, Ordering::Relaxed);
+    line_session::run(procedure, &mut line, is_interrupted, see).or_else(|error| {
         let failure = Failure::Request { what: error.to_string(), cure: None };
         Ok(Err(ProcedureError { step: "serial line", failure }))
-    };
-    loop {
-        let received = match line.read() {
-            Ok(received) => received,
-            Err(error) => return broken(&error),
-        };
-        let at_ns = line.now_ns();
-        show(at_ns, '<', &received);
-        procedure.receive(&received);
-        // When the readings can no longer be printed, the procedure ends as after Ctrl-C.
-        if interrupted.swap(false, Ordering::Relaxed) {
-            procedure.interrupt();
-        }
-        let mut sending = vec![];
-        procedure.poll(at_ns, &mut |bytes| sending.push(bytes));
-        while let Some(event) = procedure.take_event() {
-            let is_shown = output.see(at_ns, SessionEvent::Procedure(event));
-            interrupted.fetch_or(!is_shown, Ordering::Relaxed);
-        }
-        for bytes in sending {
-            show(at_ns, '>', &bytes);
-            if let Err(error) = line.write(&bytes) {
-                return broken(&error);
-            }
-        }
-        if let Some(outcome) = procedure.outcome() {
-            return Ok(outcome.clone());
-        }
-    }
+    })
 }

@@ -94,6 +94,7 @@ impl Output {
                 }
             }
             SessionEvent::Procedure(ProcedureEvent::Note(text)) => self.hint(&text),
+            SessionEvent::Procedure(ProcedureEvent::Progress { .. }) => {}
             SessionEvent::Procedure(ProcedureEvent::Reading(reading)) => self.read(at_ns, &reading),
             SessionEvent::Sent(frame) => self.frame(at_ns, '>', &frame),
             SessionEvent::Received(frame) => self.frame(at_ns, '<', &frame),
@@ -139,7 +140,7 @@ impl Output {
         json!({
             "time_s": at_ns as f64 / 1e9, "position": reading.position,
             "position_counts": reading.position_counts, "velocity": reading.velocity,
-            "torque": reading.torque, "current_a": reading.current_a,
+            "torque": reading.torque, "current_a": reading.current_a, "temperature_c": reading.temperature_c,
             "statusword": reading.statusword, "state": reading.state,
         })
     }
@@ -153,6 +154,9 @@ impl Output {
         }
         if let Some(current) = reading.current_a {
             words = format!("{words}  {current:>8.3} A");
+        }
+        if let Some(temperature) = reading.temperature_c {
+            words = format!("{words}  {temperature:>4.0} °C");
         }
         let statusword = reading.statusword.map_or_else(String::new, |word| format!("0x{word:04X} "));
         format!("{words}  {statusword}{}", reading.state)

@@ -34,8 +34,6 @@ fn families_without_lss() -> String {
 
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
-/// A bus cannot have more devices than there are node IDs.
-const MOST_DEVICES: usize = 127;
 
 /// Give devices their node ID and bit rate by their identity (LSS, CiA 305)
 ///
@@ -250,22 +248,10 @@ fn act<P: BusPort, C: Clock>(
     match arguments.action {
         Action::Wait => return Ok(()),
         Action::Scan => {
-            let devices = report.devices.insert(vec![]);
-            let mut last = None;
-            while devices.len() < MOST_DEVICES {
-                match settings.scan(last) {
-                    Ok(Some(address)) => {
-                        devices.push(Device::from(address));
-                        last = Some(address);
-                    }
-                    Ok(None) => break,
-                    Err(LayerSettingFailure::Implausible(identity)) => {
-                        report.remark = Some(identity.to_string());
-                        break;
-                    }
-                    Err(failure) => return Err(failure),
-                }
-            }
+            let mut found = vec![];
+            let outcome = settings.scan_all(&mut found);
+            report.devices = Some(found.into_iter().map(Device::from).collect());
+            report.remark = outcome?.map(|identity| identity.to_string());
             return Ok(());
         }
         Action::Inquire => {

@@ -8,6 +8,7 @@ use takt_rt::{BusPort, BusState, Clock, Frame, Nanoseconds, ReceiveBatch};
 
 use super::DriveOptions;
 use super::session::Session;
+use crate::cli::ownership;
 use crate::cli::usage_error::UsageError;
 use crate::config::Interface;
 use crate::link::{InterfaceSettings, LinkPort, RealInterface, SocketCanOptions, open_to_listen};
@@ -58,7 +59,8 @@ pub fn open(
             receive_frames: RECEIVE_FRAMES,
             ..SocketCanOptions::default()
         };
-        let port = open_to_listen(&name, &real, &settings, &socket).map_err(|error| error.to_string())?;
+        let port =
+            open_to_listen(&name, &real, &settings, &socket).map_err(|error| ownership::not_heard(&error))?;
         let number = session.add_bus(&name, number);
         buses.push(OpenBus { number, port, state: BusState::default() });
     }

@@ -1,0 +1,145 @@
+// The connection with takt: a stream of states, and commands. What is moved by this page ends when the stream does.
+
+const CONFIRM_EVERY_MS = 300;
+const SILENT_AFTER_MS = 3000;
+const AGAIN_AFTER_MS = 1000;
+
+export class Connection {
+  #token = sessionStorage.getItem("takt.token");
+  #key = null;
+  #number = 0;
+  #confirmedAt = 0;
+  #heardAt = 0;
+  #abort = null;
+  #handlers;
+  page = null;
+  machine = null;
+
+  // `handlers`: open(machine), state, event, problem, lost(why), token().
+  constructor(handlers) {
+    this.#handlers = handlers;
+    setInterval(() => {
+      if (this.#key && performance.now() - this.#heardAt > SILENT_AFTER_MS) this.#abort?.abort();
+    }, 250);
+    // A browser allows few connections to one server: a page that nobody sees gives its own back.
+    document.addEventListener("visibilitychange", () => {
+      if (document.hidden) this.#abort?.abort();
+    });
+    this.#keepOpen();
+  }
+
+  get isOpen() {
+    return this.#key !== null;
+  }
+
+  set token(token) {
+    this.#token = token;
+    sessionStorage.setItem("takt.token", token);
+  }
+
+  #headers(more) {
+    const headers = { "X-Takt-Panel": "1", ...more };
+    if (this.#token) headers.Authorization = `Bearer ${this.#token}`;
+    if (this.#key) headers["X-Takt-Page"] = this.#key;
+    return headers;
+  }
+
+  async #keepOpen() {
+    for (;;) {
+      if (document.hidden) {
+        await new Promise((seen) => document.addEventListener("visibilitychange", seen, { once: true }));
+        continue;
+      }
+      const why = await this.#open();
+      this.#key = null;
+      this.page = null;
+      this.#handlers.lost(why);
+      if (why === "token") await this.#handlers.token();
+      else await new Promise((again) => setTimeout(again, AGAIN_AFTER_MS));
+    }
+  }
+
+  // Reads the stream to its end; returns why it has ended.
+  async #open() {
+    this.#abort = new AbortController();
+    const signal = this.#abort.signal;
+    try {
+      const machine = await fetch("/api/machine", { headers: this.#headers(), signal });
+      if (machine.status === 401) return "token";
+      if (!machine.ok) return "lost";
+      this.machine = await machine.json();
+      const states = await fetch("/api/states", { headers: this.#headers(), signal });
+      if (states.status === 401) return "token";
+      if (states.status === 503) return "too_many_pages";
+      if (!states.ok) return "lost";
+      return await this.#read(states.body.getReader());
+    } catch {
+      return "lost";
+    }
+  }
+
+  async #read(reader) {
+    const decoder = new TextDecoder();
+    let text = "";
+    let why = "lost";
+    this.#heardAt = performance.now();
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return why;
+      this.#heardAt = performance.now();
+      text += decoder.decode(value, { stream: true });
+      const messages = text.split("\n\n");
+      text = messages.pop();
+      for (const message of messages) {
+        const [, name, data] = /^event: (\w+)\ndata: (.*)$/.exec(message) ?? [];
+        if (name && this.#message(name, JSON.parse(data)) === "ended") why = "ended";
+      }
+    }
+  }
+
+  #message(name, value) {
+    if (name === "page") {
+      this.#key = value.key;
+      this.page = value.number;
+      this.#number = 0;
+      this.#handlers.open(this.machine);
+    } else {
+      this.#handlers[name]?.(value);
+    }
+    if (name !== "state") return "";
+    const now = performance.now();
+    if (now - this.#confirmedAt > CONFIRM_EVERY_MS) {
+      this.#confirmedAt = now;
+      this.#post("/api/confirm", null).catch(() => {});
+    }
+    return value.has_ended ? "ended" : "";
+  }
+
+  async #post(path, value) {
+    const headers = this.#headers(value === null ? {} : { "Content-Type": "application/json" });
+    const body = value === null ? undefined : JSON.stringify(value);
+    let answer;
+    try {
+      answer = await fetch(path, { method: "POST", headers, body, keepalive: true });
+    } catch {
+      throw { error: "unreachable", words: "" };
+    }
+    const told = await answer.json().catch(() => ({}));
+    if (!answer.ok) throw { error: told.error ?? "unreachable", words: told.words ?? `HTTP ${answer.status}` };
+  }
+
+  // Each of these throws { error, words } when it is refused.
+  command(command) {
+    this.#number += 1;
+    return this.#post("/api/command", { number: this.#number, command });
+  }
+
+  control(what) {
+    return this.#post("/api/control", { do: what });
+  }
+
+  stop(category, group = null) {
+    this.#number += 1;
+    return this.#post("/api/stop", { category, group, number: this.#number });
+  }
+}

@@ -1,0 +1,266 @@
+// Every text of the page, in English and Chinese: one row a text. {0} and {1} are filled in.
+
+export const TEXTS = {
+  connecting: ["Connecting …", "正在连接…"],
+  live: ["Live", "实时"],
+  lost: ["Connection lost: nothing is moved by this page", "连接已断开：本页面不再驱动任何轴"],
+  ended: ["The controller has ended", "控制器已结束"],
+  too_many_pages: ["Too many pages are open; close one of them", "打开的页面过多，请关闭其中一个"],
+  stop: ["STOP", "停止"],
+  stop_keys: ["Esc or Space", "Esc 或空格键"],
+  stop_label: ["Stop all axes in control, then remove power. Escape or Space does the same.", "所有轴受控停止，然后断开动力。按 Esc 或空格键效果相同。"],
+  stopped_all: ["Stop sent to all axes", "已向所有轴发送停止"],
+  stop_not_sent: ["The stop could NOT be sent. Use the emergency stop.", "停止指令未能发送！请使用急停按钮。"],
+  not_an_emergency_stop: ["The stop of this page is not an emergency stop (ISO 13850). Keep a hardware one within reach.", "本页面的停止不是急停（ISO 13850）。请保证硬件急停触手可及。"],
+  switch_unit: ["Switch between degrees and radians", "切换角度与弧度"],
+  switch_language: ["切换到中文", "Switch to English"],
+  command: ["Command", "控制权"],
+  you_command: ["This page ({0}) commands. {1} open.", "本页面（{0}）拥有控制权，共打开 {1} 个页面。"],
+  other_commands: ["Page {0} commands. This is page {1}.", "页面 {0} 拥有控制权，本页面为 {1}。"],
+  nobody_commands: ["No page commands. Everyone may stop.", "当前没有页面拥有控制权。任何页面都可以停止。"],
+  take: ["Take command", "获取控制权"],
+  take_over: ["Take over", "接管"],
+  take_over_sure: ["Page {0} commands at present. What it moves comes to rest. Take over?", "页面 {0} 正在控制，其运动将停下。确定接管吗？"],
+  take_lease: ["Take over from the other program", "从其他程序接管"],
+  release: ["Give command back", "交还控制权"],
+  cancel: ["Cancel", "取消"],
+  all_axes: ["All axes", "所有轴"],
+  enable: ["Enable", "使能"],
+  disable: ["Disable", "去使能"],
+  halt: ["Come to rest", "停稳"],
+  clear_fault: ["Clear fault", "清除故障"],
+  axes: ["Axes", "轴"],
+  motion: ["Motion", "运动"],
+  plots: ["Plots", "曲线"],
+  pause: ["Pause", "暂停"],
+  resume: ["Go on", "继续"],
+  events: ["Events", "事件"],
+  clear_list: ["Clear the list", "清空列表"],
+  timing_and_buses: ["Timing and buses", "定时与总线"],
+  histogram: ["When in its slot the cycle was complete, µs after the earliest (20 samples a second)", "周期在时隙内的完成时刻，相对最早值的微秒数（每秒 20 个样本）"],
+  histogram_of: ["{0} samples, half of them within {1} µs, the latest {2} µs", "{0} 个样本，一半在 {1} µs 以内，最晚 {2} µs"],
+  cycle: ["Cycle", "周期"],
+  missed_slots: ["Missed slots", "错过的时隙"],
+  timing: ["Timing", "定时"],
+  timing_normal: ["normal", "正常"],
+  timing_warning: ["slots missed often", "常错过时隙"],
+  timing_degraded: ["too late to stream", "延迟过大，不可流式"],
+  timing_unfit: ["unfit", "不合格"],
+  rejected: ["Rejected requests", "被拒绝的请求"],
+  dropped: ["Dropped records", "丢弃的记录"],
+  load: ["Load", "负载"],
+  sent: ["Sent", "已发送"],
+  received: ["Received", "已接收"],
+  errors: ["Errors", "错误"],
+  overruns: ["Overruns", "溢出"],
+  bus_error_active: ["works", "正常"],
+  bus_error_passive: ["error-passive", "被动错误"],
+  bus_bus_off: ["bus-off", "总线关闭"],
+  bus_down: ["down", "接口断开"],
+  position: ["Position", "位置"],
+  velocity: ["Velocity", "速度"],
+  following_error_short: ["Following error", "跟随误差"],
+  torque: ["Torque", "转矩"],
+  temperature: ["Temperature", "温度"],
+  current: ["Current", "电流"],
+  position_bar: ["{0} of {1} to {2}", "{0}，范围 {1} 至 {2}"],
+  no_feedback: ["no feedback yet", "尚无反馈"],
+  stale: ["feedback is {0} ms old", "反馈已过去 {0} ms"],
+  choose_axis: ["Axis", "轴"],
+  choose: ["Command {0}", "控制 {0}"],
+  tab_absolute: ["Absolute", "绝对"],
+  tab_relative: ["Relative", "相对"],
+  tab_reciprocating: ["Reciprocating", "往复"],
+  tab_continuous: ["Continuous", "连续"],
+  tab_torque: ["Torque", "转矩"],
+  tab_jog: ["Jog", "点动"],
+  tab_group: ["Whole group", "整组"],
+  tab_mode: ["Mode", "模式"],
+  tabs: ["Kinds of motion", "运动方式"],
+  target: ["Target", "目标"],
+  distance: ["Distance", "距离"],
+  from: ["From", "从"],
+  to: ["To", "到"],
+  speed_part: ["Speed, % of the limit", "速度（限值的 %）"],
+  acceleration_part: ["Acceleration, % of the limit", "加速度（限值的 %）"],
+  speed: ["Speed", "速度"],
+  move: ["Move", "运动"],
+  backwards: ["Backwards", "后退"],
+  forwards: ["Forwards", "前进"],
+  start: ["Start", "启动"],
+  end: ["End", "结束"],
+  change_mode: ["Change the mode", "更改模式"],
+  mode_words: ["Only modes that the configuration allows (`modes`) are taken. Most drives must be disabled first.", "仅接受配置（modes）允许的模式。多数驱动器须先去使能。"],
+  jog_minus: ["◀ − Hold", "◀ − 按住"],
+  jog_plus: ["+ Hold ▶", "+ 按住 ▶"],
+  jog_words: ["Moves while held: a button, or the keys ← and → . Letting go, leaving the page or losing the connection brings the axis to rest.", "按住时运动：按钮或 ←、→ 键。松开、离开页面或断开连接时轴即停稳。"],
+  continuous_words: ["Goes on until End, a stop, or the position limit, while this page is open.", "在页面打开期间持续运动，直到“结束”、停止或位置限位。"],
+  needs_command: ["Take command first.", "请先获取控制权。"],
+  needs_enabled: ["Enable the axes first.", "请先使能。"],
+  needs_clear: ["Clear the fault first.", "请先清除故障。"],
+  not_a_number: ["{0} is not a number", "{0} 不是数字"],
+  outside: ["{0} is outside {1} to {2}", "{0} 超出范围 {1} 至 {2}"],
+  token: ["Token", "令牌"],
+  token_title: ["This panel needs a token", "此面板需要令牌"],
+  token_words: ["It is in the file that takt was started with (--panel-token).", "令牌位于启动 takt 时指定的文件中（--panel-token）。"],
+  open: ["Open", "打开"],
+  fault_of: ["Fault: {0}", "故障：{0}"],
+  drive_error: ["The drive of {0} shows an error", "{0} 的驱动器报告错误"],
+  try_this: ["Try: {0}", "建议：{0}"],
+  version: ["takt {0}", "takt {0}"],
+  plot_label: ["{0} of {1} in the last {2} s: {3}", "{1} 的{0}，最近 {2} 秒：{3}"],
+  set_point: ["set-point", "设定值"],
+  actual: ["actual", "实际值"],
+
+  error_not_commander: ["This page does not command.", "本页面没有控制权。"],
+  error_not_present: ["States do not reach this page at present, so it moves nothing.", "状态数据暂未到达本页面，因此不能驱动。"],
+  error_not_open: ["The connection of this page is lost.", "本页面的连接已断开。"],
+  error_too_often: ["Too many commands in too short a time.", "指令过于频繁。"],
+  error_overtaken: ["A later command has overtaken this one.", "该指令已被后来的指令取代。"],
+  error_discarded: ["A stop has discarded the command.", "停止已取消该指令。"],
+  error_nothing_to_renew: ["The motion has ended.", "该运动已结束。"],
+  error_busy: ["Too many commands wait for the controller.", "等待控制器的指令过多。"],
+  error_lease: ["Another program commands this controller.", "另一个程序正在控制。"],
+  error_refused: ["Refused.", "被拒绝。"],
+  error_ended: ["The controller has ended.", "控制器已结束。"],
+  error_unreachable: ["takt does not answer.", "takt 没有响应。"],
+  error_token: ["The token is missing or wrong.", "令牌缺失或错误。"],
+
+  phase_passive: ["passive", "被动"],
+  phase_disabled: ["disabled", "未使能"],
+  phase_enabling: ["enabling", "正在使能"],
+  phase_holding: ["holding", "保持"],
+  phase_moving: ["moving", "运动中"],
+  phase_streaming: ["following points", "跟随点流"],
+  phase_stopping: ["stopping", "正在停止"],
+  phase_disabling: ["disabling", "正在去使能"],
+
+  drive_not_ready_to_switch_on: ["not ready to switch on", "未准备好"],
+  drive_switch_on_disabled: ["switch on disabled", "禁止接通"],
+  drive_ready_to_switch_on: ["ready to switch on", "准备接通"],
+  drive_switched_on: ["switched on", "已接通"],
+  drive_operation_enabled: ["operation enabled", "运行使能"],
+  drive_quick_stop_active: ["quick stop active", "快速停止中"],
+  drive_fault_reaction_active: ["fault reaction active", "故障反应中"],
+  drive_fault: ["fault", "故障"],
+  drive_no_state_of_cia_402: ["no state of CiA 402", "非 CiA 402 状态"],
+
+  mode_0: ["no mode", "无模式"],
+  mode_1: ["profile position (PP)", "轮廓位置 (PP)"],
+  mode_2: ["velocity (VL)", "速度 (VL)"],
+  mode_3: ["profile velocity (PV)", "轮廓速度 (PV)"],
+  mode_4: ["profile torque (PT)", "轮廓转矩 (PT)"],
+  mode_6: ["homing (HM)", "回零 (HM)"],
+  mode_7: ["interpolated position (IP)", "插补位置 (IP)"],
+  mode_8: ["cyclic position (CSP)", "周期同步位置 (CSP)"],
+  mode_9: ["cyclic velocity (CSV)", "周期同步速度 (CSV)"],
+  mode_10: ["cyclic torque (CST)", "周期同步转矩 (CST)"],
+
+  rule_not_finite: ["A set-point was not a number", "设定值不是有限数"],
+  rule_position_limit: ["Beyond a position limit", "超出位置限值"],
+  rule_velocity_limit: ["Beyond the velocity limit", "超出速度限值"],
+  rule_acceleration_limit: ["Beyond the acceleration limit", "超出加速度限值"],
+  rule_following_error: ["Following error too large", "跟随误差过大"],
+  rule_stale_command: ["A command expired", "指令过期"],
+  rule_missed_feedback: ["A drive did not report", "驱动器未上报"],
+  rule_drive_fault: ["A drive reports a fault", "驱动器报告故障"],
+  rule_drive_disabled: ["A drive disabled itself", "驱动器自行去使能"],
+  rule_mode_changed: ["A drive left its mode", "驱动器改变了模式"],
+  rule_enable_timeout: ["A drive could not be enabled in time", "驱动器未能及时使能"],
+  rule_no_trajectory: ["No trajectory leads there", "没有可行轨迹"],
+  rule_bus_lost: ["The bus is lost", "总线丢失"],
+  rule_not_transmitted: ["Set-points did not leave", "设定值未发出"],
+  rule_not_acknowledged: ["A target was not acknowledged", "目标未被确认"],
+  rule_node_lost: ["A heartbeat is missing", "心跳丢失"],
+  rule_node_not_operational: ["A node is not operational", "节点未处于运行状态"],
+  rule_unexpected_boot_up: ["A drive started anew", "驱动器意外重启"],
+  rule_emergency_message: ["A drive sent an emergency message", "驱动器发送了紧急报文"],
+  rule_duplicate_node: ["Two nodes have the same ID", "两个节点 ID 相同"],
+  rule_foreign_master: ["Another master sends on the bus", "总线上有其他主站"],
+  rule_timing_unfit: ["The controller misses its slots", "控制器错过时隙"],
+  rule_start_pose: ["A stream began too far away", "点流起点过远"],
+  rule_jerk_limit: ["Beyond the jerk limit", "超出加加速度限值"],
+  rule_bus_error_passive: ["The bus is error-passive", "总线被动错误"],
+  rule_implausible_feedback: ["A reported position is implausible", "反馈位置不合理"],
+  rule_callback_overrun: ["A callback took too long", "回调超时"],
+  rule_callback_panicked: ["A callback panicked", "回调崩溃"],
+  rule_no_torque_in_mode: ["The mode takes no torque", "该模式不接受转矩"],
+  rule_stiffness_limit: ["Beyond the stiffness limit", "超出刚度限值"],
+  rule_damping_limit: ["Beyond the damping limit", "超出阻尼限值"],
+  rule_mode_not_shown: ["A drive did not change its mode", "驱动器未切换模式"],
+
+  cure_not_finite: ["find the division or the missing value in the program that sends set-points", "检查发送设定值的程序中是否有除零或缺失值"],
+  cure_position_limit: ["command a position within the limits; look at `limits.position`", "给出限值内的位置；检查 limits.position"],
+  cure_velocity_limit: ["command less, or look at `limits.velocity`", "降低指令，或检查 limits.velocity"],
+  cure_acceleration_limit: ["command a smoother motion, or look at `limits.acceleration`", "使运动更平滑，或检查 limits.acceleration"],
+  cure_following_error: ["look for an obstacle or a brake that is not released; then clear the fault and move more slowly", "检查障碍物或未松开的制动器；然后清除故障并放慢运动"],
+  cure_stale_command: ["the program that commanded this axis has stopped to renew it; clear the fault and begin again", "控制该轴的程序停止了刷新；清除故障后重新开始"],
+  cure_missed_feedback: ["check the power of the drive, its cable and the termination of the bus", "检查驱动器电源、电缆和总线终端电阻"],
+  cure_drive_fault: ["see the cure of the drive's error; clear the fault when its cause is gone", "参照驱动器错误的处理办法；原因消除后清除故障"],
+  cure_drive_disabled: ["look at the drive's inputs, its supply and its safe torque off", "检查驱动器输入、电源和安全转矩关断 (STO)"],
+  cure_mode_changed: ["no other program may command this drive; clear the fault", "不得有其他程序控制该驱动器；清除故障"],
+  cure_enable_timeout: ["check the drive's supply and its enable input; wait after power-on, then enable again", "检查驱动器电源与使能输入；上电后稍等再使能"],
+  cure_no_trajectory: ["choose a target that the limits allow", "选择限值允许的目标"],
+  cure_bus_lost: ["check the cable, the termination and the interface; clear the fault when the bus works again", "检查电缆、终端电阻和接口；总线恢复后清除故障"],
+  cure_not_transmitted: ["the bus is blocked by other frames or errors; look at its load and its cable", "总线被其他帧或错误阻塞；检查负载与电缆"],
+  cure_not_acknowledged: ["check that the drive is in the mode that is configured; clear the fault", "检查驱动器是否处于配置的模式；清除故障"],
+  cure_node_lost: ["check the power of the drive and its cable", "检查驱动器电源与电缆"],
+  cure_node_not_operational: ["no other master may send NMT commands; clear the fault", "不得有其他主站发送 NMT 指令；清除故障"],
+  cure_unexpected_boot_up: ["check the supply of the drive; start takt anew", "检查驱动器电源；重新启动 takt"],
+  cure_emergency_message: ["see the cure of the drive's error; clear the fault when its cause is gone", "参照驱动器错误的处理办法；原因消除后清除故障"],
+  cure_duplicate_node: ["give one of the two drives another node ID", "为其中一个驱动器设置其他节点 ID"],
+  cure_foreign_master: ["end the other master, or disconnect it", "结束或断开另一个主站"],
+  cure_timing_unfit: ["`takt doctor` says what this computer lacks for real time", "运行 takt doctor 查看本机实时性的不足"],
+  cure_start_pose: ["begin the stream where the axis is", "从轴的当前位置开始点流"],
+  cure_jerk_limit: ["command a smoother motion, or look at `limits.jerk`", "使运动更平滑，或检查 limits.jerk"],
+  cure_bus_error_passive: ["check the cable, the termination and the bit rate", "检查电缆、终端电阻和波特率"],
+  cure_implausible_feedback: ["check the encoder and `counts_per_turn`", "检查编码器与 counts_per_turn"],
+  cure_callback_overrun: ["make the callback faster, or give it a larger budget", "加快回调，或增大其时间预算"],
+  cure_callback_panicked: ["mend the callback; its message is in the log", "修复回调；详细信息见日志"],
+  cure_no_torque_in_mode: ["change the axis to CST", "将该轴切换到 CST"],
+  cure_stiffness_limit: ["command less, or look at `stiffness_max`", "降低指令，或检查 stiffness_max"],
+  cure_damping_limit: ["command less, or look at `damping_max`", "降低指令，或检查 damping_max"],
+  cure_mode_not_shown: ["check that the drive has this mode; most change it only while disabled", "确认驱动器支持该模式；多数仅在去使能时切换"],
+};
+
+let language = localStorage.getItem("takt.language") ?? (navigator.language.startsWith("zh") ? "zh" : "en");
+
+export const isChinese = () => language === "zh";
+
+export function switchLanguage() {
+  language = isChinese() ? "en" : "zh";
+  localStorage.setItem("takt.language", language);
+}
+
+// The text of a key, filled in; the key itself where there is no such text.
+export function text(key, ...parts) {
+  const row = TEXTS[key];
+  const words = row ? row[isChinese() ? 1 : 0] : key;
+  return words.replace(/\{(\d)\}/g, (_, number) => parts[number] ?? "");
+}
+
+// The text of a key that may not be there.
+export const textOr = (key, otherwise) => (TEXTS[key] ? text(key) : otherwise);
+
+// Fills in the texts of a part of the page.
+export function fill(root) {
+  document.documentElement.lang = isChinese() ? "zh-CN" : "en";
+  for (const element of root.querySelectorAll("[data-text]")) element.textContent = text(element.dataset.text);
+  for (const element of root.querySelectorAll("[data-label]")) {
+    element.setAttribute("aria-label", text(element.dataset.label));
+    element.title = text(element.dataset.label);
+  }
+}
+
+// An element with attributes, listeners (`onclick`) and children.
+export function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name.startsWith("aria-")) made.setAttribute(name, String(value));
+    else if (value === true) made.setAttribute(name, "");
+    else if (value !== false && value !== null && value !== undefined) made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}

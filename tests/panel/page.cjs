@@ -1,0 +1,389 @@
+// The page of the panel, driven as a user does: by mouse, keys and touch, in both languages, and killed in mid-jog.
+//
+//   node page.cjs TAKT FOLDER      (tests/panel/run calls it)
+
+const assert = require("node:assert/strict");
+const { spawn } = require("node:child_process");
+const fs = require("node:fs");
+const os = require("node:os");
+const path = require("node:path");
+const { chromium } = require("playwright-core");
+
+const [takt, folder] = process.argv.slice(2);
+const LONG = 30_000;
+const LAUNCH = {
+  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+  args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+};
+
+const FAULT = `
+[[fault]]
+kind = "alarm"
+axis = "joint2"
+code = 0x4310
+when = "moving"
+at = "300 ms"
+`;
+
+// A simulated arm with its panel; resolves when the page can be opened.
+function arm(place, ...options) {
+  const process_ = spawn(takt, ["run", path.join(place, "arm.toml"), "--panel", "127.0.0.1:0", ...options], { stdio: ["ignore", "pipe", "pipe"] });
+  return new Promise((resolve, reject) => {
+    let said = "";
+    process_.stderr.on("data", (data) => {
+      said += data;
+      const found = /http:\/\/[^/]+\//.exec(said);
+      if (found) resolve({ process: process_, address: found[0], said: () => said });
+    });
+    process_.on("exit", (code) => reject(new Error(`takt has ended with ${code}: ${said}`)));
+  });
+}
+
+const ended = (process_) => new Promise((resolve) => (process_.exitCode === null ? process_.on("exit", resolve) : resolve(process_.exitCode)));
+
+// Reads a position as the page shows it.
+const degrees = (text) => Number(text.replace("−", "-").replace("°", ""));
+
+class Panel {
+  constructor(page) {
+    this.page = page;
+  }
+
+  static async open(browser, address, options = {}) {
+    const context = await browser.newContext({ viewport: { width: 1440, height: 1000 }, locale: "en-US", ...options });
+    const page = await context.newPage();
+    const problems = [];
+    page.on("pageerror", (error) => problems.push(String(error)));
+    page.on("console", (message) => message.type() === "error" && !/status of 4\d\d|ERR_CONNECTION|ERR_INCOMPLETE|ERR_EMPTY/.test(message.text()) && problems.push(message.text()));
+    page.on("request", (request) => request.url().startsWith(address) || problems.push(`asks elsewhere: ${request.url()}`));
+    await page.goto(address);
+    await page.locator("#link.live").waitFor({ timeout: LONG });
+    await page.locator("#axes .axis").first().waitFor({ timeout: LONG });
+    const panel = new Panel(page);
+    panel.problems = problems;
+    return panel;
+  }
+
+  async until(words, what) {
+    await this.page.waitForFunction(what, null, { timeout: LONG, polling: 50 }).catch((error) => {
+      throw new Error(`${words}: ${error.message}`);
+    });
+  }
+
+  async phase(words) {
+    await this.page.locator("#groups .phase", { hasText: words }).first().waitFor({ timeout: LONG });
+  }
+
+  async position(axis = 0) {
+    return degrees(await this.page.locator("#axes .axis .position").nth(axis).textContent());
+  }
+
+  async positionIs(wanted, axis = 0) {
+    const begun = Date.now();
+    while (Math.abs((await this.position(axis)) - wanted) > 0.05) {
+      assert.ok(Date.now() - begun < LONG, `axis ${axis} is at ${await this.position(axis)}, not at ${wanted}; said: ${await this.page.locator("#said").textContent()}`);
+      await this.page.waitForTimeout(50);
+    }
+  }
+
+  async atRest() {
+    let before = await this.position();
+    for (;;) {
+      await this.page.waitForTimeout(300);
+      const now = await this.position();
+      if (Math.abs(now - before) < 0.005) return now;
+      before = now;
+    }
+  }
+
+  // A machine that is too busy to confirm states in time is refused, and asks again.
+  async take() {
+    for (let asked = 0; asked < 10 && !(await this.page.locator("#release").isVisible()); asked += 1) {
+      await this.page.locator("#take").click();
+      await this.page.locator("#release").waitFor({ timeout: 3000 }).catch(() => {});
+    }
+  }
+
+  tab(name) {
+    return this.page.locator(`#tab-${name}`).click();
+  }
+
+  async screenshot(name) {
+    await this.page.screenshot({ path: path.join(folder, `${name}.png`), fullPage: true });
+  }
+
+  async close() {
+    assert.deepEqual(this.problems, [], "the page had problems");
+    await this.page.context().close();
+  }
+}
+
+// WCAG 2: the contrast of every text with what is behind it.
+const contrasts = () => {
+  const parse = (colour) => colour.match(/[\d.]+/g).map(Number);
+  const luminance = ([r, g, b]) => {
+    const [x, y, z] = [r, g, b].map((part) => part / 255).map((part) => (part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4));
+    return 0.2126 * x + 0.7152 * y + 0.0722 * z;
+  };
+  const behind = (element) => {
+    for (let at = element; at; at = at.parentElement) {
+      const colour = parse(getComputedStyle(at).backgroundColor);
+      if (colour.length < 4 || colour[3] > 0) return colour;
+    }
+    return [255, 255, 255];
+  };
+  const low = [];
+  for (const element of document.querySelectorAll("body *")) {
+    const hasText = [...element.childNodes].some((node) => node.nodeType === 3 && node.textContent.trim());
+    if (!hasText || !element.checkVisibility() || element.closest(".stale")) continue;
+    const [one, other] = [luminance(parse(getComputedStyle(element).color)), luminance(behind(element))];
+    const contrast = (Math.max(one, other) + 0.05) / (Math.min(one, other) + 0.05);
+    if (contrast < 4.5) low.push(`${element.tagName}.${element.className} ${element.textContent.trim().slice(0, 30)}: ${contrast.toFixed(2)}`);
+  }
+  return low;
+};
+
+// What a screen reader needs: every control has a name, every field a label, every picture a text.
+const nameless = () =>
+  [...document.querySelectorAll("button, input, select, canvas, [role=img]")]
+    .filter((element) => element.checkVisibility() || element.tagName === "CANVAS")
+    .filter((element) => !(element.textContent.trim() || element.getAttribute("aria-label") || element.labels?.length))
+    .filter((element) => element.checkVisibility())
+    .map((element) => element.outerHTML.slice(0, 100));
+
+async function looksRight(panel, name) {
+  assert.deepEqual(await panel.page.evaluate(contrasts), [], `contrast of ${name}`);
+  assert.deepEqual(await panel.page.evaluate(nameless), [], `names of ${name}`);
+  const overflow = await panel.page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+  assert.equal(overflow, 0, `${name} is wider than its window`);
+  await panel.screenshot(name);
+}
+
+const steps = {
+  async "a page takes command, moves an axis, and disables and enables it"({ browser, address }) {
+    const panel = await Panel.open(browser, address);
+    assert.ok(await panel.page.locator("#motion .why").textContent());
+    assert.ok(await panel.page.locator("#groups .disable").first().isDisabled(), "nothing is commanded without command");
+    await panel.take();
+    await panel.tab("absolute");
+    await panel.page.fill("#field-target", "12");
+    await panel.page.fill("#field-speed_part", "100");
+    await panel.page.locator("#kind button", { hasText: "Move" }).click();
+    await panel.positionIs(12);
+    await panel.tab("relative");
+    await panel.page.fill("#field-distance", "2,5");
+    await panel.page.fill("#field-speed_part", "100");
+    await panel.page.locator("#kind button", { hasText: "Backwards" }).click();
+    await panel.positionIs(9.5);
+    await panel.tab("absolute");
+    await panel.page.fill("#field-target", "999");
+    await panel.page.locator("#kind button", { hasText: "Move" }).click();
+    await panel.page.locator("#said", { hasText: "999 is outside" }).waitFor({ timeout: LONG });
+    assert.equal(await panel.page.locator("#field-target").getAttribute("aria-invalid"), "true");
+    await panel.page.locator("#groups .disable").first().click();
+    await panel.phase("disabled");
+    await panel.page.locator("#groups .enable").first().click();
+    await panel.phase("holding");
+    await panel.close();
+  },
+
+  async "jog moves while a button or a key is held, and ends with it"({ browser, address }) {
+    const panel = await Panel.open(browser, address);
+    await panel.take();
+    await panel.tab("jog");
+    await panel.page.fill("#field-speed", "10");
+    for (const hold of ["button", "key"]) {
+      const from = await panel.atRest();
+      const isThere = async () => (await panel.position()) > from + 2;
+      // On a machine that is too busy to renew it in time, the key is let go by takt, and pressed again.
+      for (let press = 0; press < 20 && !(await isThere()); press += 1) {
+        const box = await panel.page.locator("#jog-plus").boundingBox();
+        if (hold === "button") {
+          await panel.page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+          await panel.page.mouse.down();
+        } else {
+          await panel.page.locator("#jog-plus").focus();
+          await panel.page.keyboard.down("ArrowRight");
+        }
+        await panel.page.locator("#jog-plus.held").waitFor({ timeout: LONG });
+        while ((await panel.page.locator("#jog-plus.held").count()) && !(await isThere())) await panel.page.waitForTimeout(50);
+        if (hold === "button") await panel.page.mouse.up();
+        else await panel.page.keyboard.up("ArrowRight");
+        await panel.page.locator("#jog-plus.held").waitFor({ state: "detached", timeout: LONG });
+        await panel.phase("holding");
+      }
+      const to = await panel.atRest();
+      assert.ok(to - from > 2, `${hold}: from ${from} to ${to}`);
+    }
+    await panel.close();
+  },
+
+  async "a page that is killed in mid-jog leaves the arm at rest"({ browser, address }) {
+    const watcher = await Panel.open(browser, address);
+    const own = await chromium.launch(LAUNCH);
+    const panel = await Panel.open(own, address);
+    await panel.take();
+    await panel.tab("jog");
+    await panel.page.fill("#field-speed", "10");
+    await panel.page.locator("#jog-minus").focus();
+    await panel.page.keyboard.down("ArrowLeft");
+    await watcher.phase("following points");
+    await own.close();
+    await watcher.phase("holding");
+    await watcher.page.locator("#who", { hasText: "No page commands" }).waitFor({ timeout: LONG });
+    const rest = await watcher.atRest();
+    await watcher.page.waitForTimeout(500);
+    assert.equal(await watcher.position(), rest);
+    await watcher.close();
+  },
+
+  async "another page takes over and everyone stops, by the button and by keys"({ browser, address }) {
+    const first = await Panel.open(browser, address);
+    const second = await Panel.open(browser, address);
+    await first.take();
+    await second.page.locator("#who", { hasText: "commands. This is page" }).waitFor({ timeout: LONG });
+    await first.tab("continuous");
+    await first.page.fill("#field-speed", "3");
+    for (const stop of ["button", "Escape", "Space"]) {
+      await first.page.locator("#kind button", { hasText: "Forwards" }).click();
+      await first.phase("following points");
+      if (stop === "button") await second.page.locator("#stop").click();
+      else await second.page.keyboard.press(stop);
+      await first.phase("disabled");
+      await first.page.locator("#groups .enable").first().click();
+      await first.phase("holding");
+    }
+    await second.page.locator("#take").click();
+    await second.page.locator("#ask-yes").click();
+    await second.page.locator("#who", { hasText: "This page" }).waitFor({ timeout: LONG });
+    await first.page.locator("#who", { hasText: "This is page" }).waitFor({ timeout: LONG });
+    assert.equal(await first.page.locator("#take").textContent(), "Take over");
+    // A space that is typed is no stop.
+    await second.page.locator("#field-target, #field-speed").first().press("Space");
+    await second.page.waitForTimeout(300);
+    await second.phase("holding");
+    await first.close();
+    await second.close();
+  },
+
+  async "the page is whole in both languages, in light and dark, on a desk and on a phone"({ browser, address }) {
+    const looks = [
+      ["desk-light", { colorScheme: "light" }],
+      ["desk-dark", { colorScheme: "dark" }],
+      ["phone-light", { viewport: { width: 390, height: 844 }, colorScheme: "light", hasTouch: true, isMobile: true }],
+      ["phone-dark", { viewport: { width: 390, height: 844 }, colorScheme: "dark", hasTouch: true, isMobile: true }],
+      ["desk-chinese", { locale: "zh-CN", colorScheme: "light" }],
+    ];
+    for (const [name, options] of looks) {
+      const panel = await Panel.open(browser, address, options);
+      assert.equal(await panel.page.locator("html").getAttribute("lang"), options.locale ?? "en");
+      await panel.take();
+      await panel.tab("reciprocating");
+      await panel.page.fill("#field-from", "0");
+      await panel.page.fill("#field-to", "20");
+      await panel.page.fill("#field-speed_part", "60");
+      await panel.page.locator("#kind .primary").click();
+      await panel.page.waitForTimeout(3000);
+      await looksRight(panel, name);
+      for (const tab of ["jog", "continuous", "relative", "group", "mode"]) {
+        await panel.tab(tab);
+        assert.deepEqual(await panel.page.evaluate(nameless), [], `${name} ${tab}`);
+      }
+      if (name === "desk-light") {
+        await panel.page.locator("#language").click();
+        await panel.page.locator("#axes-title", { hasText: "轴" }).waitFor();
+        await panel.page.locator("#unit").click();
+        await panel.page.locator(".position", { hasText: "rad" }).first().waitFor();
+        // English words in Chinese are those of names, units and events.
+        const left = await panel.page.evaluate(() => [...document.querySelectorAll("h2, h3, dt, button, label span, .soft")].map((one) => one.textContent.trim()).filter((words) => /[a-z]{4,}/.test(words) && !/[\u4e00-\u9fff]/.test(words)));
+        const names = ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "English", "base (sim)", "wrist (sim)"];
+        assert.deepEqual(left.filter((words) => !names.includes(words)), []);
+        await panel.page.locator("#unit").click();
+      }
+      await panel.close();
+    }
+  },
+
+  async "a fault is shown with its cure, cleared, and the arm goes on"({ browser, place }) {
+    fs.writeFileSync(path.join(place, "fault.toml"), FAULT);
+    const own = await arm(place, "--faults", path.join(place, "fault.toml"));
+    const panel = await Panel.open(browser, own.address);
+    await panel.take();
+    await panel.page.locator("#axes .pick").nth(1).click();
+    await panel.tab("absolute");
+    await panel.page.fill("#field-target", "60");
+    await panel.page.fill("#field-speed_part", "100");
+    await panel.page.fill("#field-acceleration_part", "100");
+    await panel.page.locator("#kind .primary").click();
+    const banner = panel.page.locator("#faults .banner.fault");
+    await banner.waitFor({ timeout: LONG });
+    await panel.phase("disabled");
+    assert.match(await banner.textContent(), /A drive reports a fault.*the drive of joint2 reports fault.*0x4310.*Try: .+/s);
+    assert.equal(await panel.page.locator("#faults").getAttribute("role"), "alert");
+    assert.ok(await panel.page.locator("#groups .enable").first().isDisabled());
+    await looksRight(panel, "fault-light");
+    await panel.page.emulateMedia({ colorScheme: "dark" });
+    await panel.page.locator("#language").click();
+    await panel.page.locator("#faults h3", { hasText: "故障：驱动器报告故障" }).waitFor({ timeout: LONG });
+    await looksRight(panel, "fault-dark-chinese");
+    await panel.page.locator("#language").click();
+    await banner.locator("button").click();
+    await banner.waitFor({ state: "detached", timeout: LONG });
+    await panel.page.locator("#groups .enable").first().click();
+    await panel.phase("holding");
+
+    // The controller ends while the page is open.
+    own.process.removeAllListeners("exit");
+    own.process.kill("SIGINT");
+    assert.equal(await ended(own.process), 130, own.said());
+    await panel.page.locator("#link.lost").waitFor({ timeout: LONG });
+    await panel.page.keyboard.press("Escape");
+    await panel.page.locator("#said", { hasText: "could NOT be sent" }).waitFor({ timeout: LONG });
+    await panel.page.context().close();
+  },
+
+  async "twenty pages are open, and a stop of the last one is taken"({ browser, address }) {
+    const panels = [];
+    for (let count = 0; count < 20; count += 1) panels.push(await Panel.open(browser, address));
+    await panels[0].take();
+    await panels[0].page.locator("#who", { hasText: "20 open" }).waitFor({ timeout: LONG });
+    await panels[19].page.keyboard.press("Escape");
+    await panels[0].phase("disabled");
+    for (const panel of panels.slice(1)) await panel.close();
+    await panels[0].page.locator("#groups .enable").first().click();
+    await panels[0].phase("holding");
+    await panels[0].close();
+  },
+};
+
+async function main() {
+  const place = fs.mkdtempSync(path.join(os.tmpdir(), "takt-panel-"));
+  const example = fs.readFileSync(path.join(__dirname, "../../configs/arm6-erob.toml"), "utf8");
+  fs.writeFileSync(path.join(place, "arm.toml"), `${example}\n[telemetry]\nrecord = false\n`);
+  const shared = await arm(place);
+  const browser = await chromium.launch(LAUNCH);
+  const chosen = process.env.ONLY;
+  try {
+    for (const [name, step] of Object.entries(steps)) {
+      if (chosen && !name.includes(chosen)) continue;
+      const begun = Date.now();
+      await step({ browser, place, address: shared.address }).catch(async (error) => {
+        const pages = browser.contexts().flatMap((context) => context.pages());
+        for (const [number, page] of pages.entries()) await page.screenshot({ path: path.join(folder, `failed-${number}.png`) }).catch(() => {});
+        throw new Error(`${name}: ${error.stack}`);
+      });
+      console.log(`${name}: ${((Date.now() - begun) / 1000).toFixed(1)} s`);
+    }
+  } finally {
+    await browser.close();
+    shared.process.removeAllListeners("exit");
+    shared.process.kill("SIGINT");
+    await ended(shared.process);
+    fs.rmSync(place, { recursive: true });
+  }
+}
+
+main().catch((error) => {
+  console.error(error);
+  process.exit(1);
+});
