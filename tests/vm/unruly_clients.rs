@@ -4,8 +4,9 @@
 //! fast as it can. Two observe without a pause. One after another begins to stream and panics on the way. All have ordinary
 //! priority. The program takes the arguments of `takt run`, and ends with an error if the group has stopped.
 
+mod unruly_motion;
+
 use std::error::Error;
-use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,24 +15,17 @@ use std::time::{Duration, Instant};
 
 use takt::{Config, Controller, Event, EventKind, Handle, RecordingDestination, SessionOptions};
 
-/// From one point to the next.
-const INTERVAL: Duration = Duration::from_millis(10);
+use unruly_motion::{INTERVAL, Motion};
 
-/// A gentle motion of every joint, to and fro.
-struct Motion {
-    home: Vec<f64>,
+/// The motion, and when it has begun.
+struct Begun {
+    motion: Motion,
     begun: Instant,
 }
 
-impl Motion {
-    fn after(&self, since: Duration) -> Vec<f64> {
-        let since_s = since.as_secs_f64();
-        let amplitude = 0.1 * (since_s / 2.0).min(1.0).powi(3);
-        self.home.iter().map(|home| home + amplitude * (TAU * 0.25 * since_s).sin()).collect()
-    }
-
+impl Begun {
     fn now(&self) -> Vec<f64> {
-        self.after(self.begun.elapsed())
+        self.motion.after(self.begun.elapsed())
     }
 }
 
@@ -42,11 +36,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     // Those that panic here are meant to.
     std::panic::set_hook(Box::new(|_| {}));
     arm.begin_stream()?;
-    let motion = &Motion { home, begun: Instant::now() };
+    let motion = &Begun { motion: Motion { home }, begun: Instant::now() };
     let (is_over, mut events) = (&AtomicBool::new(false), arm.events());
     let mut stops = Vec::new();
     thread::scope(|scope| {
-        let until_over = |client: fn(&Handle, &Motion)| {
+        let until_over = |client: fn(&Handle, &Begun)| {
             let handle = arm.handle();
             scope.spawn(move || {
                 while !is_over.load(Ordering::Relaxed) {
@@ -71,7 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Streams for two seconds, and stalls for a third of a second.
-fn lead(handle: &Handle, motion: &Motion) {
+fn lead(handle: &Handle, motion: &Begun) {
     let stream = handle.stream();
     for _ in 0..200 {
         // Where the other client has filled the look-ahead, there is no room.
@@ -82,19 +76,18 @@ fn lead(handle: &Handle, motion: &Motion) {
 }
 
 /// Hands over the next fifth of a second.
-fn flood(handle: &Handle, motion: &Motion) {
-    let since = motion.begun.elapsed();
-    let chunk: Vec<Vec<f64>> = (0..20).map(|index| motion.after(since + INTERVAL * index)).collect();
+fn flood(handle: &Handle, motion: &Begun) {
+    let chunk = motion.motion.chunk(motion.begun.elapsed());
     let _ = handle.stream().push_chunk(handle.now_ns(), INTERVAL, &chunk);
 }
 
-fn observe(handle: &Handle, _motion: &Motion) {
+fn observe(handle: &Handle, _motion: &Begun) {
     black_box(handle.state());
     black_box(handle.events().count());
 }
 
 /// A client that panics while it streams.
-fn begin_and_die(handle: &Handle, motion: &Motion) {
+fn begin_and_die(handle: &Handle, motion: &Begun) {
     let (handle, point) = (handle.clone(), motion.now());
     let client = thread::spawn(move || {
         let (stream, _events) = (handle.stream(), handle.events());

@@ -1,28 +1,31 @@
 # takt itself, with `takt sim` as the other side, its SYNC seen by a listener of its own: six axes on two virtual
 # interfaces, idle and under load, at 1 ms and 2 ms, with and without the spin guard; and three axes on the two emulated
-# controllers; and a stream, beside clients that behave badly; and three hollow-shaft motors over CAN FD, whose requests take the place
-# of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT and UNRULY_CLIENTS name the programs;
-# CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long. Leaves product.txt (the table, and
+# controllers; and a stream, beside clients of every kind that behave badly: threads of a program in Rust, other processes, a program in C,
+# one in Python; and three hollow-shaft motors over CAN FD, whose requests take the place
+# of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT, UNRULY_CLIENTS, UNRULY_PROCESSES and
+# UNRULY_C name the programs, PYTHON an interpreter with takt; CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long; EVERY_KIND_LOADED=yes has clients of every kind
+# under load, too. Leaves product.txt (the table, and
 # when set-points and feedback were on the wire), jitter.txt (`takt jitter`), system_calls.txt, the recordings of SYNC and
 # the reports. Fails when a mean period drifts, a slot was missed, a period deviates further above what cyclictest finds than
-# is allowed, a set-point missed its slot, feedback was late, or there were more system calls than there may be.
+# is allowed, a set-point missed its slot, feedback was late, or there were more system calls than there may be; and beside clients, when
+# a set-point broke a limit, anything but a client's own request stopped the axes, or they were not at rest in the end.
 . tests/vm/guest/laboratory.sh
 cycles=${CYCLES:-10000} load_cycles=${LOAD_CYCLES:-2000} other_cycles=${OTHER_CYCLES:-1000}
 # Beyond cyclictest's maximum, in microseconds.
 idle_allowance=5 load_allowance=${LOAD_ALLOWANCE:-10}
-# Requests leave when their cycle has been computed, and one in which a move is planned takes some 30 longer here.
-planning=35
 # Further than any deviation: not limited.
 any=100000
 
 mkdir -p "$OUT/configs"
 arm=$OUT/configs/arm.toml arm_2ms=$OUT/configs/arm-2ms.toml arm_sleep=$OUT/configs/arm-sleep.toml
-half=$OUT/configs/half.toml half_2ms=$OUT/configs/half-2ms.toml leg=$OUT/configs/leg.toml
+arm_vcan=$OUT/configs/arm-vcan.toml half=$OUT/configs/half.toml half_2ms=$OUT/configs/half-2ms.toml leg=$OUT/configs/leg.toml
 cp configs/arm6-erob.toml "$arm"
 first_bus_only "$arm" > "$half"
 two_ms() { sed 's/^period = "1 ms"/period = "2 ms"/' "$1"; }
 two_ms "$arm" > "$arm_2ms"
 two_ms "$half" > "$half_2ms"
+# For a program whose only way to name its interfaces is the configuration.
+sed -e '/^name = "base"/,/^interface/s/"sim"/"vcan0"/' -e '/^name = "wrist"/,/^interface/s/"sim"/"vcan1"/' "$arm" > "$arm_vcan"
 sed 's/"can"/"base"/' configs/hollow-leg-fd.toml > "$leg"
 sed 's/^\[cycle\]/[realtime]\nspin_guard = 0\n\n[cycle]/' "$arm" > "$arm_sleep"
 
@@ -62,8 +65,17 @@ wire_verdict() { # PERIOD_US LOG RECORDING
     return $status
 }
 
-# What is timed, and what else a listener sees; whether the wire is judged.
-program=("$TAKT" run) timed=080 drive_frames="180:780 200:780" wire=judged
+# What a recording says of the limits, of stops, and of the end.
+limits_verdict() { # CONFIG RECORDING
+    python3 $guest/limits_kept.py "$@" > "$OUT/limits.txt"
+    local status=$?
+    tee -a "$OUT/product.txt" < "$OUT/limits.txt"
+    rm "$OUT/limits.txt"
+    return $status
+}
+
+# What is timed, and what else a listener sees; whether the wire is judged, and the limits.
+program=("$TAKT" run) timed=080 drive_frames="180:780 200:780" wire=judged limits=ignored
 measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE...
     local name=$1 load=$2 count=$3 allowance=$4 period=$5 config=$6 listen=$7 seconds found listener witness status filters buses log
     shift 7
@@ -82,6 +94,7 @@ measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE.
     read -r -a found <<< "$(periods "$log.log" "$period")"
     row "$name" "$listen" "$load" "${found[@]}"
     wire_verdict "$period" "$log.wire" "$log.mcap" || [ $wire = printed ] || status=1
+    [ $limits = ignored ] || limits_verdict "$config" "$log.mcap" || status=1
     grep -oE '[0-9]+ records, [0-9]+ dropped' "$log.txt" | sed 's/^/  recording: /' | tee -a "$OUT/product.txt"
     rm -f "$log.wire" "$log.mcap"
     verdict "$period" "${found[0]}" "${found[1]}" "${found[5]}" "${found[6]}" $((latency_max + allowance)) || status=1
@@ -90,15 +103,25 @@ measure() { # NAME idle|load CYCLES ALLOWANCE PERIOD_US CONFIG LISTEN INTERFACE.
 
 # A stream, beside clients that flood, stall, observe without a pause, and die. The debug build, which these are, computes for nearly as long
 # as there is time before the set-points are due: a cycle that has lost them is printed, and not judged.
+beside() { # NAME CONFIG idle|load ALLOWANCE PROGRAM...
+    local name=$1 config=$2 load=$3 allowance=$4 wire=printed limits=judged
+    shift 4
+    local program=("$@")
+    measure "takt, $name" "$load" "$other_cycles" "$allowance" 1000 "$config" vcan0 vcan0 vcan1
+}
+# Under load these programs take minutes to begin and to end, so that of the kinds only the first runs then, unless all are asked for.
 beside_clients() { # idle|load ALLOWANCE
-    local program=("$UNRULY_CLIENTS") wire=printed
-    measure "takt, bad clients" "$1" "$other_cycles" "$2" 1000 "$arm" vcan0 vcan0 vcan1
+    try beside "bad clients" "$arm" "$@" "$UNRULY_CLIENTS"
+    [ "$1" = idle ] || [ -n "${EVERY_KIND_LOADED:-}" ] || return
+    try beside "bad processes" "$arm" "$@" "$UNRULY_PROCESSES"
+    try beside "bad C program" "$arm_vcan" "$@" "$UNRULY_C"
+    try beside "bad Python" "$arm" "$@" "$PYTHON" tests/vm/unruly_program.py
 }
 
 # A leg of hollow-shaft motors, each of which answers its request 500 us later; the request to the first of them is timed.
 requests_of_leg() { # idle|load ALLOWANCE
     local timed=001 drive_frames="002:7FF 003:7FF 065:7FF 066:7FF 067:7FF"
-    measure "takt, CAN FD leg" "$1" "$other_cycles" $(($2 + planning)) 1000 "$leg" vcan2 vcan2
+    measure "takt, CAN FD leg" "$1" "$other_cycles" "$2" 1000 "$leg" vcan2 vcan2
 }
 
 # Both ways of waiting, as takt itself sees them.
@@ -153,7 +176,7 @@ drives_on 70 "$arm" vcan0 vcan1
 try measure "takt" idle "$cycles" $idle_allowance 1000 "$arm" vcan0 vcan0 vcan1
 try measure "takt, sleep only" idle "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
-try beside_clients idle $idle_allowance
+beside_clients idle $idle_allowance
 try system_calls
 try jitter idle vcan0
 
@@ -162,7 +185,7 @@ machine load "$load_cycles"
 try measure "takt" load "$load_cycles" $load_allowance 1000 "$arm" vcan0 vcan0 vcan1
 try measure "takt, sleep only" load "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" load "$other_cycles" $load_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
-try beside_clients load $load_allowance
+beside_clients load $load_allowance
 try jitter load vcan0
 load_off
 drives_off
