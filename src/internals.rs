@@ -4,8 +4,11 @@ use takt_rt::BusPort;
 
 use crate::channels::{HostSide, LogSide};
 use crate::config::Config;
-use crate::controller::{Supervisor, VirtualRun};
+use crate::controller::port::Port;
+use crate::controller::{AfterBringUp, Supervisor, VirtualRun};
 use crate::error::AssembleError;
+use crate::faults::FaultInjector;
+use crate::journal::RunJournal;
 
 pub mod bit_fields {
     pub use crate::config::bit_fields::*;
@@ -41,6 +44,9 @@ pub mod channels {
 
 #[cfg(feature = "cli")]
 pub mod commission {
+    pub mod bus_scan {
+        pub use crate::commission::bus_scan::*;
+    }
     pub mod bus_session {
         pub use crate::commission::bus_session::*;
     }
@@ -103,6 +109,10 @@ pub mod hollow_lines {
     pub use crate::hollow_lines::*;
 }
 
+pub mod journal {
+    pub use crate::journal::*;
+}
+
 pub mod link {
     pub use crate::link::interface::*;
     pub mod modbus_line {
@@ -135,8 +145,13 @@ pub mod procedure {
 
 pub mod remote {
     pub use crate::remote::{
-        Command, Demand, Malformed, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest,
+        Answer, Command, Demand, Malformed, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest,
     };
+}
+
+#[cfg(feature = "cli")]
+pub mod replay {
+    pub use crate::replay::*;
 }
 
 pub mod schedule {
@@ -176,6 +191,11 @@ pub mod sim {
     }
 }
 
+#[cfg(feature = "panel")]
+pub mod panel {
+    pub use crate::panel::*;
+}
+
 pub mod telemetry {
     pub use crate::telemetry::thread::LoggerThread;
 }
@@ -189,16 +209,44 @@ pub trait RunInside<P>: Sized {
     /// See [`AssembleError`].
     fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError>;
 
+    /// A controller on simulated buses and lines with injected faults. It executes the program, or the requests of the host where it
+    /// `is_serving`. `outermost` makes of each port the one that it is given. Whoever calls this shows the snapshots to the injector.
+    ///
+    /// # Errors
+    /// See [`AssembleError`].
+    fn faulty(
+        config: &Config,
+        fault_injector: &FaultInjector,
+        is_serving: bool,
+        outermost: impl Fn(Port) -> P,
+    ) -> Result<(Self, LogSide), AssembleError>;
+
     /// The life cycle.
     fn supervisor(&self) -> &Supervisor;
 
     /// The host's side of the host interface, to command the group directly.
     fn host(&mut self) -> &mut HostSide;
+
+    /// Notes from now on what the cycle is told, but for what its ports do. Call it before the first cycle.
+    fn journal(&mut self) -> RunJournal;
 }
 
 impl<P: BusPort> RunInside<P> for VirtualRun<P> {
     fn serving(config: &Config, ports: Vec<P>) -> Result<(Self, LogSide), AssembleError> {
-        Self::serving(config, ports)
+        Self::serving(config, ports, AfterBringUp::Enable)
+    }
+
+    fn faulty(
+        config: &Config,
+        fault_injector: &FaultInjector,
+        is_serving: bool,
+        outermost: impl Fn(Port) -> P,
+    ) -> Result<(Self, LogSide), AssembleError> {
+        let supervisor = match is_serving {
+            true => Supervisor::serving(config, AfterBringUp::Enable),
+            false => Supervisor::new(config, None),
+        };
+        Self::faulty(config, fault_injector, supervisor, outermost)
     }
 
     fn supervisor(&self) -> &Supervisor {
@@ -207,5 +255,9 @@ impl<P: BusPort> RunInside<P> for VirtualRun<P> {
 
     fn host(&mut self) -> &mut HostSide {
         self.host()
+    }
+
+    fn journal(&mut self) -> RunJournal {
+        self.journal()
     }
 }

@@ -64,7 +64,8 @@
 //! ```text
 //! internals                           what the tests see beyond the public face
 //! cli                                 the program `takt`
-//! doctor jitter commission play       is the machine fit; one drive apart from any run; motion from a file
+//! doctor jitter commission play replay  is the machine fit; one drive apart from any run; motion from a file; a run again
+//! panel                               a running controller in the browser
 //! error                               one error for a program that embeds takt
 //! serve                               a running controller, offered to other processes
 //! controller                          the engine of a configuration, its life, its ports, the handles
@@ -74,6 +75,7 @@
 //! faults                              faults on purpose
 //! monitor                             the meaning of every frame on a bus
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
+//! journal                             what a run was told from outside, so that it can be replayed
 //! link sim                            sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
@@ -81,7 +83,7 @@
 //! hollow_lines                        the serial lines of the hollow-shaft motors, without I/O
 //! channels                            the lock-free channels to the real-time thread
 //! bus_log                             logs of frames, as other programs write and read them
-//! trajectory frame_time sleep_alignment source_text printable text_file
+//! trajectory packet frame_time sleep_alignment source_text printable text_file
 //! ```
 //!
 //! A run meets the parts in this order: `config` reads the file, `link` opens the buses, `schedule` says whether everything fits,
@@ -128,6 +130,7 @@ mod hollow_lines;
 pub mod internals;
 #[cfg(feature = "cli")]
 mod jitter;
+mod journal;
 pub mod link;
 #[cfg_attr(
     not(feature = "internals"),
@@ -136,11 +139,16 @@ pub mod link;
 mod modbus;
 #[cfg(feature = "cli")]
 mod monitor;
+mod packet;
+#[cfg(feature = "panel")]
+mod panel;
 #[cfg(feature = "cli")]
 mod play;
 mod printable;
 mod procedure;
 mod remote;
+#[cfg(feature = "cli")]
+mod replay;
 pub mod schedule;
 mod serve;
 pub mod sim;
@@ -156,8 +164,8 @@ pub use cli::main as program;
 
 pub use channels::{Consumer, Producer, ring};
 pub use command::{
-    CommandError, EventSource, LeaseError, MotionError, MotionId, MoveOptions, PointRefusal, Refused,
-    RunningController, Stopped, StreamError, TrajectoryProgress, WaitError,
+    AxisProperties, CommandError, EventSource, LeaseError, LeaseHolder, MotionError, MotionId, MoveOptions,
+    PointRefusal, Refused, RunningController, Stopped, StreamError, TrajectoryProgress, WaitError,
 };
 pub use config::{Config, ConfigError};
 pub use controller::port::Port;
@@ -171,7 +179,7 @@ pub use controller::{
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
 pub use link::IfOwned;
-pub use remote::{Client, ClientEvents, ClientGroup, ClientStream, ConnectError, LeaseHolder, connect};
+pub use remote::{Client, ClientEvents, ClientGroup, ClientStream, ConnectError, connect};
 pub use serve::{ServeError, ServeOptions, Server, serve};
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
@@ -183,3 +191,7 @@ pub use takt_rt::{
     OperationMode, Origin, Phase, RejectReason, RequestError, RequestId, Rule, Snapshot, StopCategory,
     StopCause, StopReason, StreamCounts, StreamReport, StreamState, TimingLevel, linux::ThreadReport, plan,
 };
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -5,13 +5,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 32] = [
+const ORDER: [&str; 36] = [
     "internals",
     "cli",
     "doctor",
     "jitter",
     "commission",
     "play",
+    "replay",
+    "panel",
     "error",
     "serve",
     "controller",
@@ -22,6 +24,7 @@ const ORDER: [&str; 32] = [
     "faults",
     "monitor",
     "family",
+    "journal",
     "link",
     "sim",
     "config",
@@ -33,6 +36,7 @@ const ORDER: [&str; 32] = [
     "channels",
     "bus_log",
     "trajectory",
+    "packet",
     "frame_time",
     "sleep_alignment",
     "source_text",
@@ -122,9 +126,7 @@ const NAMES: [&str; 22] = [
 ];
 
 /// The files that may name a family, and why.
-const MAY_NAME: [(&str, &str); 7] = [
-    ("src/cli/sim.rs", "its help lists the simulated devices on serial lines"),
-    ("src/cli/sim/serial.rs", "it is the list of the simulated devices on serial lines"),
+const MAY_NAME: [(&str, &str); 5] = [
     ("src/lib.rs", "it declares the folder of a maker's own protocol"),
     ("src/family/registry.rs", "it is the list of the families"),
     ("src/family/mod.rs", "it declares their folders, and their names for configurations in code"),

@@ -83,6 +83,22 @@ fn watch_shows_a_reading_in_each_interval() {
         said(&output).lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     assert!(readings.len() > 4, "{readings:?}");
     assert!(readings.iter().all(|reading| reading["state"] == "stopped"), "{readings:?}");
+    assert!(readings.iter().all(|reading| reading["temperature_c"] == 30.0), "{readings:?}");
+}
+
+#[test]
+fn watch_shows_the_temperature_in_a_column_where_the_drive_reports_it() {
+    for (axis, has_temperature) in [(HIP, true), (PAN, false)] {
+        let output = drive(axis, &["watch", "--interval", "0.05", "--duration", "0.2"]);
+        ends_with(0, &output);
+        let columns: Vec<Option<usize>> = said(&output)
+            .lines()
+            .filter(|line| line.contains("rad/s"))
+            .map(|line| line.find("30 °C"))
+            .collect();
+        assert!(columns.len() > 2 && columns.windows(2).all(|pair| pair[0] == pair[1]), "{}", said(&output));
+        assert_eq!(columns[0].is_some(), has_temperature, "{}", said(&output));
+    }
 }
 
 #[test]

@@ -111,6 +111,7 @@ impl Bench {
                 match event {
                     ProcedureEvent::Step(name) => self.steps.push(name),
                     ProcedureEvent::Note(text) => self.notes.push(text),
+                    ProcedureEvent::Progress { .. } => {}
                     ProcedureEvent::Reading(reading) => {
                         self.fastest = self.fastest.max(reading.velocity.abs())
                     }

@@ -54,6 +54,7 @@ fn an_axis_follows_its_program_beside_the_cycle_and_ends_at_rest_without_torque(
     });
     assert_eq!(outcome, Some(Outcome::Finished), "{:?}", run.snapshot().groups()[0]);
     let axis = run.snapshot().axes[0];
+    assert_eq!(axis.temperature, Some(35.0), "the simulated drive is as warm as that");
     assert!((farthest - 60_f64.to_radians()).abs() < 0.01, "{farthest}");
     assert!((axis.position + 30_f64.to_radians()).abs() < 0.01, "{axis:?}");
     assert!(error < 3_f64.to_radians(), "{}", error.to_degrees());

@@ -100,6 +100,7 @@ fn the_turntable_follows_the_program_beside_the_arm_and_ends_at_rest_without_tor
     let truth = run.line(LINE).unwrap().lock().observe(SLAVE).unwrap();
     assert!(truth.is_braked && (truth.position - axis.position).abs() < 1e-3, "{truth:?}");
     assert_eq!(truth.error_code, 0, "it does not wait for its master afterwards");
+    assert_eq!(axis.temperature, Some(35.0), "the simulated drive is as warm as that");
 }
 
 #[test]

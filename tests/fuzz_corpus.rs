@@ -51,7 +51,7 @@ const TOML: &str = "[\\[\\]=\", .0-9a-z_\n#'{}-]{0,200}";
 #[test]
 fn every_kept_input_is_borne() {
     type Subject = fn(&[u8]);
-    let subjects: [(&str, Subject); 13] = [
+    let subjects: [(&str, Subject); 14] = [
         ("configuration", subjects::configuration::run),
         ("scenario", subjects::scenario::run),
         ("device_description", subjects::device_description::run),
@@ -64,6 +64,7 @@ fn every_kept_input_is_borne() {
         ("packets", subjects::packets::run),
         ("field_description", subjects::field_description::run),
         ("erob_can", subjects::erob_can::run),
+        ("journal", subjects::journal::run),
         ("engine", |bytes| drop(subjects::engine::run(bytes))),
     ];
     for (name, run) in subjects {
@@ -160,6 +161,12 @@ proptest! {
     fn any_bytes_on_a_modbus_line_are_borne(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("modbus")) {
         subjects::modbus::run(&bytes);
         subjects::modbus::run(&seed);
+    }
+
+    #[test]
+    fn any_journal_is_read_and_replayed_or_refused(bytes in proptest::collection::vec(any::<u8>(), 0..400), seed in mutated("journal")) {
+        subjects::journal::run(&bytes);
+        subjects::journal::run(&seed);
     }
 
     #[test]

@@ -42,6 +42,17 @@ fn an_arm_is_moved_by_calls_and_shut_down() {
 }
 
 #[test]
+fn an_arm_that_is_left_disabled_can_be_enabled_at_once() {
+    let arm = Controller::start_disabled(config("arm6-erob.toml"), SessionOptions::default()).unwrap();
+    let is_off = |state: &Snapshot| state.axes().iter().all(|axis| !axis.drive_state.has_torque());
+    assert!(is_off(&arm.state()));
+    // Before its life cycle has looked at it again.
+    arm.enable().unwrap();
+    arm.wait_for(Phase::Holding, PATIENCE).unwrap();
+    assert_eq!(arm.finish().unwrap().outcome, Outcome::Finished);
+}
+
+#[test]
 fn an_impossible_command_is_an_error_before_it_is_sent() {
     let arm = start("erob-modes/erob-pv.toml");
     assert_eq!(arm.move_to(&[0.0, 0.0]), Err(CommandError::Count { given: 2, axes: 1 }));

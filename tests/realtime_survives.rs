@@ -67,6 +67,7 @@ fn run<P: BusPort + Send + 'static>(
         host: rt,
         spin_guard_ns: None,
         is_realtime_required: false,
+        clock_journal: None,
     };
     let running = realtime_thread::start(realtime_thread::thread_config(&config.realtime), work).unwrap();
     let mut supervisor = Supervisor::new(config, None);

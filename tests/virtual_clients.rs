@@ -7,9 +7,10 @@ use std::thread;
 use std::time::Duration;
 
 use takt::config::Interface;
+use takt::rt::RequestTarget;
 use takt::{
-    Config, MotionError, MoveOptions, Outcome, Phase, Snapshot, StartFailure, StopCategory, StreamState,
-    TrajectoryPoint, VirtualController, WaitError,
+    Config, MotionError, MoveOptions, Outcome, Phase, RunningController, Snapshot, StartFailure,
+    StopCategory, StreamState, TrajectoryPoint, VirtualController, WaitError,
 };
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -24,6 +25,37 @@ fn simulated(name: &str) -> VirtualController {
 
 fn set_points(state: &Snapshot) -> Vec<f64> {
     state.axes().iter().map(|axis| axis.position_set).collect()
+}
+
+#[test]
+fn drives_that_are_left_disabled_report_where_they_are_and_have_no_torque_until_they_are_enabled() {
+    for name in
+        ["arm6-erob.toml", "gantry-yz-aim.toml", "hollow-arm.toml", "damiao-arm.toml", "mixed-arm.toml"]
+    {
+        let arm = VirtualController::start_disabled(&config(name), None).unwrap();
+        let is_off = |state: &Snapshot| {
+            state.groups().iter().all(|group| group.phase == Phase::Disabled)
+                && state.axes().iter().all(|axis| axis.is_heard && !axis.drive_state.has_torque())
+        };
+        assert!(is_off(&arm.state()), "{name}");
+        // Longer than every stage of the life cycle may take.
+        arm.pass(Duration::from_secs(20));
+        assert!(is_off(&arm.state()), "{name}");
+        let moving = arm.move_by(&vec![0.001; arm.axes().len()], MoveOptions::default());
+        assert!(moving.is_err() || arm.wait(moving.unwrap(), PATIENCE).is_err(), "{name}");
+        assert!(is_off(&arm.state()), "{name}");
+        arm.enable().unwrap();
+        arm.wait_for(Phase::Holding, PATIENCE).unwrap();
+        arm.disable().unwrap();
+        arm.wait_for(Phase::Disabled, PATIENCE).unwrap();
+        assert_eq!(arm.finish(), Outcome::Finished, "{name}");
+    }
+}
+
+#[test]
+fn drives_that_are_left_disabled_are_shut_down_without_having_been_enabled() {
+    let arm = VirtualController::start_disabled(&config("arm6-erob.toml"), None).unwrap();
+    assert_eq!(arm.finish(), Outcome::Finished);
 }
 
 #[test]
@@ -101,6 +133,19 @@ fn a_group_is_moved_by_a_distance_alone() {
         let expected = if arm.axes().contains(&axis) { 0.05 } else { 0.0 };
         assert!((now - before - expected).abs() < 1e-9, "axis {axis}");
     }
+}
+
+#[test]
+fn a_stop_of_the_only_group_by_its_number_stops_it() {
+    let arm = simulated("first.toml");
+    let only = RequestTarget::Group(0);
+    let motion = arm.begin_move(only, &[0.5], MoveOptions::default()).unwrap();
+    arm.step(200);
+    let before = arm.newest_stop(only);
+    arm.request_stop(only, StopCategory::Two).unwrap();
+    assert_eq!(arm.wait_until_still(only, before, PATIENCE), Ok(()));
+    assert!(matches!(arm.wait(motion, PATIENCE), Err(MotionError::Stopped(_))));
+    assert_eq!(arm.state().groups()[0].phase, Phase::Holding);
 }
 
 #[test]

@@ -155,6 +155,7 @@ pub fn measure(
             Pacing::SleepThenSpin => options.realtime.spin_guard_ns,
         },
         is_realtime_required: false,
+        clock_journal: None,
     };
     // The ring of requests is empty: there is room for this request, and later for the one to shut down.
     let _ = host.request(Request::Sync(has_bus));

@@ -15,7 +15,7 @@ use super::set_points::SetPointLog;
 use crate::channels::{GivenTrajectory, GroupAxes, LogSide};
 use crate::config::Config;
 use crate::controller::assemble::AssembleError;
-use crate::controller::{Interrupt, Outcome, VirtualRun};
+use crate::controller::{AfterBringUp, Interrupt, Outcome, VirtualRun};
 use crate::sim::SimulatedBus;
 use crate::trajectory::TrajectoryConditions;
 
@@ -43,7 +43,7 @@ impl<'a> VirtualStage<'a> {
     ) -> Result<Self, AssembleError> {
         config.validate()?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
-        let (run, log) = VirtualRun::serving(config, ports)?;
+        let (run, log) = VirtualRun::serving(config, ports, AfterBringUp::Enable)?;
         Ok(Self {
             run,
             log,

@@ -30,6 +30,7 @@ mod point;
 mod tests;
 mod time_law;
 mod waypoints;
+mod words;
 
 use std::sync::Arc;
 

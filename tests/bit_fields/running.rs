@@ -50,6 +50,27 @@ fn every_example_configuration_starts_without_a_jump_and_runs_its_program() {
     }
 }
 
+#[test]
+fn requests_leave_at_one_moment_of_the_slot_however_long_their_cycle_was_computed() {
+    for (name, send_phase_ns) in
+        [("hollow-arm.toml", 625_000), ("hollow-leg-fd.toml", 650_000), ("hollow-rs485.toml", 2_850_000)]
+    {
+        let mut world = World::new(load(name));
+        let period_ns = world.config.cycle.period_ns;
+        let mut computed_ns = 0;
+        let outcome = world.run_to_the_end(|world| {
+            computed_ns = (computed_ns + 7_000) % 75_000;
+            world.run.clock().compute_for(computed_ns);
+        });
+        assert_eq!(outcome, Outcome::Finished, "{name}: {:?}", world.stops());
+        let requests = world.port(0).sent_with(1);
+        assert!(requests.len() > 200, "{name}");
+        for (at_ns, _) in requests {
+            assert_eq!(at_ns % period_ns, send_phase_ns, "{name}");
+        }
+    }
+}
+
 /// A machine with one drive of a description that ships with takt.
 fn described(description: &str) -> Config {
     let scales = match description {

@@ -142,6 +142,7 @@ fn bus(number: usize) -> Bus {
 
 fn axis(number: usize, bus: usize, node: u8) -> Axis {
     Axis {
+        urdf: None,
         name: format!("joint{}", number + 1),
         bus,
         node,

@@ -76,7 +76,7 @@ impl Bench {
                 *fastest = fastest.max(reading.velocity.abs())
             }
             SessionEvent::Sent(frame) => sent.push(frame),
-            SessionEvent::Received(_) => {}
+            SessionEvent::Procedure(ProcedureEvent::Progress { .. }) | SessionEvent::Received(_) => {}
         })
     }
 
