@@ -1,14 +1,18 @@
 //! Moves an arm that another process serves: `takt run configs/arm6-erob.toml --serve arm`, and beside it `cargo run --example remote arm`.
+//! `docs/another-process.md` shows it.
 
 use std::time::Duration;
 
-/// Moves each axis of the arm by 0.05 rad (m).
+/// Moves each axis of the arm by 0.05 rad (m), and then each by 0.01 rad (m) by a point of a stream.
 pub fn run(name: &str) -> takt::Result {
     let arm = takt::connect(name)?;
-    let target: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set + 0.05).collect();
-    let motion = arm.move_to(&target)?;
+    let here: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set).collect();
+    let shifted = |by: f64| here.iter().map(|position| position + by).collect::<Vec<f64>>();
+    let motion = arm.move_to(&shifted(0.05))?;
     arm.wait(motion, Duration::from_secs(10))?;
-    println!("{} is at {target:.3?}", arm.machine().name);
+    arm.begin_stream()?;
+    arm.stream().push_now(&shifted(0.06))?;
+    println!("{} is at {:.3?}, and goes on by 0.01", arm.machine().name, shifted(0.05));
     Ok(())
 }
 

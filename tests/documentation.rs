@@ -54,3 +54,12 @@ fn the_readme_stays_short() {
     let words = fs::read_to_string(root().join("README.md")).unwrap().split_whitespace().count();
     assert!(words < 1_200, "{words} words: details belong into docs/");
 }
+
+/// `tests/examples.rs` runs it.
+#[test]
+fn the_program_for_another_process_is_an_example() {
+    let page = fs::read_to_string(root().join("docs/another-process.md")).unwrap();
+    let example = fs::read_to_string(root().join("examples/remote.rs")).unwrap();
+    let (_, program) = example.split_once("\n\n").unwrap();
+    assert!(page.contains(&format!("```rust\n{program}```")), "the page does not show\n{program}");
+}

@@ -74,7 +74,7 @@ fn what_breaks_a_limit_is_refused_before_anything_moves_and_a_stop_ends_what_mov
         panic!("{refused}")
     };
     assert_eq!((number, axis), (1, 0));
-    assert!(refused.to_string().starts_with("points[1], axis 0: velocity 5"), "{refused}");
+    assert!(refused.to_string().starts_with("point 1, axis 0: velocity 5"), "{refused}");
     let refused = arm.execute(&[point(&arm, 0.0, 0.1), point(&arm, 1.0, 0.2)]).unwrap_err();
     assert!(matches!(refused, CommandError::Trajectory(TrajectoryError::Start { .. })));
     for (now, before) in arm.state().axes.iter().zip(before) {

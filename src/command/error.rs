@@ -7,7 +7,7 @@ use takt_rt::{RequestError, StopReason};
 
 use super::point_check::PointRefusal;
 use crate::telemetry::{Machine, words};
-use crate::trajectory::{RateError, TrajectoryError};
+use crate::trajectory::{RateError, TrajectoryError, axis_name};
 
 /// The real-time thread has refused a request.
 #[derive(Clone, PartialEq, thiserror::Error)]
@@ -161,6 +161,17 @@ pub enum CommandError {
     Ended,
 }
 
+impl CommandError {
+    /// The text, with every axis by its name. `axes` are the names of those that the command was for, in their order.
+    pub fn naming(&self, axes: &[&str]) -> String {
+        match self {
+            Self::Trajectory(error) => error.naming(axes),
+            Self::Rate(error) => error.naming(axes),
+            _ => self.to_string(),
+        }
+    }
+}
+
 /// Why a client of another process may not command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
@@ -203,7 +214,7 @@ pub enum StreamError {
         axes: usize,
     },
     /// An axis does not take what a point says of it.
-    #[error("axis {axis} does not take point {point}: {reason}")]
+    #[error("point {point}, {}: {reason}", axis_name(&[], *axis))]
     Refused {
         /// Which point, from 0 on.
         point: usize,
@@ -227,6 +238,18 @@ pub enum StreamError {
     /// The controller has ended, or is about to.
     #[error("the controller has ended")]
     Ended,
+}
+
+impl StreamError {
+    /// The text, with the axis by its name. `axes` are the names of those that the points are for, in their order.
+    pub fn naming(&self, axes: &[&str]) -> String {
+        match self {
+            Self::Refused { point, axis, reason } => {
+                format!("point {point}, {}: {reason}", axis_name(axes, *axis))
+            }
+            _ => self.to_string(),
+        }
+    }
 }
 
 /// Why a motion did not reach its targets.

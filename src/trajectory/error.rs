@@ -187,6 +187,14 @@ impl TrajectoryError {
         }
     }
 
+    /// The whole text, with the axis by its name. `axes` are the names of those that the points are for, in their order.
+    pub fn naming(&self, axes: &[&str]) -> String {
+        let point = self.point().map(|point| format!("point {point}"));
+        let axis = self.axis().map(|axis| axis_name(axes, axis));
+        let place: Vec<String> = point.into_iter().chain(axis).collect();
+        if place.is_empty() { self.words() } else { format!("{}: {}", place.join(", "), self.words()) }
+    }
+
     /// What is wrong, without the point and the axis.
     pub fn words(&self) -> String {
         match *self {
@@ -233,17 +241,13 @@ impl TrajectoryError {
 
 impl fmt::Display for TrajectoryError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(point) = self.point() {
-            write!(f, "points[{point}]")?;
-        }
-        match (self.point(), self.axis()) {
-            (Some(_), Some(axis)) => write!(f, ", axis {axis}: ")?,
-            (None, Some(axis)) => write!(f, "axis {axis}: ")?,
-            (Some(_), None) => f.write_str(": ")?,
-            (None, None) => {}
-        }
-        f.write_str(&self.words())
+        f.write_str(&self.naming(&[]))
     }
+}
+
+/// The name of an axis of a call; its number where `axes` has none for it.
+pub(crate) fn axis_name(axes: &[&str], axis: usize) -> String {
+    axes.get(axis).map_or_else(|| format!("axis {axis}"), |name| (*name).to_owned())
 }
 
 impl std::error::Error for TrajectoryError {}

@@ -17,7 +17,7 @@
 //! let trajectory = Trajectory::new(&[point(1.0, 0.5), point(2.0, 0.2)], &conditions).unwrap();
 //! assert_eq!(trajectory.duration_s(), 2.0);
 //! let too_fast = Trajectory::new(&[point(0.1, 0.5)], &conditions).unwrap_err();
-//! assert!(too_fast.to_string().starts_with("points[0], axis 0: "), "{too_fast}");
+//! assert!(too_fast.to_string().starts_with("point 0, axis 0: "), "{too_fast}");
 //! ```
 
 mod check;
@@ -39,6 +39,7 @@ use takt_rt::{AxisLimits, Polynomial, TimeLawPhase, TrajectorySample, Trajectory
 
 use interpolation::Knots;
 
+pub(crate) use error::axis_name;
 pub use error::{BrokenLimit, PointQuantity, TrajectoryError};
 pub use point::{AxisPoints, TrajectoryPoint};
 pub use time_law::RateError;

@@ -64,7 +64,7 @@ fn what_is_wrong_with_points_is_named_with_the_first_of_them() {
     assert_eq!(infinite, expected);
     let close = refused(&[point(0.5, &[0.0]), point(0.5 + 1e-15, &[0.1])]);
     assert!(matches!(close, TrajectoryError::Limit { point: 1, axis: 0, .. }), "{close:?}");
-    assert_eq!(count.to_string(), "points[1]: 2 values of position are given for 1 axes",);
+    assert_eq!(count.to_string(), "point 1: 2 values of position are given for 1 axes",);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use takt_rt::{AxisLimits, PathTime, Polynomial, TimeLawPhase};
 
 use super::check;
-use super::error::BrokenLimit;
+use super::error::{BrokenLimit, axis_name};
 use super::{Path, Trajectory};
 
 /// Room for rounding, relative to the limit: half of what the guard has.
@@ -50,7 +50,7 @@ pub enum RateError {
     #[error("the trajectory is over")]
     Over,
     /// At this rate a limit is broken on the way to a point.
-    #[error("at the rate {rate} axis {axis} breaks its limit of {broken} on the way to points[{point}]")]
+    #[error("{}", limit_words(*rate, *point, &axis_name(&[], *axis), *broken))]
     Limit {
         /// The rate.
         rate: f64,
@@ -67,6 +67,22 @@ pub enum RateError {
         /// The rate.
         rate: f64,
     },
+}
+
+fn limit_words(rate: f64, point: usize, axis: &str, broken: BrokenLimit) -> String {
+    format!("at the rate {rate}, {axis} breaks its limit of {broken} on the way to point {point}")
+}
+
+impl RateError {
+    /// The text, with the axis by its name. `axes` are the names of those that the trajectory is for, in their order.
+    pub fn naming(&self, axes: &[&str]) -> String {
+        match *self {
+            Self::Limit { rate, point, axis, broken } => {
+                limit_words(rate, point, &axis_name(axes, axis), broken)
+            }
+            _ => self.to_string(),
+        }
+    }
 }
 
 impl Trajectory {

@@ -187,11 +187,9 @@ impl Failure {
 
     /// Of a command for these axes.
     pub(crate) fn of_command(error: &CommandError, scope: &Scope) -> Self {
-        let axes = &scope.axes;
-        let known = &scope.controller.machine().axes;
-        let by_name =
-            |name: &str| axes.iter().position(|axis| known.get(*axis).is_some_and(|axis| axis.name == name));
-        let failure = Self::new(result_of(error), error.to_string());
+        let (axes, names) = (&scope.axes, scope.axis_names());
+        let by_name = |name: &str| names.iter().position(|axis| *axis == name);
+        let failure = Self::new(result_of(error), error.naming(&names));
         match error {
             CommandError::NoSuchAxis { axis, .. } => failure.on_axis(Some(*axis)),
             CommandError::OutsideLimits { axis, value, lowest, highest } => {
@@ -302,9 +300,10 @@ fn result_of_refusal(refused: &Refused) -> takt_result {
     }
 }
 
-impl From<StreamError> for Failure {
-    fn from(error: StreamError) -> Self {
-        let words = error.to_string();
+impl Failure {
+    /// Of points for these axes.
+    pub(crate) fn of_stream(error: StreamError, scope: &Scope) -> Self {
+        let words = error.naming(&scope.axis_names());
         match error {
             StreamError::Refused { point, axis, reason } => {
                 let (result, beyond) = match reason {

@@ -73,6 +73,12 @@ impl Scope {
         Self { controller, own, target, axes, owner: Mutex::new(None) }
     }
 
+    /// The names of its axes, in their order.
+    pub(crate) fn axis_names(&self) -> Vec<&str> {
+        let known = &self.controller.machine().axes;
+        self.axes.iter().filter_map(|axis| known.get(*axis)).map(|axis| axis.name.as_str()).collect()
+    }
+
     /// The name of its group; `None` for all axes.
     pub(crate) fn group_name(&self) -> Option<&str> {
         match self.target {

@@ -237,13 +237,15 @@ pub unsafe extern "C" fn takt_push_positions_chunk(
 }
 
 fn push(scope: &Scope, at_ns: u64, entries: &[AxisPoint]) -> Result<(), Failure> {
-    Ok(scope.controller.push_point(scope.target, at_ns, entries)?)
+    let pushed = scope.controller.push_point(scope.target, at_ns, entries);
+    pushed.map_err(|error| Failure::of_stream(error, scope))
 }
 
 fn push_chunk(scope: &Scope, from_ns: u64, interval_ns: u64, entries: &[AxisPoint]) -> Result<(), Failure> {
     let rows: Vec<Vec<AxisPoint>> = entries.chunks(scope.axes.len().max(1)).map(<[_]>::to_vec).collect();
     let interval = Duration::from_nanos(interval_ns);
-    Ok(scope.controller.push_chunk(scope.target, from_ns, interval, &rows)?)
+    let pushed = scope.controller.push_chunk(scope.target, from_ns, interval, &rows);
+    pushed.map_err(|error| Failure::of_stream(error, scope))
 }
 
 /// One point. It allocates nothing, so that a real-time thread of the program may push it.

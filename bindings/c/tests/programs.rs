@@ -172,9 +172,34 @@ fn every_example_of_the_guide_is_compiled_and_every_program_of_it_runs() {
             programs += 1;
         }
     }
-    assert_eq!(programs, 2);
+    assert_eq!(programs, 2, "the page has the programs of ten lines in both languages");
     assert!(fragments.matches("(void)arm").count() >= 4);
     let source = takt.programs.path().join("fragments.c");
     fs::write(&source, fragments + "int main(void) { return 0; }\n").unwrap();
     takt.compile(&source, &[], Library::Shared);
+}
+
+/// From a folder that has nothing but the checkout, as the page begins; what `bindings/c/install` installs is where a system has it.
+#[test]
+fn the_commands_of_the_guide_make_the_arm_move_from_an_empty_folder() {
+    if !is_here("pkg-config") {
+        eprintln!("pkg-config is not here; tests/run installs it");
+        return;
+    }
+    let takt = Installed::new();
+    let folder = takt.programs.path();
+    std::os::unix::fs::symlink(repository(), folder.join("takt")).unwrap();
+    for (language, name) in [("c", "first.c"), ("cpp", "first.cpp")] {
+        fs::write(folder.join(name), &blocks(language)[0]).unwrap();
+    }
+    // The first of them installs.
+    let commands = blocks("sh")[1..].to_vec();
+    assert_eq!(commands.len(), 2, "{commands:?}");
+    for commands in commands {
+        let mut shell = Command::new("sh");
+        shell.args(["-e", "-c", &commands]).current_dir(folder);
+        shell.env("PKG_CONFIG_PATH", takt.prefix.join("lib/pkgconfig"));
+        shell.env("LD_LIBRARY_PATH", takt.prefix.join("lib"));
+        assert_eq!(succeeds(&mut shell), "the joint is there\n");
+    }
 }

@@ -11,6 +11,7 @@ crash of the policy leave the arm within its limits. Without lerobot installed t
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -54,7 +55,8 @@ class TaktRobot(Robot):
         self.arm = arm
         self._stream: takt.Stream | None = None
         # The names are needed before the arm is connected.
-        self._names = [axis.name for axis in (arm or takt.simulate(config.config)).axes]
+        with nullcontext(arm) if arm else takt.simulate(config.config) as described:
+            self._names = [axis.name for axis in described.axes]
 
     @property
     def observation_features(self) -> dict[str, Any]:
@@ -81,6 +83,8 @@ class TaktRobot(Robot):
         pass
 
     def connect(self, calibrate: bool = True) -> None:
+        if self.is_connected:
+            raise ConnectionError("the robot is connected already")
         if self.arm is None:
             self.arm = takt.Arm(self.config.config, simulated=self.config.simulated, buses=self.config.buses)
         for camera in self.cameras.values():
@@ -88,6 +92,7 @@ class TaktRobot(Robot):
         self._stream = self.arm.follow()
 
     def get_observation(self) -> dict[str, Any]:
+        self._check_connected()
         state = self.arm.state
         if state.fault:
             raise takt.StoppedError(state.fault)
@@ -96,6 +101,7 @@ class TaktRobot(Robot):
 
     def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
         """Returns what is sent: the action within the limits of the positions."""
+        self._check_connected()
         wanted = np.array([action[f"{name}.pos"] for name in self._names], dtype=float)
         limits = [(axis.position_min, axis.position_max) for axis in self.arm.axes]
         sent = np.clip(wanted, *np.transpose(limits))
@@ -104,14 +110,22 @@ class TaktRobot(Robot):
 
     def send_chunk(self, actions: np.ndarray, fps: float) -> None:
         """A whole chunk of a policy (ACT, diffusion): a row for each action, from now on. The next chunk may overlap it."""
+        self._check_connected()
         self._stream.push_chunk(None, 1.0 / fps, actions)
 
+    def _check_connected(self) -> None:
+        if not self.is_connected:
+            raise ConnectionError("the robot is not connected: call connect() first")
+
     def disconnect(self) -> None:
-        if self._stream is not None:
-            self._stream.finish()
-            self._stream = None
-        for camera in self.cameras.values():
-            camera.disconnect()
-        if self.arm is not None:
-            self.arm.close()
-            self.arm = None
+        stream, arm = self._stream, self.arm
+        self._stream = self.arm = None
+        try:
+            if stream is not None:
+                stream.finish()
+        finally:
+            # After a fault, too.
+            for camera in self.cameras.values():
+                camera.disconnect()
+            if arm is not None:
+                arm.close()

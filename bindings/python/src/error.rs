@@ -88,7 +88,7 @@ pub fn raise_timeout(py: Python<'_>, words: &str) -> PyErr {
 
 /// A command that was not executed. `axes` are the names of those that it was for.
 pub fn raise_command(py: Python<'_>, axes: &[&str], error: &CommandError) -> PyErr {
-    let words = error.to_string();
+    let words = error.naming(axes);
     match error {
         CommandError::OutsideLimits { axis, value, lowest, highest } => {
             let fields = [
@@ -127,15 +127,7 @@ fn raise_refused(py: Python<'_>, refused: &Refused) -> PyErr {
 }
 
 fn raise_trajectory(py: Python<'_>, axes: &[&str], error: &TrajectoryError) -> PyErr {
-    let axis = error
-        .axis()
-        .map(|axis| axes.get(axis).map_or_else(|| format!("axis {axis}"), |name| (*name).to_owned()));
-    let point = error.point().map(|point| format!("point {point}"));
-    let place: Vec<String> = point.into_iter().chain(axis.clone()).collect();
-    let words = match place.is_empty() {
-        true => error.words(),
-        false => format!("{}: {}", place.join(", "), error.words()),
-    };
+    let axis = error.axis().and_then(|axis| axes.get(axis)).map(|name| (*name).to_owned());
     let mut fields = vec![("point", Field::from(error.point())), ("axis", axis.into())];
     if let TrajectoryError::Limit { broken, time_s, value, limit, .. } = error {
         fields.extend([
@@ -145,7 +137,7 @@ fn raise_trajectory(py: Python<'_>, axes: &[&str], error: &TrajectoryError) -> P
             ("limit", (*limit).into()),
         ]);
     }
-    raise(py, "TrajectoryError", &words, &fields)
+    raise(py, "TrajectoryError", &error.naming(axes), &fields)
 }
 
 /// A motion that has not reached its targets.
@@ -180,11 +172,10 @@ pub fn raise_stopped(py: Python<'_>, axes: &[&str], stopped: &Stopped) -> PyErr 
 
 /// Points of a stream that were not taken. `axes` are the names of those that they are for.
 pub fn raise_stream(py: Python<'_>, axes: &[&str], error: &StreamError) -> PyErr {
-    let words = error.to_string();
+    let words = error.naming(axes);
     match error {
-        StreamError::Refused { point, axis, reason } => {
-            let name = axes.get(*axis).map_or_else(|| format!("axis {axis}"), |name| (*name).to_owned());
-            let words = format!("point {point}, {name}: {reason}");
+        StreamError::Refused { point, axis, .. } => {
+            let name = axes.get(*axis).map(|name| (*name).to_owned());
             raise(py, "StreamError", &words, &[("point", (*point).into()), ("axis", name.into())])
         }
         StreamError::Count { .. } => raise(py, "ArgumentError", &words, &[]),

@@ -18,6 +18,8 @@ def test_a_robot_of_lerobot_observes_and_acts():
     sim = takt.simulate(ARM6)
     robot = TaktRobot(TaktRobotConfig(config=ARM6), arm=sim)
     assert not robot.is_connected
+    with pytest.raises(ConnectionError, match="connect"):
+        robot.get_observation()
     robot.connect()
     assert robot.is_connected and robot.is_calibrated
     assert set(robot.observation_features) == {f"joint{n}.pos" for n in range(1, 7)} == set(robot.action_features)
@@ -36,6 +38,8 @@ def test_a_robot_of_lerobot_observes_and_acts():
     assert_within_limits(recording, sim.axes)
     robot.disconnect()
     assert sim.has_ended and not robot.is_connected
+    with pytest.raises(ConnectionError, match="connect"):
+        robot.send_action(wild)
 
 
 def test_a_robot_of_lerobot_starts_its_own_arm():

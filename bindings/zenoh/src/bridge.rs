@@ -221,11 +221,23 @@ impl Bridge {
             match found {
                 Err(reason) => tell(&format!("a trajectory was refused: {reason}")),
                 Ok(wanted) => match self.begin(&wanted) {
-                    Err(reason) => tell(&format!("a trajectory was refused: {reason}")),
+                    Err(reason) => {
+                        let reason = reason.naming(&self.axes_of(&wanted));
+                        tell(&format!("a trajectory was refused: {reason}"));
+                    }
                     Ok(()) => tell(&words_of(&wanted)),
                 },
             }
         }
+    }
+
+    /// The names of the axes that it is for.
+    fn axes_of(&self, wanted: &Wanted) -> Vec<&str> {
+        let is_for = |axis: &&AxisPlace| match wanted {
+            Wanted::Stop => true,
+            Wanted::Execute { group, .. } => axis.group == *group,
+        };
+        self.axes.iter().filter(is_for).map(|axis| axis.name.as_str()).collect()
     }
 
     fn begin(&self, wanted: &Wanted) -> Result<(), CommandError> {
