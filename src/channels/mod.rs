@@ -65,6 +65,7 @@ pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 pub use stream::{GroupStream, Streamer, chunk};
 pub use trajectories::{GivenTrajectory, NumberedTrajectory, TrajectoryGiver};
+use words::take_snapshot_into;
 pub(crate) use words::{put_snapshot, snapshot_words, take_snapshot};
 
 /// The capacity of each channel.
@@ -441,6 +442,11 @@ impl HostSide {
         self.observer.snapshot()
     }
 
+    /// The same, written over an earlier one of this controller, or over [`Snapshot::default`].
+    pub fn read_snapshot(&self, snapshot: &mut Snapshot) {
+        self.observer.read(snapshot);
+    }
+
     /// A handle to the state for another thread.
     pub fn observer(&self) -> Observer {
         self.observer.clone()
@@ -456,9 +462,16 @@ pub struct Observer {
 impl Observer {
     /// The state after the newest complete cycle. Before the first one, it is a passive controller whose drives have reported nothing.
     pub fn snapshot(&self) -> Snapshot {
+        let mut snapshot = words::NO_SNAPSHOT;
+        self.read(&mut snapshot);
+        snapshot
+    }
+
+    /// The same, written over an earlier one of this controller, or over [`Snapshot::default`].
+    pub fn read(&self, snapshot: &mut Snapshot) {
         loop {
-            match self.snapshot.attempt(0, take_snapshot) {
-                Attempt::Whole(snapshot, _) => return snapshot,
+            match self.snapshot.attempt(0, |words| take_snapshot_into(words, snapshot)) {
+                Attempt::Whole((), _) => return,
                 // Three cycles have passed during the read, because this thread was preempted. There is one from the beginning.
                 Attempt::Torn | Attempt::Nothing => std::hint::spin_loop(),
             }

@@ -3,7 +3,7 @@
 use takt_rt::{MotionReport, MotionReports, MotionState, RequestId};
 
 use super::latest::Words;
-use super::words::{put_stop, take_stop};
+use super::words::{fill, put_stop, take_stop};
 
 /// Words of the reports at most. A stop takes four.
 pub const MOTION_WORDS: usize = MotionReports::CAPACITY * (2 + 4);
@@ -37,12 +37,11 @@ pub fn put_motions(motions: &MotionReports, words: &mut Words<'_>) {
     }
 }
 
-pub fn take_motions(words: &mut Words<'_>) -> MotionReports {
-    let mut motions = MotionReports::default();
-    for place in &mut motions.reports {
+pub fn take_motions(words: &mut Words<'_>, motions: &mut MotionReports) {
+    fill(&mut motions.reports, || {
         let packed = words.take();
         if packed == 0 {
-            break;
+            return None;
         }
         let request = RequestId(words.take());
         let state = match packed & 0xFF {
@@ -52,7 +51,6 @@ pub fn take_motions(words: &mut Words<'_>) -> MotionReports {
             _ => MotionState::Replaced { by: RequestId(words.take()) },
         };
         let axis = (packed >> 16 & 1 == 1).then_some((packed >> 8) as u8);
-        *place = Some(MotionReport { request, group: (packed >> 24) as u8, axis, state });
-    }
-    motions
+        Some(MotionReport { request, group: (packed >> 24) as u8, axis, state })
+    });
 }

@@ -99,6 +99,8 @@ pub struct Supervisor {
     arrival: Arrival,
     facts: Vec<AxisFacts>,
     outgoing: VecDeque<RequestEnvelope>,
+    /// Room for the state that is looked at; `None` before the first look, and during each.
+    seen: Option<Box<Snapshot>>,
     numbers: RequestNumbers,
     interrupt: Option<Interrupt>,
     outcome: Option<Outcome>,
@@ -141,6 +143,7 @@ impl Supervisor {
             arrival: Arrival::of(config),
             facts: Vec::new(),
             outgoing: VecDeque::new(),
+            seen: None,
             numbers: RequestNumbers::default(),
             interrupt: None,
             outcome: None,
@@ -223,7 +226,8 @@ impl Supervisor {
             self.off_cycle.receive(now_ns, bus, &received.frame);
             self.shutdown.receive(bus, &received.frame);
         }
-        let snapshot = host.snapshot();
+        let mut snapshot = self.seen.take().unwrap_or_default();
+        host.read_snapshot(&mut snapshot);
         self.tell_of_buses(&snapshot);
         self.numbers = host.numbers();
         self.handle_interrupt(now_ns);
@@ -238,6 +242,7 @@ impl Supervisor {
             }
             self.outgoing.pop_front();
         }
+        self.seen = Some(snapshot);
     }
 
     fn step(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {

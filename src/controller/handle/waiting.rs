@@ -121,10 +121,11 @@ impl Handle {
         mut find: impl FnMut(&Snapshot) -> Option<T>,
     ) -> Result<T, WaitError> {
         let deadline = self.deadline_after(at_most);
+        let mut state = Snapshot::default();
         loop {
             // This is read before the state, so that the state includes the last cycle before the end.
             let has_ended = self.has_ended();
-            let state = self.state();
+            self.0.observer.read(&mut state);
             if let Some(found) = find(&state) {
                 return Ok(found);
             }
