@@ -103,6 +103,15 @@ impl Bench {
         }
     }
 
+    /// Its group is enabled.
+    fn enable(&mut self, duration_ms: u64, position: f64) {
+        self.run(duration_ms, |at_ns| {
+            let mut target = of_wish(OffCycleWish::Enable, at_ns);
+            target.position = position;
+            target
+        });
+    }
+
     /// Follows a velocity from where the joint is.
     fn follow(&mut self, duration_ms: u64, from: f64, velocity: f64) {
         let began_ns = self.now_ns;
@@ -142,7 +151,7 @@ fn a_drive_is_prepared_before_it_is_enabled_and_told_nothing_while_it_is_observe
     bench.run(300, |at_ns| of_wish(OffCycleWish::Observe, at_ns));
     assert!(bench.sent.iter().all(|frame| frame.payload().len() <= 4), "only reads");
     assert_eq!(bench.last().state, DriveState::ReadyToSwitchOn);
-    bench.follow(700, 0.0, 0.0);
+    bench.enable(700, 0.0);
     let written = bench.sent.iter().filter_map(ReceivedRequest::decode);
     let written: Vec<_> =
         written.filter_map(|request| Some((request.address.index, request.value?))).collect();
@@ -157,7 +166,7 @@ fn a_drive_is_prepared_before_it_is_enabled_and_told_nothing_while_it_is_observe
 #[test]
 fn the_joint_stays_close_to_its_reference_and_reports_come_in_the_time_of_the_budget() {
     let mut bench = Bench::new();
-    bench.follow(1_000, 0.0, 0.0);
+    bench.enable(1_000, 0.0);
     let began = bench.reports.len();
     bench.follow(2_000, 0.0, 0.5);
     let position = bench.bus.observe(NODE).unwrap().position;
@@ -172,7 +181,7 @@ fn the_joint_stays_close_to_its_reference_and_reports_come_in_the_time_of_the_bu
 #[test]
 fn a_drive_stops_in_control_and_is_disabled_when_its_set_points_are_stale() {
     let mut bench = Bench::new();
-    bench.follow(1_000, 0.0, 0.0);
+    bench.enable(1_000, 0.0);
     bench.follow(1_000, 0.0, 0.5);
     let gone_ns = bench.now_ns;
     let mut fastest_without_torque = 0.0_f64;
@@ -185,20 +194,33 @@ fn a_drive_stops_in_control_and_is_disabled_when_its_set_points_are_stale() {
     }
     assert!(fastest_without_torque < 0.01, "{fastest_without_torque}");
     assert_eq!(bench.bus.observe(NODE).unwrap().state, DriveState::SwitchOnDisabled);
-    assert_eq!(bench.last().state, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.last().state, DriveState::ReadyToSwitchOn);
     assert_eq!(bench.writes(0x01FE).last(), Some(&Some(0)));
     // It does not go on by itself when its controller is there again.
     bench.follow(1_000, 0.0, 0.0);
-    assert_eq!(bench.last().state, DriveState::SwitchOnDisabled);
-    bench.run(100, |at_ns| of_wish(OffCycleWish::Stop, at_ns));
-    bench.follow(1_000, 0.6, 0.0);
+    assert_eq!(bench.last().state, DriveState::ReadyToSwitchOn);
+    bench.enable(1_000, 0.6);
     assert_eq!(bench.last().state, DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_drive_whose_set_points_were_stale_while_it_was_enabled_is_enabled_when_they_come_again() {
+    // Before, while and after the drive gets torque.
+    for before_ms in [20, 200, 1_000] {
+        let mut bench = Bench::new();
+        bench.enable(before_ms, 0.0);
+        let gone_ns = bench.now_ns;
+        bench.run(1_000, |_| of_wish(OffCycleWish::Enable, gone_ns));
+        assert_eq!(bench.bus.observe(NODE).unwrap().state, DriveState::SwitchOnDisabled, "{before_ms}");
+        bench.enable(1_000, 0.0);
+        assert_eq!(bench.last().state, DriveState::OperationEnabled, "{before_ms}");
+    }
 }
 
 #[test]
 fn a_drive_that_was_silent_is_stopped_as_soon_as_it_answers_again() {
     let mut bench = Bench::new();
-    bench.follow(1_000, 0.0, 0.0);
+    bench.enable(1_000, 0.0);
     bench.follow(500, 0.0, 0.5);
     bench.bus.inject_defect(NODE, Defect::SilentSdoServer, true).unwrap();
     let reports = bench.reports.len();
@@ -207,14 +229,14 @@ fn a_drive_that_was_silent_is_stopped_as_soon_as_it_answers_again() {
     bench.bus.inject_defect(NODE, Defect::SilentSdoServer, false).unwrap();
     bench.outstanding = (0, 0);
     bench.follow(1_500, 0.45, 0.5);
-    assert_eq!(bench.last().state, DriveState::SwitchOnDisabled);
+    assert_eq!(bench.last().state, DriveState::ReadyToSwitchOn);
     assert!(bench.bus.observe(NODE).unwrap().velocity.abs() < 0.01);
 }
 
 #[test]
 fn an_error_of_the_drive_is_reported_and_cleared_when_that_is_wanted() {
     let mut bench = Bench::new();
-    bench.follow(1_000, 0.0, 0.0);
+    bench.enable(1_000, 0.0);
     bench.bus.inject_fault(NODE, DriveFault::OverCurrent).unwrap();
     bench.follow(100, 0.0, 0.0);
     assert_eq!((bench.last().state, bench.last().error_code), (DriveState::Fault, 0x2310));
@@ -227,7 +249,8 @@ fn an_error_of_the_drive_is_reported_and_cleared_when_that_is_wanted() {
 fn a_drive_that_seems_to_have_an_error_is_disabled_before_that_counts() {
     let mut bench = Bench::new();
     bench.run(100, |at_ns| of_wish(OffCycleWish::Observe, at_ns));
-    bench.follow(1500, 0.0, 0.5);
+    bench.enable(1_000, 0.0);
+    bench.follow(500, 0.0, 0.5);
     assert_eq!(bench.bus.observe(NODE).unwrap().state, DriveState::OperationEnabled);
     // The reply to the question for its error is the late one to another question.
     let asks_for_error = |frame: &Frame| {
@@ -235,12 +258,12 @@ fn a_drive_that_seems_to_have_an_error_is_disabled_before_that_counts() {
     };
     let began_ns = bench.now_ns;
     while !bench.sent.last().is_some_and(asks_for_error) {
-        bench.follow(1, 0.5, 0.5);
+        bench.follow(1, 0.25, 0.5);
         assert!(bench.now_ns < began_ns + 1000 * MS);
     }
     bench.follower.receive(bench.now_ns, &Reply::Value(0x1234).frame(NODE));
     bench.reports.clear();
-    bench.run(200, |at_ns| wanted(0.5, 0.0, at_ns));
+    bench.run(200, |at_ns| wanted(0.25, 0.0, at_ns));
     assert_eq!(bench.bus.observe(NODE).unwrap().state, DriveState::SwitchOnDisabled);
     assert_eq!((bench.last().state, bench.last().error_code), (DriveState::Fault, 0x1234));
 }
@@ -249,7 +272,7 @@ fn a_drive_that_seems_to_have_an_error_is_disabled_before_that_counts() {
 fn a_drive_that_is_not_to_be_enabled_is_told_so_again_and_again() {
     let mut bench = Bench::new();
     bench.run(100, |at_ns| of_wish(OffCycleWish::Observe, at_ns));
-    bench.follow(1000, 0.0, 0.0);
+    bench.enable(1_000, 0.0);
     bench.sent.clear();
     bench.run(1000, |at_ns| of_wish(OffCycleWish::Stop, at_ns));
     let told = bench.writes(0x0100);
@@ -324,7 +347,7 @@ fn firmware_that_takes_the_velocity_limit_while_enabled_is_simulated_by_a_key() 
     };
     for (value, takes) in [("true", true), ("false", false)] {
         let mut bench = Bench::of(&Config::parse("turntable.toml", &with(value)).unwrap());
-        bench.follow(1_000, 0.0, 0.0);
+        bench.enable(1_000, 0.0);
         let write = [0x02, 0x04, 0, 0, 0x27, 0x10];
         let request = Frame::of(bench.sent[0].id(), write);
         bench.bus.receive(bench.now_ns + 5 * MS, &mut ReceiveBatch::new());

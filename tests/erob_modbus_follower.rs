@@ -90,7 +90,7 @@ impl Bench {
     fn following() -> Self {
         let mut bench = Self::new(0);
         bench.run(200, |_| (OffCycleWish::Stop, 0.25, 0.0));
-        bench.run(1_500, |_| (OffCycleWish::Follow, 0.25, 0.0));
+        bench.run(1_500, |_| (OffCycleWish::Enable, 0.25, 0.0));
         assert_eq!(bench.state(), DriveState::OperationEnabled);
         bench
     }
@@ -177,11 +177,11 @@ fn the_manuals_writes_and_its_wait_come_before_the_first_velocity() {
     let mut bench = Bench::new(0);
     bench.run(200, |_| (OffCycleWish::Stop, 0.25, 0.0));
     assert!(bench.written.is_empty());
-    bench.run(400, |_| (OffCycleWish::Follow, 0.25, 0.0));
+    bench.run(400, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!(bench.written, [0x0040, 0x0042, 0x0049, 0x004B, 0x0051, 0x0002, 0x00F0]);
     assert!(bench.drive().is_enabled());
     assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
-    bench.run(700, |_| (OffCycleWish::Follow, 0.25, 0.0));
+    bench.run(700, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!((bench.written[7], bench.state()), (0x0051, DriveState::OperationEnabled));
     bench.run(100, |_| (OffCycleWish::Stop, 0.25, 0.0));
     assert!(!bench.drive().is_enabled());
@@ -192,12 +192,12 @@ fn the_manuals_writes_and_its_wait_come_before_the_first_velocity() {
 #[test]
 fn a_drive_that_was_just_switched_on_is_enabled_as_soon_as_it_can_be() {
     let mut bench = Bench::new(3_000 * MS);
-    bench.run(5_000, |_| (OffCycleWish::Follow, 0.25, 0.0));
+    bench.run(5_000, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!(bench.state(), DriveState::OperationEnabled);
 }
 
 #[test]
-fn stale_targets_stop_the_joint_and_disable_it_until_following_was_unwished() {
+fn stale_targets_stop_the_joint_and_disable_it_until_its_group_is_enabled() {
     let mut bench = Bench::following();
     bench.run(1_000, |time_s| (OffCycleWish::Follow, 0.25 + 0.5 * time_s, 0.5));
     assert!(bench.drive().velocity().abs() > 30_000.0);
@@ -217,9 +217,22 @@ fn stale_targets_stop_the_joint_and_disable_it_until_following_was_unwished() {
     assert!(!bench.drive().is_enabled());
     assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
     let here = bench.position();
-    bench.run(100, |_| (OffCycleWish::Stop, here, 0.0));
-    bench.run(1_500, |_| (OffCycleWish::Follow, here, 0.0));
+    bench.run(1_500, |_| (OffCycleWish::Enable, here, 0.0));
     assert_eq!(bench.state(), DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_drive_whose_targets_were_stale_while_it_was_enabled_is_enabled_when_they_come_again() {
+    // Before, while and after the drive gets torque.
+    for before_ms in [50, 400, 1_500] {
+        let mut bench = Bench::new(0);
+        bench.run(200, |_| (OffCycleWish::Stop, 0.25, 0.0));
+        bench.run(before_ms, |_| (OffCycleWish::Enable, 0.25, 0.0));
+        (0..1_000).for_each(|_| bench.turn());
+        assert!(!bench.drive().is_enabled(), "{before_ms}");
+        bench.run(1_500, |_| (OffCycleWish::Enable, 0.25, 0.0));
+        assert_eq!(bench.state(), DriveState::OperationEnabled, "{before_ms}");
+    }
 }
 
 #[test]
@@ -234,7 +247,7 @@ fn a_fault_is_reported_with_its_code_and_cleared_when_that_is_wished() {
     bench.run(500, |_| (OffCycleWish::ClearFaults, 0.25, 0.0));
     assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
     assert_eq!(bench.written.iter().filter(|register| **register == 0x00F6).count(), 1);
-    bench.run(1_500, |_| (OffCycleWish::Follow, 0.25, 0.0));
+    bench.run(1_500, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!(bench.state(), DriveState::OperationEnabled);
 }
 

@@ -138,7 +138,8 @@ impl Bench {
         match input.byte() {
             0 => self.target.wish = OffCycleWish::Stop,
             1 => self.target.wish = OffCycleWish::ClearFaults,
-            2..20 => self.target.wish = OffCycleWish::Follow,
+            2..11 => self.target.wish = OffCycleWish::Enable,
+            11..20 => self.target.wish = OffCycleWish::Follow,
             20 => (self.target.position, self.target.velocity) = (input.number(), input.number()),
             // The controller is held up.
             21..30 => return,

@@ -26,10 +26,19 @@ pub enum OffCycleWish {
     Observe,
     /// It has no torque.
     Stop,
-    /// It follows the set-points.
+    /// Its group is being enabled: it is to get torque, and to follow the set-points.
+    Enable,
+    /// It follows the set-points. One that has no torque stays without.
     Follow,
     /// Its faults are cleared.
     ClearFaults,
+}
+
+impl OffCycleWish {
+    /// Whether it may have torque.
+    pub(crate) const fn grants_torque(self) -> bool {
+        matches!(self, Self::Enable | Self::Follow)
+    }
 }
 
 impl OffCycleTarget {
@@ -38,6 +47,7 @@ impl OffCycleTarget {
         let wish = match Command::decode(axis.controlword) {
             _ if phase == Phase::Passive => OffCycleWish::Observe,
             _ if axis.controlword & takt_rt::controlword::FAULT_RESET != 0 => OffCycleWish::ClearFaults,
+            Command::SwitchOn | Command::EnableOperation if phase == Phase::Enabling => OffCycleWish::Enable,
             Command::SwitchOn | Command::EnableOperation => OffCycleWish::Follow,
             Command::Shutdown | Command::DisableVoltage | Command::QuickStop => OffCycleWish::Stop,
         };
@@ -126,9 +136,11 @@ mod tests {
             assert_eq!((target.position, target.at_ns), (1.5, 7));
             target.wish
         };
-        let wishes = [0x00, 0x02, 0x06, 0x07, 0x0F, 0x80].map(|word| wish(Phase::Disabled, word));
-        let (stop, follow) = (OffCycleWish::Stop, OffCycleWish::Follow);
-        assert_eq!(wishes, [stop, stop, stop, follow, follow, OffCycleWish::ClearFaults]);
+        let (stop, clear) = (OffCycleWish::Stop, OffCycleWish::ClearFaults);
+        for (phase, on) in [(Phase::Enabling, OffCycleWish::Enable), (Phase::Holding, OffCycleWish::Follow)] {
+            let wishes = [0x00, 0x02, 0x06, 0x07, 0x0F, 0x80].map(|word| wish(phase, word));
+            assert_eq!(wishes, [stop, stop, stop, on, on, clear], "{phase:?}");
+        }
         assert_eq!(wish(Phase::Passive, 0x0F), OffCycleWish::Observe);
     }
 }

@@ -3,11 +3,11 @@
 //! ```text
 //! Off ── Preparing ── Enabling ── Settling ── Following
 //!  │                                              │  the wish ends: Disabling
-//!  └── Barred ─── Disabling ──── Stopping ────────┘  the set-points are stale, the drive was silent
+//!  └───────────── Disabling ──── Stopping ────────┘  the set-points are stale, the drive was silent
 //! ```
 //!
 //! The drive knows nothing of its controller, and goes on with the last set-point if it is gone. So the follower stops it in
-//! control as soon as the set-points are stale, and disables it at rest. A reply says neither what it answers nor whether the drive is
+//! control as soon as the set-points are stale, and disables it at rest; it is enabled only while its group is. A reply says neither what it answers nor whether the drive is
 //! enabled: one that is not to be is told so again and again, and one that shows an error is disabled before that counts.
 
 use takt_rt::{DriveState, Frame, Nanoseconds, OffCycleReport};
@@ -98,8 +98,6 @@ enum Stage {
         /// What it shows afterwards.
         then: Then,
     },
-    /// Without torque, until nobody wants it to follow any more.
-    Barred,
     /// It shows an error, or has refused to be enabled.
     Fault {
         code: u16,
@@ -118,7 +116,7 @@ impl Stage {
             | Self::Following
             | Self::Stopping { .. }
             | Self::Disabling { .. } => true,
-            Self::Off | Self::Preparing { .. } | Self::Barred | Self::Fault { .. } | Self::Judging => false,
+            Self::Off | Self::Preparing { .. } | Self::Fault { .. } | Self::Judging => false,
         }
     }
 }
@@ -127,7 +125,6 @@ impl Stage {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Then {
     Off,
-    Barred,
     /// Its error is read again: disabling ends one whose cause is gone.
     Judging,
     /// It had this error while it had torque. What was read may be the late or corrupted reply to another request.
@@ -255,7 +252,7 @@ impl Follower {
             if matches!(self.stage, Stage::Stopping { is_told: true, .. })
                 && value.saturating_abs() <= STANDING
             {
-                self.stage = Stage::Disabling { then: Then::Barred };
+                self.stage = Stage::Disabling { then: Then::Off };
             }
         } else if address == entries::CONTINUOUS_CURRENT.address {
             self.continuous_current = Some(value);
@@ -278,7 +275,7 @@ impl Follower {
 
     fn take_error(&mut self, code: u16) {
         self.stage = match (self.stage, code) {
-            (Stage::Judging | Stage::Fault { is_tried: true, .. }, 0) => Stage::Barred,
+            (Stage::Judging | Stage::Fault { is_tried: true, .. }, 0) => Stage::Off,
             (Stage::Judging | Stage::Fault { is_tried: true, .. }, code) => {
                 Stage::Fault { code, is_tried: true }
             }
@@ -300,7 +297,6 @@ impl Follower {
             }
             Stage::Disabling { then } if request.address() == entries::MOTOR_ENABLE.address => match then {
                 Then::Off => Stage::Off,
-                Then::Barred => Stage::Barred,
                 Then::Judging => Stage::Judging,
                 Then::Fault(code) => Stage::Fault { code, is_tried: false },
             },
@@ -344,9 +340,10 @@ impl Follower {
     /// Goes on to the stage that is wanted.
     fn advance(&mut self, now_ns: Nanoseconds, target: &OffCycleTarget) {
         let is_stale = now_ns.saturating_sub(target.at_ns) > STALE_NS;
-        let follows = target.wish == OffCycleWish::Follow && !is_stale;
+        let follows = target.wish.grants_torque() && !is_stale;
+        let is_enabling = target.wish == OffCycleWish::Enable && !is_stale;
         self.stage = match self.stage {
-            Stage::Off if follows && self.position.is_some() => {
+            Stage::Off if is_enabling && self.position.is_some() => {
                 Stage::Preparing { setting: 0, differs: false }
             }
             Stage::Preparing { setting, .. } if follows && setting >= self.settings.len() => {
@@ -360,8 +357,7 @@ impl Follower {
                 Stage::Disabling { then: Then::Off }
             }
             Stage::Settling { until_ns } if now_ns >= until_ns => Stage::Following,
-            Stage::Stopping { until_ns, .. } if now_ns >= until_ns => Stage::Disabling { then: Then::Barred },
-            Stage::Barred if target.wish != OffCycleWish::Follow => Stage::Off,
+            Stage::Stopping { until_ns, .. } if now_ns >= until_ns => Stage::Disabling { then: Then::Off },
             Stage::Fault { is_tried: false, .. } if target.wish == OffCycleWish::ClearFaults => {
                 Stage::Disabling { then: Then::Judging }
             }
@@ -397,7 +393,7 @@ impl Follower {
             }
             Stage::Disabling { .. } => write(&entries::MOTOR_ENABLE, 0),
             // Again and again: nothing in a reply shows that it is one to this command.
-            Stage::Off | Stage::Barred | Stage::Fault { .. }
+            Stage::Off | Stage::Fault { .. }
                 if target.wish != OffCycleWish::Observe
                     && self.turn.is_multiple_of(REQUESTS_PER_ROUND as usize * ROUNDS_TO_REPETITION) =>
             {
@@ -449,7 +445,6 @@ impl Follower {
             }
             Stage::Disabling { then: Then::Fault(code) } => (DriveState::FaultReactionActive, code),
             Stage::Stopping { .. } | Stage::Disabling { .. } => (DriveState::QuickStopActive, 0),
-            Stage::Barred => (DriveState::SwitchOnDisabled, 0),
             Stage::Fault { code, .. } => (DriveState::Fault, code),
             Stage::Judging => (DriveState::FaultReactionActive, 0),
             Stage::Off | Stage::Preparing { .. } => (DriveState::ReadyToSwitchOn, 0),

@@ -2,14 +2,14 @@
 //! outcome. The line of the drive carries the requests, see [`line`](super::line).
 //!
 //! ```text
-//! wish to follow ──▶ Preparing ──▶ Enabled (500 ms) ──▶ Following ──┐ stale set-points, a drive that was silent
-//!        ▲                                                          ▼
-//!      Off ◀── Disarming ◀── Disabling ◀──────────────────────── Stopping
+//! group enables ──▶ Preparing ──▶ Enabled (500 ms) ──▶ Following ──┐ stale set-points, a drive that was silent
+//!        ▲                                                         ▼
+//!       Off ◀── Disarming ◀── Disabling ◀────────────────────── Stopping
 //! ```
 //!
 //! A round has three requests: the set-point of the velocity, a read of the position, and another read. The velocity is that of the
-//! reference and a correction of the position. When the set-points are stale, the joint is stopped and disabled; it follows again when that
-//! was unwished in between. The drive watches its master (register 0x0002) from before it is enabled until it is disabled.
+//! reference and a correction of the position. When the set-points are stale, the joint is stopped and disabled. The drive is enabled only
+//! while its group is. It watches its master (register 0x0002) from before it is enabled until it is disabled.
 
 use takt_rt::{DriveState, Nanoseconds, OffCycleReport};
 
@@ -155,8 +155,6 @@ struct Seen {
 pub struct Follower {
     parameters: FollowerParameters,
     life: Life,
-    /// It follows only after it was unwished: targets were stale, or the drive has lost its torque.
-    must_be_unwished: bool,
     /// What the drive has refused before it was enabled. It is shown as a fault until it is cleared.
     refusal: Option<FaultCode>,
     under_way: Option<Purpose>,
@@ -183,7 +181,6 @@ impl Follower {
         Self {
             parameters,
             life: Life::Off,
-            must_be_unwished: false,
             refusal: None,
             under_way: None,
             turn: Turn::Write,
@@ -263,28 +260,23 @@ impl Follower {
 
     /// What follows from the wish, from the age of the target, and from what the drive shows.
     fn go_on(&mut self, now_ns: Nanoseconds, target: &OffCycleTarget) {
-        let wants_to_follow = target.wish == OffCycleWish::Follow;
         let is_stale = now_ns.saturating_sub(target.at_ns) > STALE_NS;
         let is_lost =
             self.silent > 0 && self.answered_ns.is_some_and(|at_ns| now_ns.saturating_sub(at_ns) > LOST_NS);
         let before = self.life;
-        if !wants_to_follow {
-            self.must_be_unwished = false;
-        }
         if target.wish == OffCycleWish::ClearFaults {
             // It may not be wished any more when there is room for the request.
             self.is_clearing_wished = self.seen.fault != 0;
             self.refusal = None;
         }
         let is_told = !matches!(self.life, Life::Off | Life::Disabling | Life::Disarming);
-        if is_told && !wants_to_follow && !is_stale {
+        if is_told && !target.wish.grants_torque() && !is_stale {
             self.life = Life::Disabling;
         }
         match self.life {
             Life::Off
-                if wants_to_follow
+                if target.wish == OffCycleWish::Enable
                     && !is_stale
-                    && !self.must_be_unwished
                     && self.is_known()
                     && self.seen.fault == 0
                     && self.refusal.is_none() =>
@@ -294,18 +286,15 @@ impl Follower {
             Life::Preparing { .. } | Life::Enabled { .. }
                 if is_stale || is_lost || self.seen.fault != 0 || self.refusal.is_some() =>
             {
-                self.must_be_unwished = true;
                 self.life = Life::Disabling;
             }
             Life::Enabled { since_ns } if now_ns.saturating_sub(since_ns) >= ENABLED_NS => {
                 self.life = Life::Following;
             }
             Life::Following if self.seen.fault != 0 || self.seen.is_motor_off => {
-                self.must_be_unwished = true;
                 self.life = Life::Disabling;
             }
             Life::Following if is_stale || is_lost => {
-                self.must_be_unwished = true;
                 self.life = Life::Stopping { since_ns: now_ns };
             }
             Life::Stopping { since_ns } => {
@@ -589,7 +578,7 @@ mod tests {
         fn new() -> Self {
             let follower = Follower::new(PARAMETERS);
             let (written, last) = (vec![], None);
-            let (now_ns, wish) = (MS, OffCycleWish::Follow);
+            let (now_ns, wish) = (MS, OffCycleWish::Enable);
             Self { follower, now_ns, wish, kept_ms: 500, refuses: None, written, was_enabled: false, last }
         }
 
@@ -636,7 +625,7 @@ mod tests {
         assert!(!drive.was_enabled, "{:?}", drive.written);
         (drive.wish, drive.kept_ms) = (OffCycleWish::ClearFaults, 500);
         assert_eq!(drive.run(20).state, DriveState::ReadyToSwitchOn);
-        drive.wish = OffCycleWish::Follow;
+        drive.wish = OffCycleWish::Enable;
         drive.run(60);
         assert!(drive.written.ends_with(&[0x0051, 0x0002, 0x00F0]), "{:?}", drive.written);
     }

@@ -4,7 +4,6 @@ use takt_rt::{ControlLaw, EventKind, Fault, Origin, Rule, StopCause, StopReason}
 
 use super::Seen;
 use crate::heartbeat::MissedHeartbeat;
-use crate::off_cycle::is_beside_the_cycle;
 
 /// What a drive that has missed the heartbeat says in its own: of its node the eRob, of its alarm the YZ-AIM.
 const STOPPED: u8 = 4;
@@ -32,7 +31,6 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
     };
     let has_paused =
         |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.has_paused);
-    let is_beside = |axis: u8| seen.config.axes.get(usize::from(axis)).is_some_and(is_beside_the_cycle);
     let is_neglected =
         |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_neglected);
     let is_loop_closed_here = |axis: u8| {
@@ -63,8 +61,6 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
         // It is spoken to so rarely that its reports miss cycles, and it does not count as at rest.
         (Rule::MissedFeedback | Rule::EnableTimeout, Origin::Axis(axis)) if is_neglected(axis) => true,
-        // Whoever speaks to it stops it when the set-points are older than 100 ms, and enables it again only when that is asked for anew.
-        (Rule::EnableTimeout, Origin::Axis(axis)) if has_paused(axis) && is_beside(axis) => true,
         // A joint swings where the machine is too late to close its loop, and goes on with its last torque while that is away.
         (Rule::FollowingError, Origin::Axis(axis))
             if (is_crowded(axis) || has_paused(axis)) && is_loop_closed_here(axis) =>
