@@ -226,12 +226,12 @@ impl ControlLaw {
     pub fn target(&self, input: &LoopInput, torque: f64, scale: &Scale, limits: &AxisLimits) -> i32 {
         match *self {
             Self::Position | Self::Interpolated | Self::ProfilePosition => {
-                scale.position_to_counts(input.set.position)
+                scale.position_command(input.set.position, limits)
             }
-            Self::ProfileVelocity => scale.velocity_to_drive(input.set.velocity),
+            Self::ProfileVelocity => scale.velocity_command(input.set.velocity, limits),
             Self::ProfileTorque => 0,
-            Self::Velocity { .. } => scale.velocity_to_drive(self.velocity(input, limits)),
-            Self::Torque { .. } => scale.torque_to_per_mille(torque),
+            Self::Velocity { .. } => scale.velocity_command(self.velocity(input, limits), limits),
+            Self::Torque { .. } => scale.torque_command(torque, limits),
         }
     }
 

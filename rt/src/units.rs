@@ -1,7 +1,9 @@
 //! SI on our side, drive units on the wire.
 //!
 //! A position becomes counts by one multiplication and one rounding of the absolute value. Rounded steps are never added up,
-//! so the error stays within half a count.
+//! so the error stays within half a count. At a limit a set-point is rounded to the inside.
+
+use crate::guard::AxisLimits;
 
 /// What a drive counts in, against what the joint does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,6 +136,27 @@ impl Scale {
         nearest(position * self.counts_per_unit + self.zero_counts)
     }
 
+    /// The set-point of a position (rad or m) in counts: to the nearest, at a limit to the inside.
+    #[inline]
+    pub fn position_command(&self, position: f64, limits: &AxisLimits) -> i32 {
+        let AxisLimits { position_min, position_max, .. } = *limits;
+        self.position_to_counts(inward(position, position_min, position_max, self.units_per_count))
+    }
+
+    /// The set-point of a velocity (rad/s or m/s) in the drive's unit: to the nearest, at the limit to the inside.
+    #[inline]
+    pub fn velocity_command(&self, velocity: f64, limits: &AxisLimits) -> i32 {
+        let (limit, unit) = (limits.velocity, self.velocity_per_drive_velocity);
+        self.velocity_to_drive(inward(velocity, -limit, limit, unit))
+    }
+
+    /// The set-point of a torque (N·m or N) in per mille of the rated torque: to the nearest, at the limit to the inside.
+    #[inline]
+    pub fn torque_command(&self, torque: f64, limits: &AxisLimits) -> i32 {
+        let (limit, unit) = (limits.torque, self.torque_per_per_mille);
+        self.torque_to_per_mille(inward(torque, -limit, limit, unit))
+    }
+
     /// Counts to position (rad or m).
     pub fn position_from_counts(&self, counts: i32) -> f64 {
         (f64::from(counts) - self.zero_counts) * self.units_per_count
@@ -164,6 +187,23 @@ impl Scale {
 #[inline]
 fn nearest(value: f64) -> i32 {
     libm::rint(value) as i32
+}
+
+/// A millionth less than half: a limit that is a whole number of units is reached, whatever the last digits say.
+const NEARLY_HALF: f64 = 0.499_999;
+
+/// A set-point that becomes a whole number of units, moved so that rounding leads to the inside of a limit: within half a unit of the
+/// limit to there, beyond the limit by half a unit. It grows with the set-point everywhere; what is no number stays none.
+#[inline]
+pub(crate) fn inward(value: f64, min: f64, max: f64, unit: f64) -> f64 {
+    let half = NEARLY_HALF * unit.abs();
+    if value > max - half {
+        (value - half).max(max - half)
+    } else if value < min + half {
+        (value + half).min(min + half)
+    } else {
+        value
+    }
 }
 
 #[cfg(test)]
@@ -233,6 +273,47 @@ mod tests {
             }).unwrap();
             prop_assert_eq!(scale.position_to_counts(scale.position_from_counts(counts)), counts);
             prop_assert_eq!(scale.velocity_to_drive(scale.velocity_from_drive(counts)), counts);
+        }
+
+        #[test]
+        fn what_is_within_a_limit_is_so_as_a_whole_number_too(
+            min in -20.0f64..0.0, range in 0.01f64..20.0, share in 0.0f64..1.0, near in -3.0f64..3.0, reversed: bool,
+            velocity in 0.01f64..10.0, torque in 1.0f64..100.0,
+        ) {
+            let scale = Scale::new(ScaleParameters { reversed, ..DRIVE }).unwrap();
+            let limits = AxisLimits { position_min: min, position_max: min + range, velocity, torque, ..AxisLimits::NONE };
+            let (count, unit) = (1.0 / scale.resolution(), 0.031);
+            // Anywhere, and within some counts of each limit.
+            for position in [min + share * range, min + near.abs() * count, limits.position_max - near.abs() * count] {
+                let counts = scale.position_command(position, &limits);
+                let back = scale.position_from_counts(counts);
+                prop_assert!((back - position).abs() <= 1.000_01 * count, "{} from {}", back, position);
+                let excess = (back - limits.position_max).max(min - back);
+                prop_assert!(excess <= 2e-6 * count, "{} beyond", excess);
+            }
+            for velocity in [near, velocity, -velocity, velocity - near.abs() * count] {
+                let back = scale.velocity_from_drive(scale.velocity_command(velocity, &limits));
+                let excess = back.abs() - velocity.abs().max(limits.velocity);
+                prop_assert!(excess <= 2e-6 * count, "{} from {}", back, velocity);
+            }
+            for torque in [torque, -torque, torque - near.abs() * unit] {
+                let back = scale.torque_from_per_mille(scale.torque_command(torque, &limits));
+                prop_assert!(back.abs() <= limits.torque + 2e-6 * unit, "{} from {}", back, torque);
+            }
+        }
+
+        #[test]
+        fn a_set_point_beyond_a_limit_comes_back_without_a_jump(
+            max in 0.5f64..3.0, beyond in -3.0f64..3.0, step in 0.0f64..1e-3, reversed: bool,
+        ) {
+            let scale = Scale::new(ScaleParameters { reversed, ..DRIVE }).unwrap();
+            let limits = AxisLimits { position_min: -max, position_max: max, ..AxisLimits::NONE };
+            let at = |position: f64| f64::from(scale.position_command(position, &limits)) / scale.resolution();
+            let sign = if reversed { -1.0 } else { 1.0 };
+            let from = max + beyond / scale.resolution();
+            let moved = sign * (at(from) - at(from - step));
+            prop_assert!(moved >= 0.0 && moved <= step + 2.0 / scale.resolution(), "{} for {}", moved, step);
+            prop_assert!(at(f64::NAN) == 0.0);
         }
 
         #[test]

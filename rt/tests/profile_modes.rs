@@ -204,7 +204,7 @@ fn assert_targets_within_limits(rig: &Rig) {
             assert!(raw.abs() <= highest, "{raw} for axis {axis} in slot {}", record.timing.slot);
         }
         let position = record.axes[usize::from(POSITION)].command_raw;
-        assert!(position.abs() <= scale.position_to_counts(LIMITS.position_max) + 1, "{position}");
+        assert!(position.abs() <= scale.position_command(LIMITS.position_max, &LIMITS), "{position}");
     }
 }
 

@@ -16,12 +16,15 @@ use super::late_reply::SetPointSkip;
 use super::mode::Mode;
 use super::{Axis, ControlLaw};
 use crate::bit_fields::{
-    FieldDriveParameters, FieldGains, FieldMode, FieldTargets, LifeWish, ReplyError, ReplyValue, RunningMode,
+    CommandValue, FieldDriveParameters, FieldGains, FieldMode, FieldTargets, LifeWish, ReplyError,
+    ReplyValue, RunningMode,
 };
 use crate::cia402::{Command, OperationMode, controlword};
 use crate::control::{LoopInput, TorqueDemand};
 use crate::frame::Frame;
+use crate::guard::AxisLimits;
 use crate::pdo::FeedbackSlot;
+use crate::units::inward;
 
 impl Axis {
     /// Takes a reply of the drive. One of another kind has none.
@@ -59,13 +62,13 @@ impl Axis {
             self.field_frame = None;
             return;
         }
-        let targets = self.field_targets(input, torque, by.gains);
+        let targets = self.field_targets(input, torque, by);
         let wish = wish(word, self.mode_set());
         self.field_frame = Some(self.field_drive.step(by, wish, &targets));
     }
 
     /// What the drive is to follow while it runs.
-    fn field_targets(&self, input: &LoopInput, torque: f64, gains: FieldGains) -> FieldTargets {
+    fn field_targets(&self, input: &LoopInput, torque: f64, by: &FieldDriveParameters) -> FieldTargets {
         let limits = &self.parameters.limits;
         // A drive that takes another mode stands, and is to go on standing.
         let (law, velocity, torque) = match self.mode {
@@ -77,13 +80,21 @@ impl Axis {
             Mode::Changing { to, .. } => (to, 0.0, 0.0),
         };
         let position = input.set.position;
-        let (stiffness, damping) = match gains {
+        let (stiffness, damping) = match by.gains {
             FieldGains::Fixed { .. } => (0.0, 0.0),
             FieldGains::Commanded => law.gains(self.torque_loop.demand()),
         };
         // What the loop in the drive makes is not commanded a second time.
         let of_drive = stiffness * input.error.position + damping * input.error.velocity;
-        FieldTargets { position, velocity, torque: torque - of_drive, stiffness, damping }
+        let unit = |value| by.command.unit_of(value);
+        let AxisLimits { position_min, position_max, velocity: fastest, torque: strongest, .. } = *limits;
+        FieldTargets {
+            position: inward(position, position_min, position_max, unit(CommandValue::Position)),
+            velocity: inward(velocity, -fastest, fastest, unit(CommandValue::Velocity)),
+            torque: inward(torque - of_drive, -strongest, strongest, unit(CommandValue::Torque)),
+            stiffness,
+            damping,
+        }
     }
 
     /// The temperature (°C) that the drive reports, if it does.
@@ -127,5 +138,34 @@ const fn operation_mode(mode: FieldMode) -> OperationMode {
         FieldMode::Position => OperationMode::CyclicSynchronousPosition,
         FieldMode::Velocity => OperationMode::CyclicSynchronousVelocity,
         FieldMode::Torque => OperationMode::CyclicSynchronousTorque,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bit_fields::{BitField, ByteOrder, CommandValues, FieldBits, FieldFrame, LinearScale, Number};
+    use crate::frame::{FrameFormat, Id};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_set_point_within_a_limit_is_so_in_its_field(
+            max in 0.5f64..12.0, near in 0.0f64..3.0, bits in 12u8..33, is_low: bool, is_reversed: bool,
+        ) {
+            let mut scale = LinearScale::centred(bits, 12.5);
+            scale.codes_per_unit *= if is_reversed { -1.0 } else { 1.0 };
+            let (value, number) = (CommandValue::Position, Number::Unsigned);
+            let field = BitField { value, bits: FieldBits::of(0, bits), number, scale, codes: None };
+            let format = FrameFormat::Classic;
+            let command = FieldFrame::compile(Id::canopen(0, 1), format, 8, ByteOrder::BigEndian, &[field]).unwrap();
+            let unit = command.unit_of(value).abs();
+            let position = if is_low { near * unit - max } else { max - near * unit };
+            let mut told = CommandValues::default();
+            told.set(value, inward(position, -max, max, unit));
+            let heard = command.values(&command.frame(&told)).unwrap().get(value);
+            prop_assert!(heard.abs() <= max + 2e-6 * unit, "{} beyond {}", heard, max);
+            prop_assert!((heard - position).abs() <= 1.000_01 * unit, "{} for {}", heard, position);
+        }
     }
 }

@@ -110,14 +110,14 @@ impl Axis {
     /// Sets what the drive adds in its own loops: its velocity loop has the velocity of the set-point already where it follows
     /// velocities, and its torque loop the torque where it follows torques.
     fn set_offsets(&mut self, velocity: f64, torque: f64) {
-        let AxisParameters { law, feed_forward, scale, .. } = &self.parameters;
+        let AxisParameters { law, feed_forward, scale, limits, .. } = &self.parameters;
         let follows_position = law.target_slot() == CommandSlot::TargetPosition;
         let follows_torque = law.target_slot() == CommandSlot::TargetTorque;
         if feed_forward.has_velocity() && follows_position {
-            self.command.set(CommandSlot::VelocityOffset, scale.velocity_to_drive(velocity));
+            self.command.set(CommandSlot::VelocityOffset, scale.velocity_command(velocity, limits));
         }
         if feed_forward.has_torque() && !follows_torque {
-            self.command.set(CommandSlot::TorqueOffset, scale.torque_to_per_mille(torque));
+            self.command.set(CommandSlot::TorqueOffset, scale.torque_command(torque, limits));
         }
     }
 

@@ -11,8 +11,8 @@
 //!
 //! The target of a mode that an axis may be changed to is always one at rest, whatever mode the axis is in.
 
-use super::Axis;
 use super::torque_loop::TorqueLoop;
+use super::{Axis, AxisParameters};
 use crate::cia402::OperationMode;
 use crate::control::{ControlLaw, TorqueDemand};
 use crate::pdo::CommandSlot;
@@ -101,7 +101,8 @@ impl Axis {
         let is_enabled = self.is_enabled();
         let Self { parameters, command, .. } = self;
         // Of a drive that is not enabled it follows the joint within the limits, as in CSP.
-        let position = parameters.scale.position_to_counts(self.set_points.sent_now().position);
+        let position = self.set_points.sent_now().position;
+        let position = parameters.scale.position_command(position, &parameters.limits);
         for law in &parameters.mode_changes.laws {
             command.set(law.target_slot(), law.idle(position));
         }
@@ -115,9 +116,9 @@ impl Axis {
 
     /// Object 6071 for a drive that may be in CST already, and adds the torque offset of its former mode then.
     fn torque_while_changing(&self, to: &ControlLaw, holding: f64) -> i32 {
-        let (scale, limit) = (&self.parameters.scale, self.parameters.limits.torque);
+        let AxisParameters { scale, limits, .. } = &self.parameters;
         let torque = to.torque(&self.loop_input(), &TorqueDemand::Law { torque: holding });
         let offset = self.command.command(CommandSlot::TorqueOffset);
-        scale.torque_to_per_mille(torque.clamp(-limit, limit)).saturating_sub(offset)
+        scale.torque_command(torque.clamp(-limits.torque, limits.torque), limits).saturating_sub(offset)
     }
 }

@@ -1,6 +1,6 @@
 //! An axis in a profile mode: targets instead of set-points.
 
-use super::Axis;
+use super::{Axis, AxisParameters};
 use crate::cia402_codec::ProfileRamps;
 use crate::control::ControlLaw;
 use crate::fault::Fault;
@@ -124,13 +124,13 @@ impl Axis {
 
     /// Takes a target that [`Axis::accepts`]. A velocity or a torque that is not zero expires.
     pub fn set_profile_target(&mut self, target: ProfileTarget, valid_until_ns: Nanoseconds) {
-        let scale = &self.parameters.scale;
+        let AxisParameters { scale, limits, .. } = &self.parameters;
         let (raw, needs_handshake) = match target {
             ProfileTarget::Position(position) => {
-                (scale.position_to_counts(position), self.parameters.codec.acknowledges_set_points())
+                (scale.position_command(position, limits), self.parameters.codec.acknowledges_set_points())
             }
-            ProfileTarget::Velocity(velocity) => (scale.velocity_to_drive(velocity), false),
-            ProfileTarget::Torque(torque) => (scale.torque_to_per_mille(torque), false),
+            ProfileTarget::Velocity(velocity) => (scale.velocity_command(velocity, limits), false),
+            ProfileTarget::Torque(torque) => (scale.torque_command(torque, limits), false),
         };
         self.profile.set(raw, needs_handshake, TimedTarget { target, valid_until_ns });
     }

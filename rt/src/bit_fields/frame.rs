@@ -108,6 +108,11 @@ impl<V: FieldValue> FieldFrame<V> {
 }
 
 impl FieldFrame<CommandValue> {
+    /// What one code of a field is, in the unit of its value; 0 where there is no such field, or codes are not whole numbers.
+    pub fn unit_of(&self, value: CommandValue) -> f64 {
+        self.layout.unit_of(value.slot())
+    }
+
     /// The frame that carries these values.
     #[inline]
     pub fn frame(&self, values: &CommandValues) -> Frame {

@@ -276,6 +276,12 @@ impl FrameLayout {
         self.fields.iter().any(|field| field.slot == slot)
     }
 
+    /// What one code of a field is, in the unit of its value; 0 where there is no such field, or codes are not whole numbers.
+    pub(super) fn unit_of(&self, slot: u8) -> f64 {
+        let is_counted = |field: &&Field| field.slot == slot && field.number != Number::Float;
+        self.fields.iter().find(is_counted).map_or(0.0, |field| 1.0 / field.codes_per_unit)
+    }
+
     /// Packs values, each by the slot of its field. The first [`FrameLayout::length`] bytes count.
     #[inline]
     pub(super) fn pack(&self, values: &[f64]) -> [u8; MAX_FIELD_BYTES] {

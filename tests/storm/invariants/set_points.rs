@@ -257,9 +257,11 @@ impl SetPoints {
             };
         };
         let last = self.scale.position_from_counts(before);
+        // A set-point at a limit is rounded to the inside.
+        let room = ROUNDING * (limits.position_max - limits.position_min + count);
         let is_further_out = |position: f64, last: f64| {
-            position > limits.position_max + count && position > last.max(limits.position_max) + count
-                || position < limits.position_min - count && position < last.min(limits.position_min) - count
+            position > limits.position_max + room && position > last.max(limits.position_max) + count
+                || position < limits.position_min - room && position < last.min(limits.position_min) - count
         };
         // A drive in profile position is stopped where the joint comes to rest, which may be where it was when it last reported.
         let reference =
