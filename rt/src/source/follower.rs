@@ -143,6 +143,37 @@ pub(super) mod tests {
     use proptest::prelude::*;
 
     const PERIOD_S: f64 = 0.001;
+    pub const LIMITS: AxisLimits = AxisLimits {
+        position_min: -1.0,
+        position_max: 2.0,
+        velocity: 3.0,
+        acceleration: 8.0,
+        deceleration: 8.0,
+        jerk: 100.0,
+        torque: 50.0,
+    };
+
+    /// The last four set-points, the newest first.
+    #[derive(Default)]
+    pub struct SetPoints([f64; 4]);
+
+    impl SetPoints {
+        /// Checks that no difference of them is beyond a limit after the next one.
+        pub fn check(&mut self, position: f64, limits: &AxisLimits) -> Result<(), TestCaseError> {
+            self.0 = [position, self.0[0], self.0[1], self.0[2]];
+            let [newest, last, before, oldest] = self.0;
+            let steepest = limits.acceleration.max(limits.deceleration);
+            let difference = (newest - last) / PERIOD_S;
+            prop_assert!(difference.abs() <= limits.velocity * (1.0 + 1e-9), "velocity {difference}");
+            let difference = (newest - 2.0 * last + before) / PERIOD_S.powi(2);
+            prop_assert!(difference.abs() <= steepest * (1.0 + 1e-6), "acceleration {difference}");
+            let difference = (newest - 3.0 * last + 3.0 * before - oldest) / PERIOD_S.powi(3);
+            prop_assert!(difference.abs() <= limits.jerk * (1.0 + 1e-5) + 1e-4, "jerk {difference}");
+            let within = limits.position_min - 1e-6..=limits.position_max + 1e-6;
+            prop_assert!(within.contains(&newest), "position {newest}");
+            Ok(())
+        }
+    }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(60))]
@@ -153,32 +184,14 @@ pub(super) mod tests {
             (acceleration, deceleration) in prop::sample::select(&[(8.0, 8.0), (10.0, 20.0), (20.0, 10.0)][..]),
             jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
         ) {
-            let limits = AxisLimits {
-                position_min: -1.0,
-                position_max: 2.0,
-                velocity: 3.0,
-                acceleration,
-                deceleration,
-                jerk,
-                torque: 50.0,
-            };
-            let steepest = acceleration.max(deceleration);
-            let mut state = State::rest(0.0);
-            let mut set = [0.0; 4];
+            let limits = AxisLimits { acceleration, deceleration, jerk, ..LIMITS };
+            let (mut state, mut set_points) = (State::rest(0.0), SetPoints::default());
             for (position, velocity, acceleration, cycles) in targets {
                 let mut target = State { position, velocity, acceleration };
                 for _ in 0..cycles {
                     target = target.after(PERIOD_S);
                     state = follow(&state, &target, &limits, PERIOD_S).unwrap();
-                    set = [state.position, set[0], set[1], set[2]];
-                    let [newest, last, before, oldest] = set;
-                    let difference = (newest - last) / PERIOD_S;
-                    prop_assert!(difference.abs() <= 3.0 * (1.0 + 1e-9), "velocity {difference}");
-                    let difference = (newest - 2.0 * last + before) / PERIOD_S.powi(2);
-                    prop_assert!(difference.abs() <= steepest * (1.0 + 1e-6), "acceleration {difference}");
-                    let difference = (newest - 3.0 * last + 3.0 * before - oldest) / PERIOD_S.powi(3);
-                    prop_assert!(difference.abs() <= jerk * (1.0 + 1e-5) + 1e-4, "jerk {difference}");
-                    prop_assert!((-1.0 - 1e-6..=2.0 + 1e-6).contains(&newest), "position {newest}");
+                    set_points.check(state.position, &limits)?;
                 }
             }
         }
@@ -208,15 +221,7 @@ pub(super) mod tests {
             out in prop_oneof![0.0f64..1e-5, 0.0f64..1e-4, 0.0f64..0.5],
             jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
         ) {
-            let limits = AxisLimits {
-                position_min: -1.0,
-                position_max: 2.0,
-                velocity: 3.0,
-                acceleration: 8.0,
-                deceleration: 8.0,
-                jerk,
-                torque: 50.0,
-            };
+            let limits = AxisLimits { jerk, ..LIMITS };
             let mut state = State::rest(2.0 + out);
             for (position, velocity, cycles) in targets {
                 let mut target = State { position, velocity, acceleration: 0.0 };
@@ -249,15 +254,7 @@ pub(super) mod tests {
             targets in prop::collection::vec((any_finite(), any_finite(), any_finite(), 1usize..20), 1..20),
             jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
         ) {
-            let limits = AxisLimits {
-                position_min: -1.0,
-                position_max: 2.0,
-                velocity: 3.0,
-                acceleration: 8.0,
-                deceleration: 8.0,
-                jerk,
-                torque: 50.0,
-            };
+            let limits = AxisLimits { jerk, ..LIMITS };
             let mut state = State::rest(0.0);
             for (position, velocity, acceleration, cycles) in targets {
                 let target = State { position, velocity, acceleration };
@@ -274,18 +271,9 @@ pub(super) mod tests {
 
         #[test]
         fn a_target_beyond_every_limit_is_never_refused_where_it_is_to_rest(far in any_finite()) {
-            let limits = AxisLimits {
-                position_min: -1.0,
-                position_max: 2.0,
-                velocity: 3.0,
-                acceleration: 8.0,
-                deceleration: 8.0,
-                jerk: 100.0,
-                torque: 50.0,
-            };
             let mut state = State::rest(0.0);
             for _ in 0..3_000 {
-                state = follow(&state, &State::rest(far), &limits, PERIOD_S).unwrap();
+                state = follow(&state, &State::rest(far), &LIMITS, PERIOD_S).unwrap();
             }
             prop_assert!((state.position - far.clamp(-1.0, 2.0)).abs() < 1e-9, "{state:?}");
         }
@@ -293,18 +281,9 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_no_number_is_an_error() {
-        let limits = AxisLimits {
-            position_min: -1.0,
-            position_max: 2.0,
-            velocity: 3.0,
-            acceleration: 8.0,
-            deceleration: 8.0,
-            jerk: 100.0,
-            torque: 50.0,
-        };
         let bad = State { velocity: f64::NAN, ..State::default() };
         assert!(matches!(
-            follow(&State::default(), &bad, &limits, PERIOD_S),
+            follow(&State::default(), &bad, &LIMITS, PERIOD_S),
             Err(PlanError::NotFinite { axis: 0, .. })
         ));
     }

@@ -75,19 +75,12 @@ fn led(start: &State, velocity: f64, change: f64, limits: &AxisLimits, period_s:
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::source::follower::tests::farthest;
+    use crate::source::follower::tests::{self, SetPoints, farthest};
     use proptest::prelude::*;
 
     const PERIOD_S: f64 = 0.001;
-    const LIMITS: AxisLimits = AxisLimits {
-        position_min: -1.0,
-        position_max: 2.0,
-        velocity: 3.0,
-        acceleration: 10.0,
-        deceleration: 10.0,
-        jerk: 200.0,
-        torque: 50.0,
-    };
+    const LIMITS: AxisLimits =
+        AxisLimits { acceleration: 10.0, deceleration: 10.0, jerk: 200.0, ..tests::LIMITS };
 
     /// The motion after so many seconds of a velocity.
     fn after(duration_s: f64, velocity: f64, start: State) -> State {
@@ -149,21 +142,12 @@ mod tests {
             jerk in prop_oneof![50.0f64..1000.0, Just(f64::INFINITY)],
         ) {
             let limits = AxisLimits { acceleration, deceleration, jerk, ..LIMITS };
-            let steepest = acceleration.max(deceleration);
-            let (mut state, mut set) = (State::rest(0.0), [0.0; 4]);
+            let (mut state, mut set_points) = (State::rest(0.0), SetPoints::default());
             for (velocity, acceleration, cycles) in wanted {
                 for cycle in 0..cycles {
                     let velocity = velocity + acceleration * cycle as f64 * PERIOD_S;
                     state = follow_velocity(&state, velocity, acceleration, &limits, PERIOD_S).unwrap();
-                    set = [state.position, set[0], set[1], set[2]];
-                    let [newest, last, before, oldest] = set;
-                    let difference = (newest - last) / PERIOD_S;
-                    prop_assert!(difference.abs() <= 3.0 * (1.0 + 1e-9), "velocity {difference}");
-                    let difference = (newest - 2.0 * last + before) / PERIOD_S.powi(2);
-                    prop_assert!(difference.abs() <= steepest * (1.0 + 1e-6), "acceleration {difference}");
-                    let difference = (newest - 3.0 * last + 3.0 * before - oldest) / PERIOD_S.powi(3);
-                    prop_assert!(difference.abs() <= jerk * (1.0 + 1e-5) + 1e-4, "jerk {difference}");
-                    prop_assert!((-1.0 - 1e-6..=2.0 + 1e-6).contains(&newest), "position {newest}");
+                    set_points.check(state.position, &limits)?;
                 }
             }
         }
