@@ -3,10 +3,6 @@
 
 use libfuzzer_sys::fuzz_target;
 
-#[path = "../subjects/mod.rs"]
-#[allow(dead_code, reason = "each target takes its own")]
-mod subjects;
-
 fuzz_target!(|bytes: &[u8]| {
     subjects::bus_logs::run(bytes);
     subjects::bus_logs::decode(bytes);
