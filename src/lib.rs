@@ -93,8 +93,6 @@
 // Some names are passed on for the tests alone, to whom types of private modules are open.
 #![cfg_attr(not(feature = "internals"), allow(unused_imports))]
 #![cfg_attr(feature = "internals", allow(unnameable_types))]
-// Some functions are for the program alone.
-#![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
 mod bus_log;
 pub mod canopen;
@@ -122,7 +120,7 @@ pub mod faults;
 mod frame_time;
 #[cfg_attr(
     not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "the simulated devices use a part of it")
+    allow(unnameable_types, reason = "tasks on a line name its types, and nobody outside names those tasks")
 )]
 mod hollow_lines;
 #[cfg(feature = "internals")]
@@ -134,7 +132,10 @@ mod journal;
 pub mod link;
 #[cfg_attr(
     not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
+    allow(
+        unnameable_types,
+        reason = "sessions on a line name its types, and nobody outside names those sessions"
+    )
 )]
 mod modbus;
 #[cfg(feature = "cli")]

@@ -14,7 +14,7 @@ pub(crate) mod erob_can;
 pub(crate) mod erob_canopen;
 #[cfg_attr(
     not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
+    allow(unnameable_types, reason = "sessions name its types, and nobody outside names those sessions")
 )]
 pub(crate) mod erob_modbus;
 mod error_words;

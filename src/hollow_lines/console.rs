@@ -291,12 +291,11 @@ impl fmt::Display for ZeroPoint {
 #[derive(Clone, Debug, Default)]
 pub struct ConsoleReader {
     line: ArrayVec<u8, LINE_BYTES>,
-    overlong: u64,
     is_overlong: bool,
 }
 
 impl ConsoleReader {
-    /// Takes the next byte. Returns the line that it ends: LF and CR each end one, and empty lines are left out. What is no ASCII
+    /// Takes the next byte. Returns the line that it ends: LF and CR each end one, and empty and overlong lines are left out. What is no ASCII
     /// is shown as `?`.
     pub fn push(&mut self, byte: u8) -> Option<String> {
         match byte {
@@ -308,18 +307,10 @@ impl ConsoleReader {
                 is_sound.then_some(line)
             }
             byte => {
-                if self.line.try_push(byte).is_err() && !self.is_overlong {
-                    self.is_overlong = true;
-                    self.overlong += 1;
-                }
+                self.is_overlong |= self.line.try_push(byte).is_err();
                 None
             }
         }
-    }
-
-    /// Lines that were too long to be kept.
-    pub const fn overlong(&self) -> u64 {
-        self.overlong
     }
 }
 

@@ -1,4 +1,7 @@
 //! The 16 bytes of a command to a motor and of its reply: those of its CAN FD frames (section 4 of the manual).
+//!
+//! The simulated motor reads commands and writes replies. The other side is the layout of the family; here it is for the masters of
+//! tests alone.
 
 use std::f64::consts::TAU;
 
@@ -124,6 +127,7 @@ impl MotorCommand {
     ///
     /// # Errors
     /// [`MotorDataError::Position`] for a position beyond 40 bits.
+    #[cfg(any(test, feature = "internals"))]
     pub fn encode(&self) -> Result<[u8; DATA_BYTES], MotorDataError> {
         let [p0, p1, p2, p3, p4] = position_bytes(self.position)?;
         let [v0, v1, v2, v3] = self.velocity.to_be_bytes();
@@ -179,6 +183,7 @@ impl MotorReply {
     ///
     /// # Errors
     /// See [`MotorDataError`].
+    #[cfg(any(test, feature = "internals"))]
     pub fn decode(bytes: &[u8; DATA_BYTES]) -> Result<Self, MotorDataError> {
         let [p0, p1, p2, p3, p4, v0, v1, v2, v3, c0, c1, mode, run, _, temperature, id] = *bytes;
         let is_running = match run & 0x0F {
@@ -220,16 +225,6 @@ pub struct MotorScale {
 }
 
 impl MotorScale {
-    /// rad of a position.
-    pub fn angle(self, counts: i64) -> f64 {
-        counts as f64 / COUNTS_PER_TURN * TAU
-    }
-
-    /// Counts of an angle in rad, to the nearest one.
-    pub fn counts(self, angle: f64) -> i64 {
-        (angle / TAU * COUNTS_PER_TURN).round() as i64
-    }
-
     /// rad/s of a velocity code.
     pub fn velocity(self, code: i32) -> f64 {
         f64::from(code) / VELOCITY_ONE_KHZ * 1_000.0 / f64::from(self.pole_pairs.get()) * TAU
@@ -243,11 +238,6 @@ impl MotorScale {
     /// A of a current code.
     pub fn current(self, code: i16) -> f64 {
         f64::from(code) / CURRENT_100_A * 100.0
-    }
-
-    /// The code of a current in A; the largest one there is for more.
-    pub fn current_code(self, current: f64) -> i16 {
-        (current / 100.0 * CURRENT_100_A).round() as i16
     }
 }
 
@@ -309,9 +299,6 @@ mod tests {
         assert!((scale.velocity(8_388_608) / TAU * 60.0 - 1_000.0 * 60.0 / 14.0).abs() < 1e-9);
         assert_eq!(scale.velocity_code(scale.velocity(-12_345)), -12_345);
         assert!((scale.current(8) - 0.0244).abs() < 1e-4);
-        assert_eq!((scale.current_code(100.0), scale.current_code(-2.0)), (i16::MAX, -655));
-        assert!((scale.angle(-81_266_187) / TAU + 77.5015).abs() < 1e-4);
-        assert_eq!(scale.counts(scale.angle(678_257)), 678_257);
-        assert_eq!((scale.velocity_code(f64::MAX), scale.counts(f64::NAN)), (i32::MAX, 0));
+        assert_eq!(scale.velocity_code(f64::MAX), i32::MAX);
     }
 }

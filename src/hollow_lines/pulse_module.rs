@@ -9,8 +9,6 @@ use thiserror::Error;
 pub const SETTING_BYTES: usize = 6;
 /// The first byte of the printed example.
 pub const FIRST_BYTE_OF_EXAMPLE: u8 = 0x01;
-/// The first byte that the text asks for.
-pub const FIRST_BYTE_OF_TEXT: u8 = 0x00;
 
 /// A loop gain that is multiplied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,7 +114,7 @@ mod tests {
     fn a_multiplier_is_a_big_endian_float() {
         let setting = StiffnessSetting::Multiplier { gain: LoopGain::CurrentKi, factor: 1.0 };
         let bytes = [0, 5, 0x3F, 0x80, 0, 0];
-        assert_eq!(setting.encode(FIRST_BYTE_OF_TEXT), Ok(bytes));
+        assert_eq!(setting.encode(0), Ok(bytes));
         assert_eq!(StiffnessSetting::decode(&bytes), Ok((0, setting)));
     }
 

@@ -13,10 +13,6 @@ pub(crate) mod ownership;
 )]
 mod port;
 pub(crate) mod real_interface;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(dead_code, reason = "no device here has another parity, and the tests open lines with each")
-)]
 pub(crate) mod serial_line;
 mod slcan;
 pub(crate) mod socketcan;

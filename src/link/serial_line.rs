@@ -9,49 +9,23 @@ use std::time::Duration;
 
 use nix::unistd::{Gid, Group};
 use serial2::rs4xx::{Rs485Config, TransceiverMode};
-use serial2::{CharSize, FlowControl, KeepSettings, SerialPort};
+use serial2::{CharSize, FlowControl, KeepSettings, Parity, SerialPort, StopBits};
 use thiserror::Error;
 
-/// How a line is set up. Characters have eight data bits.
+/// How a line is set up. Characters have eight data bits, no parity and one stop bit, as all devices here want them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SerialSettings {
     /// bit/s
     pub bit_rate: u32,
-    /// The parity bit.
-    pub parity: Parity,
-    /// The stop bits.
-    pub stop_bits: StopBits,
     /// Who switches an RS-485 line from receiving to sending.
     pub direction: Direction,
 }
 
 impl SerialSettings {
-    /// No parity, one stop bit, and an adapter that switches by itself.
+    /// With an adapter that switches by itself.
     pub const fn new(bit_rate: u32) -> Self {
-        Self { bit_rate, parity: Parity::None, stop_bits: StopBits::One, direction: Direction::Adapter }
+        Self { bit_rate, direction: Direction::Adapter }
     }
-}
-
-/// The parity bit of a character.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Parity {
-    /// There is none.
-    #[default]
-    None,
-    /// The number of ones is even.
-    Even,
-    /// The number of ones is odd.
-    Odd,
-}
-
-/// The stop bits of a character.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum StopBits {
-    /// One.
-    #[default]
-    One,
-    /// Two.
-    Two,
 }
 
 /// Who switches an RS-485 line from receiving to sending.
@@ -98,13 +72,15 @@ pub enum SerialLineError {
         /// The path.
         device: String,
     },
-    /// The device does not have these settings.
-    #[error("{device} cannot have {settings} ({reason}); set the drive and the line to another bit rate")]
+    /// The device does not have this bit rate.
+    #[error(
+        "{device} cannot have {bit_rate} bit/s ({reason}); set the drive and the line to another bit rate"
+    )]
     Settings {
         /// The path.
         device: String,
         /// What was asked for.
-        settings: String,
+        bit_rate: u32,
         /// What the system said.
         reason: String,
     },
@@ -245,19 +221,12 @@ fn set_up(device: &str, port: &mut SerialPort, wanted: &SerialSettings) -> Resul
     settings.set_raw();
     settings.set_char_size(CharSize::Bits8);
     settings.set_flow_control(FlowControl::None);
-    settings.set_parity(match wanted.parity {
-        Parity::None => serial2::Parity::None,
-        Parity::Even => serial2::Parity::Even,
-        Parity::Odd => serial2::Parity::Odd,
-    });
-    settings.set_stop_bits(match wanted.stop_bits {
-        StopBits::One => serial2::StopBits::One,
-        StopBits::Two => serial2::StopBits::Two,
-    });
+    settings.set_parity(Parity::None);
+    settings.set_stop_bits(StopBits::One);
     let set = settings.set_baud_rate(wanted.bit_rate).and_then(|()| port.set_configuration(&settings));
     set.map_err(|error| SerialLineError::Settings {
         device: device.to_owned(),
-        settings: describe(wanted),
+        bit_rate: wanted.bit_rate,
         reason: error.to_string(),
     })?;
     if wanted.direction == Direction::Kernel {
@@ -266,19 +235,6 @@ fn set_up(device: &str, port: &mut SerialPort, wanted: &SerialSettings) -> Resul
         })?;
     }
     Ok(())
-}
-
-fn describe(settings: &SerialSettings) -> String {
-    let parity = match settings.parity {
-        Parity::None => "no parity",
-        Parity::Even => "even parity",
-        Parity::Odd => "odd parity",
-    };
-    let stop_bits = match settings.stop_bits {
-        StopBits::One => "one stop bit",
-        StopBits::Two => "two stop bits",
-    };
-    format!("{} bit/s with {parity} and {stop_bits}", settings.bit_rate)
 }
 
 fn refusal(device: &str, error: io::Error) -> SerialLineError {
@@ -376,11 +332,5 @@ mod tests {
         let settings = SerialSettings { direction: Direction::Kernel, ..SETTINGS };
         let error = SerialLine::open(&device.path().display().to_string(), &settings).unwrap_err();
         assert!(matches!(error, SerialLineError::NoDirection { .. }), "{error}");
-    }
-
-    #[test]
-    fn the_settings_of_a_line_are_told_in_words() {
-        let full = SerialSettings { parity: Parity::Even, stop_bits: StopBits::Two, ..SETTINGS };
-        assert_eq!(describe(&full), "115200 bit/s with even parity and two stop bits");
     }
 }

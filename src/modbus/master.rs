@@ -158,7 +158,6 @@ pub struct Master {
     has_heard: bool,
     /// The line is not free before this time.
     free_ns: Nanoseconds,
-    unexpected_bytes: u64,
     repeated: u64,
 }
 
@@ -166,12 +165,7 @@ impl Master {
     /// The master of a line on which nothing is known to have happened.
     pub const fn new(timing: MasterTiming) -> Self {
         let free_ns = timing.line.silence_ns();
-        Self { timing, state: State::Idle, has_heard: false, free_ns, unexpected_bytes: 0, repeated: 0 }
-    }
-
-    /// Bytes that nobody waited for.
-    pub const fn unexpected_bytes(&self) -> u64 {
-        self.unexpected_bytes
+        Self { timing, state: State::Idle, has_heard: false, free_ns, repeated: 0 }
     }
 
     /// Requests that were sent again.
@@ -245,16 +239,13 @@ impl Master {
         Some(frame)
     }
 
-    /// Takes bytes that have come over the line, in pieces of any length. What nobody waits for is counted.
+    /// Takes bytes that have come over the line, in pieces of any length. What nobody waits for only keeps the line busy.
     pub fn receive(&mut self, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
         }
         self.has_heard = true;
-        let State::Sent { exchange, bytes: received, .. } = &mut self.state else {
-            self.unexpected_bytes = self.unexpected_bytes.saturating_add(bytes.len() as u64);
-            return;
-        };
+        let State::Sent { exchange, bytes: received, .. } = &mut self.state else { return };
         // More than a frame would be refused all the same.
         received.extend(bytes.iter().take(LONGEST - received.len().min(LONGEST)));
         let Received::Whole(outcome) = evaluate(&exchange.request, exchange.slave, received) else { return };
@@ -370,7 +361,6 @@ mod tests {
         assert_eq!([0, 1_700].map(|us| sent(&mut master, us)), [false, false]);
         master.receive(&[4]);
         assert_eq!([1_750, 3_499, 3_500].map(|us| sent(&mut master, us)), [false, false, true]);
-        assert_eq!(master.unexpected_bytes(), 4);
     }
 
     #[test]
@@ -392,7 +382,7 @@ mod tests {
         master.start(slave(2), ENABLE, Repeat::Never).unwrap();
         assert_eq!(master.poll(140 * MS), None);
         master.receive(&reply_frame(&ENABLE.frame(slave(2)), Ok(&[])).unwrap());
-        assert_eq!((master.unexpected_bytes(), master.take_outcome()), (8, None));
+        assert_eq!(master.take_outcome(), None);
         assert_eq!(master.poll(169 * MS), None);
         assert!(master.poll(171 * MS).is_some());
     }

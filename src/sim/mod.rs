@@ -50,7 +50,7 @@ mod drive;
 pub(crate) mod erob;
 #[cfg_attr(
     not(feature = "internals"),
-    allow(dead_code, unnameable_types, reason = "the tests use more of it than the program")
+    allow(unnameable_types, reason = "its parameters are those of an axis, which nobody outside makes")
 )]
 pub(crate) mod erob_can;
 pub(crate) mod erob_modbus;

@@ -68,6 +68,7 @@ pub enum ErrorForm {
     #[default]
     Printed,
     /// With 80, as programs of the vendor expect it.
+    #[cfg_attr(not(feature = "internals"), expect(dead_code, reason = "the tests alone choose it"))]
     Observed,
 }
 
