@@ -2,7 +2,6 @@
 
 #[path = "../vectors/rows.rs"]
 mod rows;
-#[allow(dead_code, reason = "it is the world of other tests, too")]
 #[path = "../drive_modes/world.rs"]
 mod world;
 

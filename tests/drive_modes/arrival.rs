@@ -4,7 +4,8 @@ use takt::Outcome;
 use takt::config::ProgramTarget;
 use takt_rt::{DriveState, Phase};
 
-use crate::world::{World, counts_per_unit, load};
+use crate::wire::counts_per_unit;
+use crate::world::{World, load};
 
 /// How far the true joints are from the target of each move at the end of the standstill after it, in counts.
 fn errors_at_rest(name: &str) -> Vec<Vec<f64>> {

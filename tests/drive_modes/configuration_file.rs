@@ -8,7 +8,9 @@ use takt::canopen::eds;
 use takt::canopen::object::ObjectAddress;
 use takt::config::Config;
 
-use crate::world::{World, id, one_yz_aim, parse};
+use crate::one_yz_aim::one_yz_aim;
+use crate::wire::id;
+use crate::world::{World, parse};
 
 /// A YZ-AIM that interpolates and moves a little.
 fn yz_aim() -> Config {

@@ -4,9 +4,8 @@ use takt::Outcome;
 use takt::config::{Config, ProgramTarget};
 use takt_rt::Phase;
 
-use crate::world::{
-    MILLISECOND_NS, Sent, Watched, World, counts, counts_per_unit, id, load, parse, text_of, word,
-};
+use crate::wire::{MILLISECOND_NS, counts, counts_per_unit, id, word};
+use crate::world::{Sent, Watched, World, load, parse, text_of};
 
 const SYNC: u32 = 0x080;
 const HEARTBEAT: u32 = 0x77F;

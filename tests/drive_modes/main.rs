@@ -1,6 +1,9 @@
 //! Whole controllers in virtual time against simulated drives: interpolated position on YZ-AIMs, every mode of operation
 //! of an eRob, what comes on the wire, and what happens when the controller falls silent.
 
+mod one_yz_aim;
+mod targets;
+mod wire;
 mod world;
 
 mod arrival;

@@ -10,7 +10,8 @@ use takt_rt::{
     PointRole, RejectReason, Request, RequestId, StopCategory, StopCause, StreamPoint,
 };
 
-use crate::world::{World, counts_per_unit, id, load};
+use crate::wire::{counts_per_unit, id};
+use crate::world::{World, load};
 
 const PERIOD_S: f64 = 1e-3;
 

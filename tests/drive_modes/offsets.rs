@@ -3,7 +3,8 @@
 use takt::internals::RunInside;
 use takt_rt::{AxisPoint, MAX_AXES, Phase, PointRole, PositionPoint, Request, StreamPoint};
 
-use crate::world::{World, counts_per_unit, id, parse, text_of};
+use crate::wire::{counts_per_unit, id};
+use crate::world::{World, parse, text_of};
 
 /// An eRob in this mode with this `feed_forward`, which streams a slow swing with a torque of 6 N·m fed forward. The payloads of
 /// its commands, newest last, and the velocity of the set-point in counts/s.

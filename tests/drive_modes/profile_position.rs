@@ -4,10 +4,13 @@ use takt::Outcome;
 use takt::config::Config;
 use takt::sim::Defect;
 use takt_rt::{
-    Frame, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory, controlword, statusword,
+    EventKind, Frame, Phase, ProfileMove, ProfileTarget, Request, RequestId, Rule, StopCategory, controlword,
+    statusword,
 };
 
-use crate::world::{MILLISECOND_NS, World, counts, counts_per_unit, id, load, one_yz_aim, parse, word};
+use crate::one_yz_aim::one_yz_aim;
+use crate::wire::{MILLISECOND_NS, counts, counts_per_unit, id, word};
+use crate::world::{World, load, parse};
 
 const RPDO1: u32 = 0x201;
 const TPDO1: u32 = 0x181;
@@ -39,8 +42,8 @@ fn in_motion(world: &mut World) -> u64 {
 fn a_target_is_offered_with_bit_4_acknowledged_with_bit_12_and_both_fall() {
     let mut world = World::holding(erob());
     let since_ns = world.run.snapshot().at_ns;
-    world.drive_to(0, ProfileTarget::Position(0.5));
-    world.run_until(|world| world.is_reached());
+    let motion = world.drive_to(0, ProfileTarget::Position(0.5));
+    world.run_until(|world| world.is_reached(motion));
     let target = target_counts(&world, 0.5);
     let commands = commands_since(&mut world, since_ns);
     let offers: Vec<_> = commands.iter().filter(|(_, word, _)| word & controlword::BIT_4 != 0).collect();
@@ -69,9 +72,9 @@ fn a_new_target_in_motion_is_taken_at_once_and_the_old_one_is_left() {
     let mut world = World::holding(erob());
     in_motion(&mut world);
     let at = world.observe(0).position;
-    world.drive_to(0, ProfileTarget::Position(-0.3));
+    let motion = world.drive_to(0, ProfileTarget::Position(-0.3));
     let mut furthest = at;
-    while !world.is_reached() {
+    while !world.is_reached(motion) {
         world.run_for(1);
         furthest = furthest.max(world.observe(0).position);
         assert!(world.observe(0).velocity.abs() <= 1.01 * world.config.axes[0].limits.velocity);
@@ -90,8 +93,8 @@ fn a_second_target_so_many_cycles_after_the_first_is_where_the_joint_ends() {
         let mut world = World::holding(erob());
         world.drive_to(0, ProfileTarget::Position(0.1));
         world.run_for(gap);
-        world.drive_to(0, ProfileTarget::Position(-0.05));
-        world.run_until(|world| world.is_reached());
+        let motion = world.drive_to(0, ProfileTarget::Position(-0.05));
+        world.run_until(|world| world.is_reached(motion));
         world.run_for(300);
         let error = (world.observe(0).position + 0.05) * counts_per_unit(&world.config.axes[0]);
         assert!(error.abs() <= 2.0, "{gap}: {error}");
@@ -102,12 +105,13 @@ fn a_second_target_so_many_cycles_after_the_first_is_where_the_joint_ends() {
 #[test]
 fn targets_that_come_in_every_cycle_are_followed_and_none_is_called_unacknowledged() {
     let mut world = World::holding(erob());
+    let mut motion = RequestId::default();
     for step in 0..1500_u32 {
-        world.drive_to(0, ProfileTarget::Position(f64::from(step) * 2e-4));
+        motion = world.drive_to(0, ProfileTarget::Position(f64::from(step) * 2e-4));
     }
     let behind = 1499.0 * 2e-4 - world.observe(0).position;
     assert!(behind < 0.1, "{behind} rad behind");
-    world.run_until(|world| world.is_reached());
+    world.run_until(|world| world.is_reached(motion));
     assert_eq!(world.stops(), []);
 }
 
@@ -190,7 +194,11 @@ fn a_stop_of_category_1_brakes_in_the_end() {
     world.run_for(5);
     let seen = world.observe(0);
     assert!(seen.is_braked && seen.velocity == 0.0, "{seen:?}");
-    assert_eq!(world.phases(), [Phase::Stopping, Phase::Disabling, Phase::Disabled]);
+    let phases = world.events.iter().filter_map(|event| match event.kind {
+        EventKind::PhaseChanged { to, .. } => Some(to),
+        _ => None,
+    });
+    assert_eq!(phases.collect::<Vec<_>>(), [Phase::Stopping, Phase::Disabling, Phase::Disabled]);
 }
 
 /// The vendor's tool commands position 0 with "disable".
@@ -264,8 +272,8 @@ fn a_yz_aim_moves_to_targets_by_its_own_profile_and_stops_without_going_back() {
         let mut config = parse(&one_yz_aim("pp", "to = 0"));
         config.axes[0].answers_sync = answers_sync;
         let mut world = World::holding(config);
-        world.drive_to(0, ProfileTarget::Position(0.1));
-        world.run_until(|world| world.is_reached());
+        let motion = world.drive_to(0, ProfileTarget::Position(0.1));
+        world.run_until(|world| world.is_reached(motion));
         world.run_for(300);
         let scale = counts_per_unit(&world.config.axes[0]);
         let error = (world.observe(0).position - 0.1) * scale;

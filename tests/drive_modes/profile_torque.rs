@@ -4,9 +4,10 @@ use takt::Outcome;
 use takt::config::Config;
 use takt::internals::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
-use takt_rt::{DriveState, Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory};
+use takt_rt::{DriveState, Phase, ProfileMove, ProfileTarget, Request, RequestId, Rule, StopCategory};
 
-use crate::world::{World, load, word};
+use crate::wire::word;
+use crate::world::{World, load};
 
 /// One eRob that differs from what the configuration says of it.
 fn erob_with(config: Config, change: impl Fn(&mut ErobParameters)) -> (Config, Vec<SimulatedBus>) {
@@ -125,18 +126,18 @@ fn without_friction() -> World {
 }
 
 /// Pushes the joint up to a speed and lets it go.
-fn let_go_at(world: &mut World, speed: f64) {
+fn let_go_at(world: &mut World, speed: f64) -> RequestId {
     world.drive_to(0, ProfileTarget::Torque(1.0));
     world.run_until(|world| world.observe(0).velocity > speed);
-    world.drive_to(0, ProfileTarget::Torque(0.0));
+    world.drive_to(0, ProfileTarget::Torque(0.0))
 }
 
 #[test]
 fn a_move_that_ends_with_no_torque_is_over_when_the_joint_stands() {
     let mut world = World::holding(load("erob-modes/erob-pt.toml"));
-    let_go_at(&mut world, 0.3);
+    let motion = let_go_at(&mut world, 0.3);
     let standing = 0.02 * world.config.axes[0].limits.velocity;
-    world.run_until(|world| world.is_reached());
+    world.run_until(|world| world.is_reached(motion));
     // It was reported a cycle or two before.
     assert!(world.observe(0).velocity.abs() < 1.1 * standing, "{:?}", world.observe(0));
     world.run_for(1);

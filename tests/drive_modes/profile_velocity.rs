@@ -2,7 +2,9 @@
 
 use takt_rt::{Phase, ProfileMove, ProfileTarget, Request, Rule, StopCategory};
 
-use crate::world::{MILLISECOND_NS, World, counts, load, one_yz_aim, parse, word};
+use crate::one_yz_aim::one_yz_aim;
+use crate::wire::{MILLISECOND_NS, counts, word};
+use crate::world::{World, load, parse};
 
 fn erob() -> World {
     World::holding(load("erob-modes/erob-pv.toml"))

@@ -2,11 +2,13 @@
 
 use takt::Outcome;
 use takt::config::Config;
+use takt::internals::RunInside;
 use takt::internals::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::Phase;
 
-use crate::world::{World, counts_per_unit, id, load};
+use crate::wire::{counts_per_unit, id};
+use crate::world::{World, load};
 
 /// The gantry with drives that differ from the usual ones.
 fn gantry_with(config: Config, change: impl Fn(&mut YzAimParameters)) -> World {
@@ -103,5 +105,5 @@ fn the_alarm_of_a_yz_aim_is_known_after_the_run_though_its_process_data_have_no_
     world.port(0).bus.inject_fault(node, DriveFault::BlockedRotor).unwrap();
     let outcome = world.run_to_the_end(|_| ());
     assert!(matches!(outcome, Outcome::Stopped(_)), "{outcome:?}");
-    assert_eq!(world.drive_errors(), [(0, 0x12)]);
+    assert_eq!(world.run.supervisor().drive_errors(), [(0, 0x12)]);
 }

@@ -9,7 +9,9 @@ use takt::config::Config;
 use takt::internals::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 
-use crate::world::{World, counts_per_unit, id, load, one_yz_aim, parse, text_of, word};
+use crate::one_yz_aim::one_yz_aim;
+use crate::wire::{counts_per_unit, id, word};
+use crate::world::{World, load, parse, text_of};
 
 /// A PDO as a DCF configures it: on with this transmission type and these objects, or off.
 fn pdo(direction: char, number: u32, node: u32, content: Option<(u8, &[u32])>) -> String {

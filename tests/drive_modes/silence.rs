@@ -5,7 +5,9 @@ use takt::config::Config;
 use takt::family;
 use takt_rt::{BusPort, DriveState, Phase, Rule};
 
-use crate::world::{MILLISECOND_NS, World, counts_per_unit, id, load, one_yz_aim, parse, word};
+use crate::one_yz_aim::one_yz_aim;
+use crate::wire::{MILLISECOND_NS, counts_per_unit, id, word};
+use crate::world::{World, load, parse};
 
 const SILENCE_NS: u64 = 3_000 * MILLISECOND_NS;
 const COMMUNICATION_LOST: u16 = 0x20;

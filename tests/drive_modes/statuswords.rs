@@ -3,7 +3,8 @@
 use takt::config::{Config, Feedback};
 use takt_rt::{Frame, Phase, Request, Rule};
 
-use crate::world::{World, id, load, word};
+use crate::wire::{id, word};
+use crate::world::{World, load};
 
 const FAULT: u16 = 0x1208;
 const READY_TO_SWITCH_ON: u16 = 0x1231;

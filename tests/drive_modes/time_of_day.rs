@@ -5,7 +5,8 @@ use takt::internals::canopen::time::TimeOfDay;
 use takt::schedule::{self, MessageKind};
 use takt_rt::TIME_ID;
 
-use crate::world::{MILLISECOND_NS, World, parse, text_of};
+use crate::wire::MILLISECOND_NS;
+use crate::world::{World, parse, text_of};
 
 /// 2000-01-01, where virtual time begins.
 const FIRST_DAY: u16 = 16 * 365 + 4;

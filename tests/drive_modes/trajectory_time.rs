@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use takt_rt::Phase;
 
-use crate::world::{MILLISECOND_NS, World, counts, counts_per_unit, id, parse, text_of};
+use crate::wire::{MILLISECOND_NS, counts, counts_per_unit, id};
+use crate::world::{World, parse, text_of};
 
 const SYNC: u32 = 0x080;
 

@@ -3,7 +3,8 @@
 use takt::config::Config;
 use takt_rt::{BusPort, Phase};
 
-use crate::world::{MILLISECOND_NS, World, parse};
+use crate::wire::MILLISECOND_NS;
+use crate::world::{World, parse};
 
 fn one_erob(mode: &str, step: &str, master: &str) -> Config {
     let mut config = parse(&format!(

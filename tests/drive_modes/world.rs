@@ -1,19 +1,17 @@
 //! A controller whose frames are written down, in virtual time.
 
-use std::f64::consts::TAU;
 use std::path::Path;
 
-use takt::config::{Axis, Config, ProgramMove, ProgramTarget, Travel};
+use takt::config::{Axis, Config, ProgramMove, ProgramTarget};
 use takt::internals::RunInside;
 use takt::internals::channels::LogSide;
 use takt::sim::{Observation, SimulatedBus};
 use takt::{Outcome, VirtualRun};
 use takt_rt::{
-    BusHealth, BusPort, Event, EventKind, Frame, Id, MotionState, Phase, ProfileMove, ProfileTarget,
-    ReceiveBatch, Received, Request, RequestId, StopReason,
+    BusHealth, BusPort, Event, EventKind, Frame, Phase, ReceiveBatch, Received, Request, RequestId,
+    StopReason,
 };
 
-pub const MILLISECOND_NS: u64 = 1_000_000;
 /// A minute is more than any of these programs takes.
 pub const CYCLES_AT_MOST: u64 = 60_000;
 
@@ -76,7 +74,6 @@ pub struct World {
     pub run: VirtualRun<Watched>,
     log: LogSide,
     pub events: Vec<Event>,
-    last_motion: RequestId,
 }
 
 pub fn text_of(name: &str) -> String {
@@ -92,37 +89,6 @@ pub fn load(name: &str) -> Config {
     parse(&text_of(name))
 }
 
-/// One YZ-AIM on a ball screw in this mode, on a bus at half the rate of the controller, and one step of its program.
-pub fn one_yz_aim(mode: &str, step: &str) -> String {
-    format!(
-        r#"
-name = "one"
-[[bus]]
-name = "can"
-period = "2 ms"
-[[axis]]
-name = "x"
-bus = "can"
-node = 1
-drive = "yz-aim"
-mode = "{mode}"
-travel = "linear"
-lead = "10 mm"
-[axis.limits]
-position = ["0 mm", "800 mm"]
-velocity = "0.15 m/s"
-acceleration = "1 m/s^2"
-torque = "300 N"
-[axis.joint]
-inertia = "4 kg"
-viscous_friction = "20 N s/m"
-coulomb_friction = "5 N"
-[[program.move]]
-{step}
-"#
-    )
-}
-
 impl World {
     pub fn new(config: Config) -> Self {
         let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
@@ -133,7 +99,7 @@ impl World {
     pub fn on(config: Config, buses: Vec<SimulatedBus>) -> Self {
         let ports = buses.into_iter().map(Watched::new).collect();
         let (run, log) = VirtualRun::new(&config, ports).unwrap();
-        Self { config, run, log, events: vec![], last_motion: RequestId::default() }
+        Self { config, run, log, events: vec![] }
     }
 
     /// A controller that holds where its axes are for an hour, to be commanded by the test.
@@ -202,11 +168,6 @@ impl World {
         self.run.supervisor().outcome().cloned()
     }
 
-    /// The axes whose drives showed an error during the shut-down, with its code.
-    pub fn drive_errors(&self) -> &[(usize, u16)] {
-        self.run.supervisor().drive_errors()
-    }
-
     pub fn phase(&self) -> Phase {
         self.run.snapshot().groups[0].phase
     }
@@ -221,18 +182,6 @@ impl World {
     pub fn finished_motions(&self) -> usize {
         let is_finished = |event: &&Event| matches!(event.kind, EventKind::MotionFinished { .. });
         self.events.iter().filter(is_finished).count()
-    }
-
-    /// Whether the last target that [`World::drive_to`] has given is reached.
-    pub fn is_reached(&self) -> bool {
-        self.run.snapshot().motions.of(self.last_motion) == Some(MotionState::Finished)
-    }
-
-    /// Gives an axis in a profile mode a target that stays valid for an hour.
-    pub fn drive_to(&mut self, axis: u8, target: ProfileTarget) {
-        let valid_until_ns = self.run.snapshot().at_ns + 3_600_000 * MILLISECOND_NS;
-        self.last_motion =
-            self.request(Request::SetProfileTarget(ProfileMove { axis, target, valid_until_ns }));
     }
 
     pub fn port(&mut self, bus: usize) -> &mut Watched {
@@ -252,33 +201,4 @@ impl World {
         });
         stops.collect()
     }
-
-    pub fn phases(&self) -> Vec<Phase> {
-        let phases = self.events.iter().filter_map(|event| match event.kind {
-            EventKind::PhaseChanged { to, .. } => Some(to),
-            _ => None,
-        });
-        phases.collect()
-    }
-}
-
-/// Counts for one rad (m) of an axis.
-pub fn counts_per_unit(axis: &Axis) -> f64 {
-    let travel_per_turn = match axis.travel {
-        Travel::Rotary => TAU,
-        Travel::Linear { lead_m } => lead_m,
-    };
-    axis.counts_per_turn * axis.gear_ratio / travel_per_turn
-}
-
-pub fn id(function: u16, node: u8) -> u32 {
-    Id::canopen(function, node).value()
-}
-
-pub fn word(payload: &[u8]) -> u16 {
-    u16::from_le_bytes([payload[0], payload[1]])
-}
-
-pub fn counts(payload: &[u8]) -> i32 {
-    i32::from_le_bytes(payload.try_into().unwrap())
 }
