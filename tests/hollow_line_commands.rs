@@ -2,40 +2,29 @@
 //! Modbus mode, the console, the encoder, the pulse module; and the table of the PWM input.
 
 mod printed;
+mod simulated;
 
 use std::io::Read;
-use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
-use std::thread;
-use std::time::Duration;
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use takt::internals::sim::pseudo_terminal::PseudoTerminal;
-use tempfile::TempDir;
 
 use printed::{ends_with, errors, said};
+use simulated::Simulated;
 
 /// A simulated device in a process of its own.
 struct Device {
-    process: Child,
+    _simulated: Simulated,
     line: String,
-    _folder: TempDir,
 }
 
 impl Device {
     fn new(kind: &str, faults: &[&str]) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let link: PathBuf = folder.path().join("line");
-        let mut process = Command::new(env!("CARGO_BIN_EXE_takt"));
-        process.args(["sim", "--serial", kind, "--pty"]).arg(&link).stderr(Stdio::null());
-        faults.iter().for_each(|fault| {
-            process.args(["--line-fault", fault]);
-        });
-        let process = process.spawn().unwrap();
-        while !link.exists() {
-            thread::sleep(Duration::from_millis(5));
-        }
-        Self { process, line: format!("serial:{}@19200", link.display()), _folder: folder }
+        let faults = faults.iter().flat_map(|fault| ["--line-fault", *fault]);
+        let simulated = Simulated::new(&["--serial", kind].into_iter().chain(faults).collect::<Vec<_>>());
+        let line = format!("serial:{}@19200", simulated.path.display());
+        Self { _simulated: simulated, line }
     }
 
     fn drive(&self, family: &str, arguments: &[&str]) -> Output {
@@ -58,13 +47,6 @@ impl Device {
         ];
         let keys: Vec<&str> = keys.iter().flat_map(|key| ["--set", key]).collect();
         self.drive("hollow-can-fd", &[&["--node", "2"], &keys[..], arguments].concat())
-    }
-}
-
-impl Drop for Device {
-    fn drop(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
     }
 }
 

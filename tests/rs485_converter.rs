@@ -2,46 +2,30 @@
 //! against the simulated converter on a pseudo-terminal.
 
 mod printed;
+mod simulated;
 
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::thread;
-use std::time::Duration;
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 use takt::Config;
-use tempfile::TempDir;
 
 use printed::{ends_with, errors, said};
+use simulated::Simulated;
 
 /// A simulated converter with motors 1 to 4, in a process of its own.
 struct Converter {
-    process: Child,
+    simulated: Simulated,
     interface: String,
-    folder: TempDir,
 }
 
 impl Converter {
     fn new(faults: &[&str]) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let link: PathBuf = folder.path().join("line");
-        let mut process = Command::new(env!("CARGO_BIN_EXE_takt"));
-        process.args(["sim", "--serial", "hollow-rs485", "--pty"]).arg(&link).stderr(Stdio::null());
-        faults.iter().for_each(|fault| {
-            process.args(["--line-fault", fault]);
-        });
-        let process = process.spawn().unwrap();
-        while !link.exists() {
-            thread::sleep(Duration::from_millis(5));
-        }
-        Self { process, interface: format!("rs485-canfd:{}", link.display()), folder }
-    }
-}
-
-impl Drop for Converter {
-    fn drop(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
+        let faults = faults.iter().flat_map(|fault| ["--line-fault", *fault]);
+        let arguments: Vec<_> = ["--serial", "hollow-rs485"].into_iter().chain(faults).collect();
+        let simulated = Simulated::new(&arguments);
+        let interface = format!("rs485-canfd:{}", simulated.path.display());
+        Self { simulated, interface }
     }
 }
 
@@ -173,7 +157,7 @@ fn a_motor_without_a_configuration_is_asked_over_the_line_by_its_keys() {
 fn a_motor_behind_the_converter_follows_a_cycle() {
     let converter = Converter::new(&[]);
     let bus = format!("line={}", converter.interface);
-    let recording = converter.folder.path().join("run.mcap");
+    let recording = converter.simulated.path.with_file_name("run.mcap");
     let recording = recording.to_str().unwrap();
     let output = takt(&["run", config().to_str().unwrap(), "--bus", &bus, "--record", recording, "--json"]);
     ends_with(0, &output);

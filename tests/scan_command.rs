@@ -1,20 +1,20 @@
 //! `takt scan` as a user meets it: simulated drives behind an adapter, and on a serial line.
 
 mod printed;
+mod simulated;
 
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 use serde_json::Value;
-use tempfile::TempDir;
 
 use printed::{ends_with, errors, said};
+use simulated::Simulated;
 
 fn takt(subcommand: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
@@ -27,43 +27,12 @@ fn scan(arguments: &[&str]) -> Output {
     takt("scan").args(arguments).output().unwrap()
 }
 
-/// Simulated drives, until they are dropped.
-struct Simulated {
-    process: Child,
-    folder: TempDir,
+fn adapter(simulated: &Simulated) -> String {
+    format!("slcan:{}", simulated.path.display())
 }
 
-impl Simulated {
-    fn new(arguments: &[&str]) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let mut process = takt("sim");
-        process.args(arguments).arg("--pty").arg(folder.path().join("line"));
-        let process = process.stderr(Stdio::null()).spawn().unwrap();
-        let simulated = Self { process, folder };
-        while !simulated.line().exists() {
-            thread::sleep(Duration::from_millis(5));
-        }
-        simulated
-    }
-
-    fn line(&self) -> PathBuf {
-        self.folder.path().join("line")
-    }
-
-    fn adapter(&self) -> String {
-        format!("slcan:{}", self.line().display())
-    }
-
-    fn serial(&self) -> String {
-        format!("serial:{}", self.line().display())
-    }
-}
-
-impl Drop for Simulated {
-    fn drop(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
-    }
+fn serial(simulated: &Simulated) -> String {
+    format!("serial:{}", simulated.path.display())
 }
 
 #[test]
@@ -71,7 +40,7 @@ fn the_drive_of_the_first_configuration_is_found_in_every_width() {
     let simulated = Simulated::new(&["configs/first.toml"]);
     for columns in [None, Some("60"), Some("80"), Some("200")] {
         let mut command = takt("scan");
-        command.args(["--bus", &simulated.adapter(), "--to", "8"]).env("NO_COLOR", "1");
+        command.args(["--bus", &adapter(&simulated), "--to", "8"]).env("NO_COLOR", "1");
         if let Some(columns) = columns {
             command.env("COLUMNS", columns);
         }
@@ -92,14 +61,14 @@ fn the_drive_of_the_first_configuration_is_found_in_every_width() {
 #[test]
 fn what_was_found_is_an_object_and_a_configuration_that_check_accepts() {
     let simulated = Simulated::new(&["configs/first.toml"]);
-    let output = scan(&["--bus", &simulated.adapter(), "--to", "8", "--json"]);
+    let output = scan(&["--bus", &adapter(&simulated), "--to", "8", "--json"]);
     ends_with(0, &output);
     let object: Value = serde_json::from_str(&said(&output)).unwrap();
     assert_eq!((&object["ended"], &object["buses"][0]["devices"][0]["node"]), (&"done".into(), &1.into()));
     assert_eq!(object["buses"][0]["devices"][0]["identity"]["vendor"], 0x5A65_726F);
-    let output = scan(&["--bus", &simulated.adapter(), "--to", "8", "--config"]);
+    let output = scan(&["--bus", &adapter(&simulated), "--to", "8", "--config"]);
     ends_with(0, &output);
-    let file = simulated.folder.path().join("found.toml");
+    let file = simulated.path.with_file_name("found.toml");
     fs::write(&file, said(&output)).unwrap();
     let checked = takt("check").arg(&file).output().unwrap();
     ends_with(0, &checked);
@@ -109,7 +78,7 @@ fn what_was_found_is_an_object_and_a_configuration_that_check_accepts() {
 #[test]
 fn slaves_on_a_serial_line_are_found_at_the_bit_rate_that_is_theirs() {
     let simulated = Simulated::new(&["--serial", "erob-modbus:2,5"]);
-    let output = scan(&["--bus", &simulated.serial(), "--to", "6", "--json"]);
+    let output = scan(&["--bus", &serial(&simulated), "--to", "6", "--json"]);
     ends_with(0, &output);
     let object: Value = serde_json::from_str(&said(&output)).unwrap();
     let devices = object["buses"][0]["devices"].as_array().unwrap();
@@ -121,7 +90,7 @@ fn slaves_on_a_serial_line_are_found_at_the_bit_rate_that_is_theirs() {
 #[test]
 fn a_motor_behind_the_converter_is_read_and_not_commanded() {
     let simulated = Simulated::new(&["--serial", "hollow-modbus"]);
-    let output = scan(&["--bus", &format!("{}@19200", simulated.serial()), "--to", "2", "--json"]);
+    let output = scan(&["--bus", &format!("{}@19200", serial(&simulated)), "--to", "2", "--json"]);
     ends_with(0, &output);
     let object: Value = serde_json::from_str(&said(&output)).unwrap();
     assert_eq!(object["buses"][0]["devices"][0]["drive"], "hollow-can-fd", "{object}");
@@ -131,7 +100,7 @@ fn a_motor_behind_the_converter_is_read_and_not_commanded() {
 fn ctrl_c_in_the_middle_shows_what_has_been_found() {
     let simulated = Simulated::new(&["configs/first.toml"]);
     let mut command = takt("scan");
-    command.args(["--bus", &simulated.adapter(), "--listen-for", "60 s", "--verbose"]);
+    command.args(["--bus", &adapter(&simulated), "--listen-for", "60 s", "--verbose"]);
     let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     // The identity of the drive has been read when its firmware is asked for.
     let mut lines = BufReader::new(process.stderr.take().unwrap()).lines();
@@ -150,7 +119,7 @@ fn ctrl_c_in_the_middle_shows_what_has_been_found() {
 #[test]
 fn a_bus_that_another_takt_commands_is_not_scanned() {
     let simulated = Simulated::new(&["configs/first.toml"]);
-    let interface = simulated.adapter();
+    let interface = adapter(&simulated);
     let mut watch = takt("drive")
         .args(["--bus", &interface, "--node", "1", "--family", "erob-canopen", "watch"])
         .stdout(Stdio::piped())
@@ -176,7 +145,7 @@ fn a_bus_that_another_takt_commands_is_not_scanned() {
 fn a_reader_that_goes_away_is_no_failure() {
     let simulated = Simulated::new(&["configs/first.toml"]);
     let takt = env!("CARGO_BIN_EXE_takt");
-    let line = format!("{takt} scan --bus {} --to 4 | head -1; echo ${{PIPESTATUS[0]}}", simulated.adapter());
+    let line = format!("{takt} scan --bus {} --to 4 | head -1; echo ${{PIPESTATUS[0]}}", adapter(&simulated));
     let output = Command::new("bash").args(["-c", &line]).output().unwrap();
     let text = said(&output);
     assert_eq!(text.lines().last(), Some("0"), "{text}{}", errors(&output));

@@ -1,18 +1,18 @@
 //! `takt send` as a user meets it: simulated drives behind an adapter, and an adapter that the test plays.
 
 mod printed;
+mod simulated;
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
 use takt::internals::sim::pseudo_terminal::PseudoTerminal;
-use tempfile::TempDir;
 
 use printed::{ends_with, errors, said};
+use simulated::Simulated;
 
 fn takt(subcommand: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
@@ -25,46 +25,18 @@ fn send(arguments: &[&str]) -> Output {
     takt("send").args(arguments).output().unwrap()
 }
 
-/// Simulated drives behind an adapter, until it is dropped.
-struct Simulated {
-    process: Child,
-    folder: TempDir,
-}
-
-impl Simulated {
-    fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let mut process = takt("sim");
-        process.args(["tests/monitor/canopen.toml", "--pty"]).arg(folder.path().join("adapter"));
-        let process = process.stderr(Stdio::null()).spawn().unwrap();
-        let simulated = Self { process, folder };
-        while !simulated.adapter().exists() {
-            thread::sleep(Duration::from_millis(5));
-        }
-        simulated
-    }
-
-    fn adapter(&self) -> PathBuf {
-        self.folder.path().join("adapter")
-    }
-
-    fn interface(&self) -> String {
-        format!("slcan:{}", self.adapter().display())
-    }
-}
-
-impl Drop for Simulated {
-    fn drop(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
-    }
+/// Drives behind an adapter, and that adapter.
+fn simulated() -> (Simulated, String) {
+    let simulated = Simulated::new(&["tests/monitor/canopen.toml"]);
+    let interface = format!("slcan:{}", simulated.path.display());
+    (simulated, interface)
 }
 
 #[test]
 fn a_frame_is_sent_and_what_comes_back_is_shown_with_its_meaning() {
-    let simulated = Simulated::new();
+    let (_simulated, interface) = simulated();
     // The drive is read: its device type.
-    let read = ["601#40.0010.00.00000000", "--bus", &simulated.interface(), "--wait", "0.5"];
+    let read = ["601#40.0010.00.00000000", "--bus", &interface, "--wait", "0.5"];
     let output = send(&read);
     ends_with(0, &output);
     let text = said(&output);
@@ -85,9 +57,8 @@ fn a_frame_is_sent_and_what_comes_back_is_shown_with_its_meaning() {
 
 #[test]
 fn a_frame_is_sent_as_often_as_it_is_wanted() {
-    let simulated = Simulated::new();
-    let output =
-        send(&["701#R", "080#", "--bus", &simulated.interface(), "--count", "3", "--period", "5 ms"]);
+    let (_simulated, interface) = simulated();
+    let output = send(&["701#R", "080#", "--bus", &interface, "--count", "3", "--period", "5 ms"]);
     ends_with(0, &output);
     let sent: Vec<String> =
         said(&output).lines().filter(|line| line.contains('>')).map(str::to_owned).collect();
@@ -97,8 +68,7 @@ fn a_frame_is_sent_as_often_as_it_is_wanted() {
 
 #[test]
 fn nothing_is_sent_where_a_running_takt_is_the_master() {
-    let simulated = Simulated::new();
-    let interface = simulated.interface();
+    let (_simulated, interface) = simulated();
     let mut watch = takt("drive")
         .args(["--bus", &interface, "--node", "1", "--family", "erob-canopen", "watch"])
         .stdout(Stdio::piped())

@@ -1,36 +1,29 @@
 //! `takt sim --serial`: the simulated devices on serial lines, as any program finds them.
 
+mod simulated;
+
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
 use takt::internals::hollow_lines::encoder::{self, EncoderReading};
 use takt::internals::hollow_lines::motor_data::{MotorCommand, MotorMode, MotorReply, MotorRun};
 use takt::internals::hollow_lines::transparent::{FrameReader, TransparentFrame};
-use tempfile::TempDir;
+
+use simulated::Simulated;
 
 /// A simulated device in a process of its own, and its line.
 struct Device {
-    process: Child,
+    _simulated: Simulated,
     line: File,
-    _folder: TempDir,
 }
 
 impl Device {
     fn new(kind: &str) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let link: PathBuf = folder.path().join("line");
-        let mut process = Command::new(env!("CARGO_BIN_EXE_takt"));
-        process.args(["sim", "--serial", kind, "--pty"]).arg(&link).stderr(Stdio::null());
-        let process = process.spawn().unwrap();
-        while !link.exists() {
-            thread::sleep(Duration::from_millis(5));
-        }
-        let line = OpenOptions::new().read(true).write(true).open(&link).unwrap();
-        Self { process, line, _folder: folder }
+        let simulated = Simulated::new(&["--serial", kind]);
+        let line = OpenOptions::new().read(true).write(true).open(&simulated.path).unwrap();
+        Self { _simulated: simulated, line }
     }
 
     /// The frame that answers a request.
@@ -62,13 +55,6 @@ impl Device {
             heard.push_str(std::str::from_utf8(&bytes[..count]).unwrap());
         }
         heard
-    }
-}
-
-impl Drop for Device {
-    fn drop(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
     }
 }
 

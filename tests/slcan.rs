@@ -1,14 +1,18 @@
 //! A bus behind an SLCAN adapter: `takt sim --pty` in one process, its master in another one, in wall-clock time.
 
+mod simulated;
+
 use std::fs::OpenOptions;
 use std::io::{Read, Write};
-use std::path::PathBuf;
-use std::process::{Child, Command, Output, Stdio};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
 use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
 use tempfile::TempDir;
+
+use simulated::Simulated;
 
 /// A joint that is moved slowly, by a controller that bears late cycles: the machine that tests run on is busy.
 const SLOW_JOINT: &str = r#"
@@ -32,44 +36,31 @@ limits = { position = ["-170 deg", "170 deg"], velocity = "90 deg/s", accelerati
 to = "20 deg"
 "#;
 
-/// Simulated drives behind adapters, until it is dropped.
-struct Simulated {
-    process: Child,
+/// The slow joint behind an adapter.
+struct SlowJoint {
+    simulated: Simulated,
     folder: TempDir,
 }
 
-impl Simulated {
-    fn new(config: &str) -> Self {
+impl SlowJoint {
+    fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("config.toml"), config).unwrap();
-        let mut process = takt();
-        process.args(["sim", "config.toml", "--pty", "adapter"]).current_dir(folder.path());
-        let process = process.stderr(Stdio::null()).spawn().unwrap();
-        let simulated = Self { process, folder };
-        while !simulated.adapter().exists() {
-            thread::sleep(Duration::from_millis(5));
-        }
-        simulated
+        let config = folder.path().join("config.toml");
+        std::fs::write(&config, SLOW_JOINT).unwrap();
+        Self { simulated: Simulated::new(&[config.to_str().unwrap()]), folder }
     }
 
     fn config(&self) -> PathBuf {
         self.folder.path().join("config.toml")
     }
 
-    fn adapter(&self) -> PathBuf {
-        self.folder.path().join("adapter")
+    fn adapter(&self) -> &Path {
+        &self.simulated.path
     }
 
     /// `slcan:` and the path of the adapter.
     fn interface(&self) -> String {
         format!("slcan:{}", self.adapter().display())
-    }
-}
-
-impl Drop for Simulated {
-    fn drop(&mut self) {
-        self.process.kill().unwrap();
-        self.process.wait().unwrap();
     }
 }
 
@@ -84,7 +75,7 @@ fn words(output: &Output) -> String {
 
 #[test]
 fn an_arm_behind_an_adapter_is_moved_by_another_process_time_and_again() {
-    let simulated = Simulated::new(SLOW_JOINT);
+    let simulated = SlowJoint::new();
     for _ in 0..2 {
         let bus = format!("can={}", simulated.interface());
         let run = takt().arg("run").arg(simulated.config()).args(["--bus", &bus, "--json"]).output().unwrap();
@@ -102,7 +93,7 @@ fn an_arm_behind_an_adapter_is_moved_by_another_process_time_and_again() {
 
 #[test]
 fn a_drive_behind_an_adapter_is_read_without_a_configuration() {
-    let simulated = Simulated::new(SLOW_JOINT);
+    let simulated = SlowJoint::new();
     let read = takt()
         .args(["drive", "--bus", &simulated.interface(), "--node", "1", "--family", "erob-canopen", "read"])
         .arg("1000")
@@ -115,7 +106,7 @@ fn a_drive_behind_an_adapter_is_read_without_a_configuration() {
 
 #[test]
 fn whoever_opens_the_line_may_talk_to_the_drives_by_hand() {
-    let simulated = Simulated::new(SLOW_JOINT);
+    let simulated = SlowJoint::new();
     let mut line = OpenOptions::new().read(true).write(true).open(simulated.adapter()).unwrap();
     line.write_all(b"C\rS8\rO\r").unwrap();
     // An SDO read of 1000 sub 0: the answer comes once the drive has booted. The adapter answers each line, so a reading ends.
@@ -135,7 +126,7 @@ fn whoever_opens_the_line_may_talk_to_the_drives_by_hand() {
 
 #[test]
 fn the_jitter_of_sync_is_measured_behind_an_adapter() {
-    let simulated = Simulated::new(SLOW_JOINT);
+    let simulated = SlowJoint::new();
     let measured = takt()
         .args(["jitter", "--cycles", "200", "--json", "--bus", &simulated.interface()])
         .output()
@@ -149,7 +140,7 @@ fn the_jitter_of_sync_is_measured_behind_an_adapter() {
 
 #[test]
 fn one_master_at_a_time_may_use_an_adapter() {
-    let simulated = Simulated::new(SLOW_JOINT);
+    let simulated = SlowJoint::new();
     let read = |bus: &str| {
         let options = ["--node", "1", "--family", "erob-canopen", "read", "1000"];
         takt().args(["drive", "--bus", bus]).args(options).output().unwrap()
