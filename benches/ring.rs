@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 use criterion::{Criterion, criterion_group, criterion_main};
 use takt::internals::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
-    AxisDescription, Logger, LoggerOptions, Machine, RecordingDestination, SetPointMagnitudes, Unit,
-    WallClock,
+    AxisDescription, Logger, LoggerOptions, Machine, RecordingDestination, RecordingOptions,
+    SetPointMagnitudes, Unit, WallClock,
 };
 use takt_rt::{CycleRecord, HostInterface, Snapshot};
 
@@ -100,6 +100,7 @@ fn logger(criterion: &mut Criterion) {
             started_ns: 0,
             recording: is_recorded
                 .then(|| RecordingDestination::Stream("nowhere".to_owned(), Box::new(io::sink()))),
+            recording_options: RecordingOptions::default(),
             candump: None,
             black_box: None,
             traces: Vec::new(),

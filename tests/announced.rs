@@ -7,7 +7,9 @@ use std::process::{Command, Output};
 use std::sync::{Arc, Mutex};
 
 use takt::sim::SimulatedBus;
-use takt::telemetry::{LogSide, Logger, LoggerOptions, Machine, RecordingDestination, WallClock};
+use takt::telemetry::{
+    LogSide, Logger, LoggerOptions, Machine, RecordingDestination, RecordingOptions, WallClock,
+};
 use takt::{Config, FaultInjector, Outcome, Scenario, VirtualRun};
 use tracing::field::{Field, Visit};
 use tracing::span::{Attributes, Id, Record};
@@ -86,6 +88,7 @@ fn logger(config: &Config, log: LogSide, recording: RecordingDestination) -> Log
         wall_clock: WallClock::fixed(0),
         started_ns: 0,
         recording: Some(recording),
+        recording_options: RecordingOptions::default(),
         candump: None,
         black_box: None,
         traces: vec![],

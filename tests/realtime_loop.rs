@@ -14,7 +14,7 @@ use takt::internals::channels::{ChannelSizes, channels};
 use takt::internals::controller::realtime_thread::{self, LoopParts};
 use takt::internals::controller::{Supervisor, assemble};
 use takt::internals::telemetry::LoggerThread;
-use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, Machine, WallClock};
+use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingOptions, WallClock};
 use takt_rt::Frame;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusHealth, BusPort, Clock, ReceiveBatch};
@@ -122,6 +122,7 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         wall_clock: WallClock::starting_now(started_ns),
         started_ns,
         recording: None,
+        recording_options: RecordingOptions::default(),
         candump: None,
         black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
         traces,

@@ -19,7 +19,7 @@ use takt::internals::controller::{Supervisor, assemble};
 use takt::internals::link::trace::Trace;
 use takt::internals::telemetry::LoggerThread;
 use takt::telemetry::{
-    BlackBoxOptions, Incident, Logger, LoggerOptions, Machine, Notice, Recorded, WallClock,
+    BlackBoxOptions, Incident, Logger, LoggerOptions, Machine, Notice, Recorded, RecordingOptions, WallClock,
 };
 use takt::{Session, SessionOptions};
 use takt_rt::linux::MonotonicClock;
@@ -185,6 +185,7 @@ fn after_a_panic_of_the_real_time_thread_its_last_cycles_and_frames_are_in_the_b
         wall_clock: WallClock::fixed(0),
         started_ns: 0,
         recording: None,
+        recording_options: RecordingOptions::default(),
         candump: None,
         black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
         traces: left.traces,

@@ -116,6 +116,48 @@ fn a_recording_that_was_cut_off_is_replayed_to_its_end() {
 }
 
 #[test]
+fn a_recording_in_several_files_is_replayed_from_its_first_one_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let config = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/first.toml");
+    fs::copy(config, folder.path().join("first.toml")).unwrap();
+    let recorded =
+        ["--record", "run.mcap", "--record-uncompressed", "--record-size-limit", "1M", "--duration", "4"];
+    let output = takt(folder.path(), &[&["run", "first.toml"], &recorded[..]].concat());
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let output = takt(folder.path(), &["replay", "run.0001.mcap", "--json"]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let result: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(result["identical"].as_bool().unwrap(), "{result}");
+    let cycles = |file: &str| -> u64 {
+        let output = takt(folder.path(), &["report", file, "--json"]);
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["cycles"].as_u64().unwrap()
+    };
+    let [first, second] = ["run.0001.mcap", "run.0002.mcap"].map(cycles);
+    assert!(first > 0 && second > 0 && result["compared"].as_u64().unwrap() >= first + second, "{result}");
+
+    let error = refused(&takt(folder.path(), &["replay", "run.0002.mcap"]));
+    assert!(error.contains("begins in an earlier file, run.0001.mcap: replay that one"), "{error}");
+    fs::remove_file(folder.path().join("run.0001.mcap")).unwrap();
+    let error = refused(&takt(folder.path(), &["replay", "run.0002.mcap"]));
+    assert!(error.contains("run.0001.mcap: which is not there any more"), "{error}");
+}
+
+#[test]
+fn sizes_and_numbers_of_files_that_make_no_sense_are_refused_with_the_option() {
+    for (arguments, what) in [
+        (&["--record-size-limit", "12X"][..], "a size is a whole number of bytes"),
+        (&["--record-size-limit", "-1M"], "a size is a whole number of bytes"),
+        (&["--record-size-limit", "99999999999G"], "a size is a whole number of bytes"),
+        (&["--record-size-limit", "1023K"], "needs 1M at least"),
+        (&["--record-size-limit", "1M", "--record-keep", "0"], "--record-keep"),
+        (&["--record-keep", "3"], "--record-size-limit"),
+    ] {
+        let error = refused(&takt(recorded_folder(), &[&["run", "none.toml"], arguments].concat()));
+        assert!(error.contains(what) && error.contains("--record-"), "{arguments:?}: {error}");
+    }
+}
+
+#[test]
 fn what_has_no_journal_is_refused_with_the_reason() {
     let replay_of_replay = replay(&["--record", "again.mcap"]);
     assert_eq!(replay_of_replay.status.code(), Some(0), "{replay_of_replay:?}");

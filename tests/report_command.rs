@@ -14,7 +14,7 @@ use takt::internals::link::trace::traced;
 use takt::sim::SimulatedBus;
 use takt::telemetry::{
     BlackBoxOptions, BusDescription, Emphasis, LogSummary, Logger, LoggerOptions, Machine, RealtimeReport,
-    Recorded, RecordingDestination, RunEnd, RunOutcome, RunReport, WallClock,
+    Recorded, RecordingDestination, RecordingOptions, RunEnd, RunOutcome, RunReport, WallClock,
 };
 use takt::{Outcome, VirtualRun};
 use takt_rt::{CycleRecord, HostInterface, Rule};
@@ -45,6 +45,7 @@ fn stopped_run() -> RunFiles {
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
         started_ns: 0,
         recording: Some(RecordingDestination::File(folder.path().join("run.mcap"))),
+        recording_options: RecordingOptions::default(),
         candump: None,
         black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
         traces,
@@ -72,6 +73,7 @@ fn recording_to(file: &Path, machine: Machine) -> LoggerOptions {
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
         started_ns: 0,
         recording: Some(RecordingDestination::File(file.to_owned())),
+        recording_options: RecordingOptions::default(),
         candump: None,
         black_box: None,
         traces: vec![],
@@ -183,6 +185,7 @@ fn run_with_a_lost_bus(bus: &str, restart: &str, folder: &Path) -> (LogSummary, 
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
         started_ns: 0,
         recording: Some(RecordingDestination::File(folder.join(format!("{bus}.mcap")))),
+        recording_options: RecordingOptions::default(),
         candump: None,
         black_box: None,
         traces: vec![],
@@ -273,11 +276,11 @@ fn cycles_without_feedback_are_shown_as_such_and_not_as_the_last_values() {
 
     let svg = fs::read_to_string(svg).unwrap();
     assert!(svg.contains("grey: no feedback") && svg.contains("fill=\"#ddd\""), "{svg}");
-    // The curves of what is commanded go on: of position and velocity, and three of the timing.
+    // The curves of what is commanded go on: of position, velocity, acceleration and torque, and three of the timing.
     let whole = svg.lines().filter(|line| line.starts_with("<polyline"));
     let longest = whole.clone().map(|line| line.matches(',').count()).max().unwrap();
     let (whole, cut): (Vec<_>, Vec<_>) = whole.partition(|line| line.matches(',').count() == longest);
-    assert!(whole.len() == 5 && cut.len() >= 3, "{} whole and {} cut", whole.len(), cut.len());
+    assert!(whole.len() == 7 && cut.len() >= 4, "{} whole and {} cut", whole.len(), cut.len());
 }
 
 /// The author of the file must not be able to control the terminal.
@@ -329,20 +332,104 @@ fn the_svg_shows_position_velocity_following_error_and_timing_and_marks_the_stop
     for part in [
         "joint3: position, rad",
         "joint3: velocity",
+        "joint3: acceleration, rad/s²",
+        "joint3: torque, N·m",
         "joint3: following error, mrad",
         "timing, µs",
         "wake-up",
     ] {
         assert!(svg.contains(part), "{part}");
     }
-    // Set and actual of position and velocity, the following error, and three times.
-    assert_eq!(svg.matches("<polyline").count(), 8);
-    assert!(svg.contains("-1 s") && !svg.contains("NaN"));
+    // Set and actual of position, velocity and torque, the set acceleration, the following error, and three times.
+    assert_eq!(svg.matches("<polyline").count(), 11);
+    assert!(svg.contains("-1.0 s") && !svg.contains("NaN"));
     // A path below a file cannot be written, not even by root.
     let below_a_file = left.black_box.join("stop.svg");
     let unwritable = report(&left.black_box, &["--svg", below_a_file.to_str().unwrap()]);
     assert_eq!(unwritable.status.code(), Some(1));
     assert!(text(&unwritable).contains("joint3 was"), "the text is printed all the same");
+}
+
+#[test]
+fn the_page_shows_every_axis_the_events_and_the_buses_and_takes_nothing_from_elsewhere() {
+    let left = stopped_run();
+    for file in [&left.recording, &left.black_box] {
+        let path = left.folder.path().join("run.html");
+        let output = report(file, &["--html", path.to_str().unwrap()]);
+        assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+        let page = fs::read_to_string(path).unwrap();
+        for axis in 1..=6 {
+            for quantity in [
+                "position, rad",
+                "velocity, rad/s",
+                "acceleration, rad/s²",
+                "torque, N·m",
+                "following error, mrad",
+            ] {
+                let label = format!("aria-label=\"joint{axis}: {quantity}\"");
+                assert_eq!(page.matches(&label).count(), 1, "{label}");
+            }
+        }
+        for part in [
+            "bus load, %",
+            "Stop: joint3 was 0.0",
+            "moving → stopping",
+            "<b>wake-up</b>",
+            "prefers-color-scheme: dark",
+        ] {
+            assert!(page.contains(part), "{part}");
+        }
+        let before = |part: &str| page.find(part).unwrap();
+        assert!(before("moving → stopping") < before("aria-label"), "events come first");
+        for foreign in ["<script", "<link", " src=", "url(", "@import", "href=\"http", "NaN", "inf "] {
+            assert!(!page.contains(foreign), "{foreign}");
+        }
+        assert!(page.len() < 2_000_000, "{} bytes", page.len());
+    }
+}
+
+#[test]
+fn a_part_of_a_recording_is_read_alone() {
+    let left = stopped_run();
+    let whole = json(&report(&left.recording, &["--json"]));
+    let part = json(&report(&left.recording, &["--json", "--from", "0.5", "--to", "0.75"]));
+    assert_eq!(part["cycles"], 250);
+    let span = |key: usize| part["span_s"][key].as_f64().unwrap();
+    assert!((span(0) - 0.5).abs() < 1.5e-3 && (span(1) - 0.75).abs() < 1.5e-3, "{part}");
+    let events = |report: &Value| report["events"].as_array().unwrap().clone();
+    let inside: Vec<Value> = events(&whole)
+        .into_iter()
+        .filter(|event| (0.5..0.75).contains(&event["at_s"].as_f64().unwrap()))
+        .collect();
+    assert_eq!(events(&part), inside);
+    let svg = left.folder.path().join("part.svg");
+    report(&left.recording, &["--from", "0.5", "--to", "0.75", "--svg", svg.to_str().unwrap()]);
+    assert!(fs::read_to_string(svg).unwrap().contains(">0.55 s<"), "times count from the beginning");
+
+    for (arguments, what) in [
+        (["--from", "2", "--to", "1"], "--to (1 s) must be after --from (2 s)"),
+        (["--from", "900", "--to", "901"], "there is no cycle in it from --from (900 s)"),
+        (["--from", "-1", "--to", "1"], "--from"),
+        (["--from", "0", "--to", "soon"], "--to"),
+    ] {
+        let output = report(&left.recording, &arguments);
+        assert_eq!(output.status.code(), Some(2));
+        assert!(errors(&output).contains(what), "{}", errors(&output));
+    }
+}
+
+#[test]
+fn a_recording_has_the_load_of_every_bus() {
+    let left = stopped_run();
+    for file in [&left.recording, &left.black_box] {
+        let told = json(&report(file, &["--json"]));
+        let loads = told["bus_loads"].as_array().unwrap();
+        assert_eq!(loads.len(), 2, "{told}");
+        for load in loads {
+            let (mean, most) = (load["mean"].as_f64().unwrap(), load["max"].as_f64().unwrap());
+            assert!(mean > 0.05 && mean <= most && most < 1.0, "{load}");
+        }
+    }
 }
 
 #[test]
@@ -464,7 +551,12 @@ fn many_short_cycles_and_a_long_name_take_no_more_memory_than_the_file() {
         service_in: 1,
     };
     let (mut rt, _host, log) = channels(&sizes);
-    let bus = BusDescription { name: "b".repeat(1 << 20), interface: String::new() };
+    let bus = BusDescription {
+        name: "b".repeat(1 << 20),
+        interface: String::new(),
+        bit_rate: None,
+        data_bit_rate: None,
+    };
     let machine =
         Machine { name: "m".to_owned(), cycle_ns: 1_000_000, axes: vec![], buses: vec![bus], groups: vec![] };
     let file = folder.path().join("many.mcap");

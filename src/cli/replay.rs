@@ -20,7 +20,7 @@ use super::usage_error::UsageError;
 /// configuration
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// The recording of `takt run`
+    /// The recording of `takt run`; of several files, the first one
     recording: PathBuf,
     /// Change a value of the configuration before: axes.wrist.limits.jerk=200
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -94,7 +94,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
     let path = &arguments.recording;
     let found = recorded_journal(path).map_err(|error| error.to_string())?;
     let is_changed = arguments.config.is_some() || !arguments.settings.is_empty();
-    let sources = found.sources.clone();
+    let (sources, files) = (found.sources.clone(), found.files.clone());
     let journal = complete(path, found)?;
     let config = configuration(arguments, sources)?;
     let machine = Machine::of(&config);
@@ -107,7 +107,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
             written.cycle(record, events, &machine);
         }
     };
-    let comparison = compare(path, &config, journal, each).map_err(|error| error.to_string())?;
+    let comparison = compare(&files, &config, journal, each).map_err(|error| error.to_string())?;
     let is_written = written.is_none_or(|written| match written.finish() {
         Ok(file) => {
             say!("takt: the replay is recorded in {}", file.display());
@@ -150,6 +150,18 @@ fn configuration(arguments: &Arguments, recorded: ConfigSources) -> Result<Confi
 /// The journal, if all of it is there.
 fn complete(path: &Path, found: RecordedJournal) -> Result<crate::journal::Journal, UsageError> {
     let path = path.display();
+    if let Some(first) = found.begins_in {
+        let is_there = if first.exists() {
+            "replay that one, and this one follows it"
+        } else {
+            "which is not there any more"
+        };
+        return Err(format!(
+            "{path}: the journal of this run begins in an earlier file, {}: {is_there}",
+            first.display()
+        )
+        .into());
+    }
     if found.is_of_other_version {
         return Err(format!(
             "{path}: its journal is of another version of takt; replay it with that version"

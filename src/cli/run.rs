@@ -22,7 +22,8 @@ use crate::remote::now_ns;
 use crate::schedule;
 use crate::serve::{self, ServeError, ServeOptions};
 use crate::telemetry::{
-    EachCycle, Machine, Notice, RealtimeReport, RecordingDestination, RunEnd, RunOutcome, RunReport, words,
+    EachCycle, Machine, Notice, RealtimeReport, RecordingDestination, RecordingOptions, RunEnd, RunOutcome,
+    RunReport, words,
 };
 use takt_rt::{Event, EventKind, Fault, Snapshot, StopReason};
 
@@ -52,6 +53,15 @@ pub struct Arguments {
     /// Record to this file instead of a new one in the configured folder
     #[arg(long, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
+    /// Begin the next file of the recording when one has this size: 64M, 2G. The files are numbered: run.0001.mcap
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true, value_parser = recording_size)]
+    record_size_limit: Option<u64>,
+    /// Keep so many files of the recording, the newest ones, and remove older ones
+    #[arg(long, value_name = "N", requires = "record_size_limit", allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=9999))]
+    record_keep: Option<u32>,
+    /// Do not compress the recording and the black box (zstd)
+    #[arg(long)]
+    record_uncompressed: bool,
     /// Play the faults of this scenario (TOML), to see what they lead to; configs/faults has examples
     #[arg(long, value_name = "FILE.toml")]
     faults: Option<PathBuf>,
@@ -154,6 +164,11 @@ pub fn run(arguments: Arguments) -> Exit {
     let options = SessionOptions {
         duration_ns: arguments.duration.map(|duration| duration.as_nanos() as u64),
         recording: arguments.record.map(RecordingDestination::File),
+        recording_options: RecordingOptions {
+            is_compressed: !arguments.record_uncompressed,
+            size_limit_bytes: arguments.record_size_limit,
+            keep: arguments.record_keep.map(|keep| keep as usize),
+        },
         is_realtime_required: arguments.require_realtime,
         each_cycle: metrics
             .clone()
@@ -265,6 +280,24 @@ fn offered(
         bar.suspend(|| say!("takt: {}", panel::greeting(panel.address())));
     }
     Ok(controller.ended()?)
+}
+
+/// The size of a file: a number of bytes, or of KiB, MiB or GiB.
+fn recording_size(text: &str) -> Result<u64, String> {
+    let (number, unit) = match text.char_indices().last() {
+        Some((at, letter)) if letter.is_ascii_alphabetic() => (&text[..at], letter.to_ascii_uppercase()),
+        _ => (text, 'B'),
+    };
+    let shift = ['B', 'K', 'M', 'G'].iter().position(|known| *known == unit).map(|power| 10 * power);
+    let bytes =
+        number.parse::<u64>().ok().zip(shift).and_then(|(number, shift)| number.checked_mul(1 << shift));
+    match bytes {
+        None => Err("a size is a whole number of bytes, or of K, M or G, as in 64M".to_owned()),
+        Some(bytes) if bytes < RecordingOptions::SMALLEST_LIMIT_BYTES => {
+            Err("a file of a recording needs 1M at least".to_owned())
+        }
+        Some(bytes) => Ok(bytes),
+    }
 }
 
 /// File permissions, in octal.

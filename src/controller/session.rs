@@ -31,7 +31,7 @@ use crate::link::trace::Trace;
 use crate::sleep_alignment;
 use crate::telemetry::{
     BlackBoxOptions, EachCycle, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
-    RecordingDestination, ShownTiming, WallClock, shown_timing,
+    RecordingDestination, RecordingOptions, ShownTiming, WallClock, shown_timing,
 };
 
 /// The pause between two polls of the controller.
@@ -44,6 +44,8 @@ pub struct SessionOptions {
     pub duration_ns: Option<u64>,
     /// Where to record; `None` as the configuration says.
     pub recording: Option<RecordingDestination>,
+    /// How it is written: compressed, and in how many files.
+    pub recording_options: RecordingOptions,
     /// Whether a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
     /// Called by the logger's thread with the record of each cycle. It must not panic.
@@ -227,6 +229,7 @@ fn lead_as_owner(
         wall_clock: WallClock::starting_now(started_ns),
         started_ns,
         recording: options.recording.or_else(|| directory(config.telemetry.is_recorded)),
+        recording_options: options.recording_options,
         candump: directory(config.telemetry.is_candump_written),
         black_box: config
             .telemetry

@@ -1,6 +1,6 @@
 //! A replay beside the recording that it was made from.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use takt_rt::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, StopReason};
 
@@ -59,19 +59,18 @@ pub struct AxisDifference {
     pub jerk: (f64, f64),
 }
 
-/// Replays a journal under a configuration, and compares it with its recording, as far as that has the same axes. Each cycle is also
+/// Replays a journal under a configuration, and compares it with the files of its recording, as far as that has the same axes. Each cycle is also
 /// handed to `each`.
 ///
 /// # Errors
 /// The journal cannot be replayed, or the recording not be read.
 pub fn compare(
-    path: &Path,
+    files: &[PathBuf],
     config: &Config,
     journal: Journal,
     mut each: impl FnMut(&CycleRecord, &[Event]),
 ) -> Result<Comparison, CompareError> {
     let mut replay = Replay::new(config, journal)?;
-    let recorded = Recorded::open(path)?;
     let mut comparison = Comparison {
         axes: vec![AxisDifference::default(); config.axes.len()],
         names: config.axes.iter().map(|axis| axis.name.clone()).collect(),
@@ -90,7 +89,7 @@ pub fn compare(
         each(&record, &events);
         Some(record)
     };
-    recorded.each_cycle(|record| {
+    let mut compare_cycle = |record: &CycleRecord| {
         let slot = record.timing.slot;
         // Records that the logger has lost are not in the recording.
         while next.as_ref().is_none_or(|replayed| replayed.timing.slot < slot) {
@@ -110,7 +109,10 @@ pub fn compare(
                 record.timing.slot_start_ns.saturating_sub(begun_ns) as f64 / 1e9,
             );
         }
-    })?;
+    };
+    for file in files {
+        Recorded::open(file)?.each_cycle(&mut compare_cycle)?;
+    }
     while step(&mut comparison).is_some() {}
     Ok(comparison)
 }

@@ -151,6 +151,7 @@ struct OpenFile {
 pub struct BlackBox {
     history: History,
     directory: PathBuf,
+    is_compressed: bool,
     wall_clock: WallClock,
     started_ns: Nanoseconds,
     drives: Vec<Option<DriveState>>,
@@ -167,6 +168,7 @@ impl BlackBox {
     /// Allocates all memory of the black box, for a run that begins at `started_ns`.
     pub fn new(
         options: BlackBoxOptions,
+        is_compressed: bool,
         machine: &Machine,
         wall_clock: WallClock,
         started_ns: Nanoseconds,
@@ -174,6 +176,7 @@ impl BlackBox {
         Self {
             history: History::new(options.span_ns, machine.cycle_ns, machine.axes.len(), machine.buses.len()),
             directory: options.directory,
+            is_compressed,
             wall_clock,
             started_ns,
             drives: vec![None; machine.axes.len()],
@@ -255,12 +258,14 @@ impl BlackBox {
         };
         self.files.extend(opened.path.clone());
         let label = opened.label.clone();
-        let begun = Recording::begin(opened, machine, self.wall_clock).and_then(|mut recording| {
-            recording.add_buses(machine)?;
-            recording.metadata(METADATA, incident.metadata(machine, slot))?;
-            write_history(&self.history, &mut recording, machine)?;
-            Ok(recording)
-        });
+        let begun = Recording::begin(opened, machine, self.wall_clock, self.is_compressed).and_then(
+            |mut recording| {
+                recording.add_frames(machine)?;
+                recording.metadata(METADATA, incident.metadata(machine, slot))?;
+                write_history(&self.history, &mut recording, machine)?;
+                Ok(recording)
+            },
+        );
         match begun {
             Ok(recording) => {
                 announce::opened("black box", &label);
@@ -327,7 +332,7 @@ fn write_history(history: &History, recording: &mut Recording, machine: &Machine
         Entry::Health(health) => recording.health(health),
     })?;
     // From now on, the history before the incident is in the file.
-    recording.flush()
+    recording.end_chunk()
 }
 
 /// The reason of an error of the MCAP writer, without its prefix.

@@ -1,6 +1,7 @@
 //! Where a recording or a log is written. An existing file is never overwritten.
 
 use crate::printable::printable_path;
+use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -38,15 +39,106 @@ pub(crate) struct OpenError {
 impl RecordingDestination {
     /// Opens it. For a folder, `stem` and `extension` make the file name.
     pub(crate) fn open(self, stem: &str, extension: &str) -> Result<Opened, OpenError> {
-        let path = match self {
-            Self::Directory(directory) => directory.join(format!("{}.{extension}", file_name(stem))),
-            Self::File(path) => path,
-            Self::Stream(label, writer) => return Ok(Opened { label, path: None, writer }),
-        };
-        let (path, file) =
-            create_new(&path).map_err(|reason| OpenError { path: printable_path(&path), reason })?;
-        Ok(Opened { label: printable_path(&path), path: Some(path), writer: Box::new(file) })
+        match self.path(stem, extension) {
+            Ok(path) => Opened::of(&path, create_new(&path)),
+            Err((label, writer)) => Ok(Opened { label, path: None, writer }),
+        }
     }
+
+    /// Opens the first of several files, and says how they are named. A stream is opened as a whole.
+    pub(crate) fn open_first(
+        self,
+        stem: &str,
+        extension: &str,
+    ) -> Result<(Opened, Option<PartNames>), OpenError> {
+        match self.path(stem, extension) {
+            Ok(path) => {
+                let names = PartNames::unused(&path);
+                Ok((names.open(1)?, Some(names)))
+            }
+            Err((label, writer)) => Ok((Opened { label, path: None, writer }, None)),
+        }
+    }
+
+    /// The path of the file, or the stream.
+    fn path(self, stem: &str, extension: &str) -> Result<PathBuf, (String, Box<dyn Write + Send>)> {
+        match self {
+            Self::Directory(directory) => Ok(directory.join(format!("{}.{extension}", file_name(stem)))),
+            Self::File(path) => Ok(path),
+            Self::Stream(label, writer) => Err((label, writer)),
+        }
+    }
+}
+
+impl Opened {
+    fn of(path: &Path, created: io::Result<(PathBuf, File)>) -> Result<Self, OpenError> {
+        let (path, file) = created.map_err(|reason| OpenError { path: printable_path(path), reason })?;
+        Ok(Self { label: printable_path(&path), path: Some(path), writer: Box::new(file) })
+    }
+}
+
+/// How the files of one recording are named: `run.0001.mcap`, `run.0002.mcap` …
+#[derive(Clone, Debug)]
+pub(crate) struct PartNames(PathBuf);
+
+impl PartNames {
+    /// Names of which none is in use: the files of an earlier recording may have been removed, but for the last ones.
+    fn unused(path: &Path) -> Self {
+        let is_used = |names: &Self| {
+            let directory = path.parent().filter(|directory| !directory.as_os_str().is_empty());
+            let entries = fs::read_dir(directory.unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+            entries.map(|entry| entry.file_name()).any(|name| names.number_of(Path::new(&name)).is_some())
+        };
+        let later = (2_u32..).map(|number| Self(numbered(path, number)));
+        let mut names = std::iter::once(Self(path.to_owned())).chain(later);
+        names.find(|names| !is_used(names)).unwrap_or_else(|| Self(path.to_owned()))
+    }
+
+    /// The names that this file is one of.
+    #[cfg(feature = "cli")]
+    pub(crate) fn of_part(path: &Path) -> Option<Self> {
+        let extension = path.extension()?;
+        let stem = Path::new(path.file_stem()?);
+        stem.extension().and_then(digits)?;
+        let mut name = stem.file_stem()?.to_owned();
+        name.push(".");
+        name.push(extension);
+        Some(Self(path.with_file_name(name)))
+    }
+
+    /// The path of a file by its number, from 1 on.
+    pub(crate) fn path(&self, number: u32) -> PathBuf {
+        let mut name = self.0.file_stem().unwrap_or_default().to_owned();
+        name.push(format!(".{number:04}"));
+        if let Some(extension) = self.0.extension() {
+            name.push(".");
+            name.push(extension);
+        }
+        self.0.with_file_name(name)
+    }
+
+    /// The number of a file, if it is one of these.
+    fn number_of(&self, path: &Path) -> Option<u32> {
+        let stem = Path::new(path.file_stem()?);
+        let is_ours = path.extension() == self.0.extension() && stem.file_stem() == self.0.file_stem();
+        stem.extension().filter(|_| is_ours).and_then(digits)
+    }
+
+    /// Opens a new file.
+    pub(crate) fn open(&self, number: u32) -> Result<Opened, OpenError> {
+        let path = self.path(number);
+        let create = || {
+            if let Some(directory) = path.parent() {
+                fs::create_dir_all(directory)?;
+            }
+            Ok((path.clone(), OpenOptions::new().write(true).create_new(true).open(&path)?))
+        };
+        Opened::of(&path, create())
+    }
+}
+
+fn digits(text: &OsStr) -> Option<u32> {
+    text.to_str().filter(|text| text.len() >= 4)?.parse().ok()
 }
 
 /// Replaces the characters that a file name may not have.
@@ -109,6 +201,25 @@ mod tests {
         };
         let names = [open(), open(), open()].map(|path| path.file_name().unwrap().to_owned());
         assert_eq!(names, ["arm_6_x.mcap", "arm_6_x-2.mcap", "arm_6_x-3.mcap"]);
+    }
+
+    #[test]
+    fn the_files_of_one_recording_are_numbered_and_never_mixed_with_those_of_an_earlier_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("run.mcap");
+        let begin = || RecordingDestination::File(file.clone()).open_first("", "").unwrap();
+        let name = |opened: &Opened| opened.path.clone().unwrap().file_name().unwrap().to_owned();
+        let (first, names) = begin();
+        let names = names.unwrap();
+        assert_eq!(
+            (name(&first), name(&names.open(2).unwrap())),
+            ("run.0001.mcap".into(), "run.0002.mcap".into())
+        );
+        assert_eq!(names.open(2).err().unwrap().to_string().split(": ").next(), names.path(2).to_str());
+        fs::remove_file(names.path(1)).unwrap();
+        let (again, _) = begin();
+        assert_eq!(name(&again), "run-2.0001.mcap");
+        assert_eq!(name(&begin().0), "run-3.0001.mcap");
     }
 
     #[test]

@@ -10,6 +10,7 @@ use takt_rt::{CycleRecord, Event, Nanoseconds};
 
 use super::announce;
 use super::black_box::{BlackBox, BlackBoxOptions, Incident, reason};
+use super::bus_load::BusLoad;
 use super::candump::CandumpLog;
 use super::destination::RecordingDestination;
 use super::history::OnBus;
@@ -17,14 +18,14 @@ use super::journal_keeper::JournalKeeper;
 use super::listener::{Listener, Notify};
 use super::loop_timing::ShownTimingWriter;
 use super::machine::Machine;
-use super::recording::Recording;
+use super::recording_series::{RecordingOptions, RecordingSeries};
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use super::words;
 use crate::channels::LogSide;
 use crate::config::ConfigSources;
 use crate::journal::RunJournal;
-use crate::link::trace::{Trace, Traced};
+use crate::link::trace::{Trace, Traced, TracedHealth};
 use crate::printable::printable_path;
 
 /// What is to be done with the record of each cycle.
@@ -40,6 +41,8 @@ pub struct LoggerOptions {
     pub started_ns: Nanoseconds,
     /// Where the MCAP recording goes; `None` makes none.
     pub recording: Option<RecordingDestination>,
+    /// How it is written.
+    pub recording_options: RecordingOptions,
     /// Where the candump log of `traces` goes; `None` makes none.
     pub candump: Option<RecordingDestination>,
     /// Settings of the black box; `None` makes none.
@@ -74,8 +77,12 @@ pub struct LogSummary {
     pub events_dropped: u64,
     /// Frames that found no room on their way to the candump log and the black box.
     pub frames_dropped: u64,
-    /// The recording, if it was written to a file, even in part.
+    /// The recording, if it was written to a file, even in part. Of several files, the last one.
     pub recording: Option<PathBuf>,
+    /// The files of the recording before that one, the oldest first.
+    pub earlier_recordings: Vec<PathBuf>,
+    /// How many older files of the recording were removed.
+    pub recordings_removed: u64,
     /// The candump log, if it was written to a file, even in part.
     pub candump: Option<PathBuf>,
     /// The files of the black box.
@@ -100,14 +107,18 @@ pub struct Logger {
     source: LogSide,
     machine: Machine,
     statistics: Statistics,
-    recording: Option<Recording>,
+    recording: Option<RecordingSeries>,
     candump: Option<CandumpLog>,
     black_box: Option<BlackBox>,
     each_cycle: Option<EachCycle>,
     timing: Option<ShownTimingWriter>,
     traces: Vec<Trace>,
+    /// In the order of the traces.
+    loads: Vec<Option<BusLoad>>,
     journal: Option<JournalKeeper>,
-    paths: [Option<PathBuf>; 2],
+    /// The files of the recording when it has ended, and how many were removed.
+    recorded: (Vec<PathBuf>, u64),
+    candump_path: Option<PathBuf>,
     not_written: Vec<String>,
     listener: Listener,
 }
@@ -116,10 +127,21 @@ impl Logger {
     /// Opens the files. A file that cannot be opened is reported to `notify` and left out. `notify` also gets every event. It
     /// is called in the thread that drains. After a panic it is never called again; see [`Self::panic`].
     pub fn new(source: LogSide, options: LoggerOptions, notify: Notify) -> Self {
-        let LoggerOptions { machine, wall_clock, started_ns, recording, candump, black_box, traces } =
-            options;
+        let LoggerOptions {
+            machine,
+            wall_clock,
+            started_ns,
+            recording,
+            recording_options,
+            candump,
+            black_box,
+            traces,
+        } = options;
         let stem = format!("{}-{}", machine.name, wall_clock.file_stamp(started_ns));
-        let black_box = black_box.map(|options| BlackBox::new(options, &machine, wall_clock, started_ns));
+        let is_compressed = recording_options.is_compressed;
+        let black_box =
+            black_box.map(|options| BlackBox::new(options, is_compressed, &machine, wall_clock, started_ns));
+        let loads = machine.buses.iter().map(BusLoad::of).collect();
         let mut logger = Self {
             source,
             statistics: Statistics::new(machine.groups_of_axes()),
@@ -130,18 +152,20 @@ impl Logger {
             each_cycle: None,
             timing: None,
             traces,
+            loads,
             journal: None,
-            paths: [None, None],
+            recorded: (Vec::new(), 0),
+            candump_path: None,
             not_written: Vec::new(),
             listener: Listener::new(notify),
         };
         if let Some(destination) = recording {
-            logger.begin_recording(destination, &stem, wall_clock);
+            logger.begin_recording(destination, &stem, wall_clock, recording_options);
         }
         if let Some(destination) = candump {
             match destination.open(&stem, "log") {
                 Ok(opened) => {
-                    logger.paths[1].clone_from(&opened.path);
+                    logger.candump_path.clone_from(&opened.path);
                     announce::opened("candump log", &opened.label);
                     logger.candump = Some(CandumpLog::new(opened, wall_clock));
                 }
@@ -166,10 +190,7 @@ impl Logger {
         };
         match written {
             Ok(()) => self.journal = journal.map(JournalKeeper::new),
-            Err(error) => {
-                let failure = self.recording.take().map(|recording| (recording.label, error));
-                self.end_recording(failure);
-            }
+            Err(error) => self.end_recording(&error),
         }
         self
     }
@@ -180,20 +201,18 @@ impl Logger {
         Self { timing: Some(timing), ..self }
     }
 
-    fn begin_recording(&mut self, destination: RecordingDestination, stem: &str, wall_clock: WallClock) {
-        let opened = match destination.open(stem, "mcap") {
-            Ok(opened) => opened,
-            Err(error) => return self.report_failure(format!("no recording: cannot write {error}")),
-        };
-        self.paths[0].clone_from(&opened.path);
-        let label = opened.label.clone();
-        match Recording::begin(opened, &self.machine, wall_clock) {
-            Ok(recording) => {
-                announce::opened("recording", &label);
-                self.recording = Some(recording);
-            }
+    fn begin_recording(
+        &mut self,
+        destination: RecordingDestination,
+        stem: &str,
+        wall_clock: WallClock,
+        options: RecordingOptions,
+    ) {
+        match RecordingSeries::begin(destination, stem, options, &self.machine, wall_clock) {
+            Ok(recording) => self.recording = Some(recording),
             Err(error) => {
-                self.report_failure(format!("no recording: cannot write {label}: {}", reason(&error)));
+                self.recorded.0.extend(error.path());
+                self.report_failure(format!("no recording: cannot write {error}"));
             }
         }
     }
@@ -221,7 +240,6 @@ impl Logger {
 
     fn drain_records(&mut self) -> usize {
         let mut taken = 0;
-        let mut failure = None;
         while let Some(written) = self.source.next_record(|record| {
             self.statistics.add(record);
             if let Some(timing) = &mut self.timing {
@@ -236,14 +254,15 @@ impl Logger {
             self.recording.as_mut().map_or(Ok(()), |recording| recording.cycle(record))
         }) {
             taken += 1;
-            if let Err(error) = written {
-                failure = self.recording.take().map(|recording| (recording.label, error));
+            let rotated =
+                written.and_then(|()| self.recording.as_mut().map_or(Ok(()), RecordingSeries::rotate));
+            if let Err(error) = rotated {
+                self.end_recording(&error);
             }
         }
         if let Some(timing) = self.timing.as_mut().filter(|_| taken > 0) {
             timing.show();
         }
-        self.end_recording(failure);
         taken
     }
 
@@ -256,8 +275,7 @@ impl Logger {
             announce::event(&event, &text, &self.machine);
             let written = self.recording.as_mut().map(|recording| recording.event(&event, &text));
             if let Some(Err(error)) = written {
-                let failure = self.recording.take().map(|recording| (recording.label, error));
-                self.end_recording(failure);
+                self.end_recording(&error);
             }
             incidents.extend(self.black_box.as_mut().and_then(|black_box| black_box.event(&event, &text)));
             if self.listener.notify(&Notice::Event(event)).is_err() {
@@ -281,19 +299,37 @@ impl Logger {
         }
     }
 
-    fn end_recording(&mut self, failure: Option<(String, McapError)>) {
-        if let Some((label, error)) = failure {
-            self.report_failure(format!("the recording ends here: cannot write {label}: {}", reason(&error)));
+    /// Ends the recording, which cannot be written any more.
+    fn end_recording(&mut self, error: &McapError) {
+        let Some(recording) = self.recording.take() else { return };
+        self.recorded = (recording.files().to_vec(), recording.removed());
+        let label = recording.label().to_owned();
+        self.report_failure(format!("the recording ends here: cannot write {label}: {}", reason(error)));
+    }
+
+    /// Writes what the buses are like.
+    fn write_health(&mut self, health: &[OnBus<TracedHealth>]) {
+        for health in health {
+            if let Some(black_box) = &mut self.black_box {
+                black_box.health(health);
+            }
+            let written = self.recording.as_mut().map(|recording| recording.health(health));
+            if let Some(Err(error)) = written {
+                self.end_recording(&error);
+            }
         }
     }
 
     fn drain_traces(&mut self) {
+        let mut healths = Vec::new();
         for (bus, trace) in self.traces.iter_mut().enumerate() {
             while let Some(traced) = trace.take_any() {
                 if let Some(journal) = &mut self.journal {
                     journal.port(bus, &traced);
                 }
                 let Traced::Frame(what) = traced else { continue };
+                let load = self.loads.get_mut(bus).and_then(Option::as_mut);
+                healths.extend(load.and_then(|load| load.frame(&what)).map(|what| OnBus { bus, what }));
                 let frame = OnBus { bus, what };
                 if let Some(black_box) = &mut self.black_box {
                     black_box.frame(&frame);
@@ -303,11 +339,11 @@ impl Logger {
                 }
             }
             while let Some(what) = trace.take_health() {
-                if let Some(black_box) = &mut self.black_box {
-                    black_box.health(&OnBus { bus, what });
-                }
+                let load = self.loads.get_mut(bus).and_then(Option::as_mut);
+                healths.push(OnBus { bus, what: load.map_or(what, |load| load.change(&what)) });
             }
         }
+        self.write_health(&healths);
         if let Some(log) = &mut self.candump
             && let Err(error) = log.write(&self.traces)
         {
@@ -321,8 +357,7 @@ impl Logger {
         let (Some(journal), Some(recording)) = (&mut self.journal, &mut self.recording) else { return };
         let Some(block) = journal.drain() else { return };
         if let Err(error) = recording.journal(&block) {
-            let failure = self.recording.take().map(|recording| (recording.label, error));
-            self.end_recording(failure);
+            self.end_recording(&error);
         }
     }
 
@@ -330,7 +365,8 @@ impl Logger {
     pub fn finish(mut self) -> LogSummary {
         self.drain();
         if let Some(recording) = self.recording.take() {
-            let label = recording.label.clone();
+            let label = recording.label().to_owned();
+            self.recorded = (recording.files().to_vec(), recording.removed());
             let lost = self
                 .journal
                 .as_ref()
@@ -359,8 +395,12 @@ impl Logger {
             }
             black_boxes = BlackBoxes { files: black_box.files().to_vec(), replaced: black_box.replaced() };
         }
-        let [recording, candump] = std::mem::take(&mut self.paths);
-        let [recording, candump] = [recording, candump].map(|path| self.verified(path));
+        let (recorded, recordings_removed) = std::mem::take(&mut self.recorded);
+        let mut earlier_recordings: Vec<PathBuf> =
+            recorded.into_iter().filter_map(|path| self.verified(Some(path))).collect();
+        let recording = earlier_recordings.pop();
+        let candump = self.candump_path.take();
+        let candump = self.verified(candump);
         black_boxes.files =
             black_boxes.files.into_iter().filter_map(|path| self.verified(Some(path))).collect();
         let (records_dropped, events_dropped) = (self.source.records_dropped(), self.source.events_dropped());
@@ -374,6 +414,8 @@ impl Logger {
             events_dropped,
             frames_dropped,
             recording,
+            earlier_recordings,
+            recordings_removed,
             candump,
             black_boxes,
             not_written: self.not_written,

@@ -64,6 +64,10 @@ pub struct BusDescription {
     pub name: String,
     /// `sim`, or the name of its network interface.
     pub interface: String,
+    /// Its bit rate, in bit/s; `None` in a recording.
+    pub bit_rate: Option<u32>,
+    /// The bit rate of the data phase of CAN FD, in bit/s.
+    pub data_bit_rate: Option<u32>,
 }
 
 /// The unit of an axis' position.
@@ -101,6 +105,8 @@ impl Machine {
         let bus = |bus: &crate::config::Bus| BusDescription {
             name: bus.name.clone(),
             interface: bus.interface.to_string(),
+            bit_rate: Some(bus.bit_rate),
+            data_bit_rate: bus.data_bit_rate,
         };
         Self {
             name: config.name.clone(),

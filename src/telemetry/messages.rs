@@ -3,9 +3,12 @@
 
 mod decode;
 
-use takt_rt::{AxisRecord, CycleRecord, Event, EventKind, FrameKind, GroupRecord};
+use takt_rt::{
+    AxisRecord, CycleRecord, Event, EventKind, FrameKind, GroupRecord, NANOSECONDS_PER_SECOND, Nanoseconds,
+};
 
 use super::cdr::CdrEncoder;
+use super::severity::Severity;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
 pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event, decode_frame, decode_group};
@@ -66,6 +69,20 @@ pub const FRAME: MessageType = MessageType {
 pub const BUS: MessageType = MessageType {
     name: "takt_msgs/msg/Bus",
     definition: include_str!("messages/Bus.msg"),
+    later_fields: &[1],
+};
+
+/// All axes at a time, as programs of ROS 2 know them.
+pub const JOINT_STATE: MessageType = MessageType {
+    name: "sensor_msgs/msg/JointState",
+    definition: include_str!("messages/JointState.msg"),
+    later_fields: &[],
+};
+
+/// An event in words, as programs of ROS 2 know it.
+pub const LOG: MessageType = MessageType {
+    name: "rcl_interfaces/msg/Log",
+    definition: include_str!("messages/Log.msg"),
     later_fields: &[],
 };
 
@@ -262,7 +279,46 @@ pub fn encode_bus(TracedHealth { at_ns, health }: &TracedHealth, encoder: &mut C
         .u64(health.tx_overruns)
         .u64(health.rx_overruns)
         .u64(health.tx_frames)
-        .u64(health.rx_frames);
+        .u64(health.rx_frames)
+        .u64(health.busy_ns);
+}
+
+/// Encodes a time of day as `builtin_interfaces/Time`.
+fn put_time(unix_ns: Nanoseconds, encoder: &mut CdrEncoder) -> &mut CdrEncoder {
+    encoder.i32((unix_ns / NANOSECONDS_PER_SECOND) as i32).u32((unix_ns % NANOSECONDS_PER_SECOND) as u32)
+}
+
+/// Encodes a [`JOINT_STATE`] of the axes with these names.
+pub fn encode_joint_state(
+    unix_ns: Nanoseconds,
+    names: &[String],
+    record: &CycleRecord,
+    encoder: &mut CdrEncoder,
+) {
+    let axes = record.axes().get(..names.len()).unwrap_or(record.axes());
+    put_time(unix_ns, encoder.begin()).string("").u32(axes.len() as u32);
+    names.iter().take(axes.len()).for_each(|name| {
+        encoder.string(name);
+    });
+    let quantities: [fn(&AxisRecord) -> f64; 3] =
+        [|axis| axis.position, |axis| axis.velocity.into(), |axis| axis.torque.into()];
+    for quantity in quantities {
+        encoder.u32(axes.len() as u32);
+        axes.iter().for_each(|axis| {
+            encoder.f64(quantity(axis));
+        });
+    }
+}
+
+/// Encodes a [`LOG`] of an event, told by `name`.
+pub fn encode_log(unix_ns: Nanoseconds, kind: &EventKind, name: &str, text: &str, encoder: &mut CdrEncoder) {
+    let level = match Severity::of(kind) {
+        Severity::Debug => 10,
+        Severity::Info => 20,
+        Severity::Warning => 30,
+        Severity::Error => 40,
+    };
+    put_time(unix_ns, encoder.begin()).u8(level).string(name).string(text).string("").string("").u32(0);
 }
 
 #[cfg(test)]

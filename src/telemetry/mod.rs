@@ -11,6 +11,7 @@
 
 mod announce;
 mod black_box;
+mod bus_load;
 mod candump;
 mod cdr;
 mod destination;
@@ -26,10 +27,12 @@ mod realtime;
 mod recorded;
 mod recording;
 mod recording_report;
+mod recording_series;
 pub(crate) mod render;
 #[cfg(feature = "cli")]
 mod replay_recording;
 mod report;
+mod severity;
 mod statistics;
 pub(crate) mod thread;
 mod wall_clock;
@@ -46,13 +49,16 @@ pub use loop_timing::{LoopTiming, TIME_BOUNDS_NS, TimeCounts};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use recorded::frames as recorded_frames;
 pub use recorded::{
-    Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, RecordedFrame, RecordedFrames, WalkError,
+    Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, RecordedFrame, RecordedFrames,
+    RecordedLoad, WalkError,
 };
 #[cfg(feature = "cli")]
 pub(crate) use recorded::{RecordedJournal, journal as recorded_journal};
 pub use recording_report::{
-    AxisCycle, AxisCycles, AxisSummary, BusChange, GroupSummary, RecordingReport, ReportedEvent,
+    AxisCycle, AxisCycles, AxisSummary, BusChange, BusLoadSummary, GroupSummary, RecordingReport,
+    ReportedEvent,
 };
+pub use recording_series::RecordingOptions;
 pub use render::Emphasis;
 #[cfg(feature = "cli")]
 pub(crate) use replay_recording::ReplayRecording;
@@ -60,6 +66,8 @@ pub use report::{
     AxisReport, BusReport, GroupReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport,
     SetPointParts, StopReport, TelemetryReport,
 };
+#[cfg(feature = "cli")]
+pub(crate) use severity::Severity;
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
 pub(crate) use thread::LoggerThread;
 pub use wall_clock::WallClock;

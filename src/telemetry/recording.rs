@@ -1,29 +1,48 @@
-//! The MCAP recording: `/cycle` with the times, `/group/<name>` for each group, `/axis/<name>` for each axis, and `/events`.
-//! Without configured groups the only one is `/group/all`. A black box also has
-//! `/bus/<name>` with the health of each bus, and `/frames/<name>`. The time of a message is a time of day: that of its
-//! event or frame, or the start of its slot.
+//! The MCAP recording: `/cycle` with the times, `/group/<name>` for each group, `/axis/<name>` for each axis, `/events`, and
+//! `/bus/<name>` with the health and the load of each bus. Without configured groups the only one is `/group/all`. A black box
+//! also has `/frames/<name>`. For programs of ROS 2 there are `/joint_states` with all axes, a hundred times a second, and
+//! `/rosout` with the events in words. The time of a message is a time of day: that of its event or frame, or the start of
+//! its slot.
 
 use std::collections::BTreeMap;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
-use mcap::{McapError, McapResult, WriteOptions};
-use takt_rt::{CycleRecord, Event, Phase};
+use mcap::{Compression, McapError, McapResult, WriteOptions};
+use takt_rt::{CycleRecord, CycleTiming, Event, NANOSECONDS_PER_SECOND, Nanoseconds, Phase};
 
 use super::cdr::CdrEncoder;
 use super::destination::Opened;
 use super::history::OnBus;
-use super::machine::Machine;
+use super::machine::{BusDescription, Machine};
 use super::messages::{self, MessageType};
 use super::own_errors;
 use super::wall_clock::WallClock;
 use crate::config::ConfigSources;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
-/// A chunk is written to the file as a whole. It holds a third of a second of six axes at 1 ms. A crash of the computer
-/// loses at most that.
+/// A chunk is written to the file as a whole, and a crash of the program loses at most that. It holds a third of a second of
+/// six axes at 1 ms, as counted before compression.
 const CHUNK_BYTES: u64 = 256 * 1024;
+/// The longest time in a chunk.
+const CHUNK_NS: Nanoseconds = NANOSECONDS_PER_SECOND;
+/// What a message takes beside its data: the opcode, the length, and the header.
+const MESSAGE_BYTES: u64 = 1 + 8 + 22;
+/// What the index at the end of the file has of a chunk, and of each channel in it.
+const CHUNK_INDEX_BYTES: u64 = 100;
+const CHANNEL_INDEX_BYTES: u64 = 10;
+/// The period of the joint states: programs that draw a robot want no more.
+const JOINT_STATES_NS: Nanoseconds = 10_000_000;
+
+/// The metadata record of one file of several, with the name of the first one and its own number.
+pub const PART: &str = "part";
+/// Its key for the first file.
+pub const FIRST_PART: &str = "first";
+/// Its key for the number of this file.
+pub const PART_NUMBER: &str = "number";
 
 /// The name of the metadata record that describes the machine.
 pub const METADATA: &str = "takt";
@@ -48,14 +67,30 @@ const ONLY_GROUP: &str = "all";
 pub struct Recording {
     /// Its name in messages.
     pub label: String,
-    writer: mcap::Writer<NoSeek<BufWriter<Box<dyn Write + Send>>>>,
+    writer: mcap::Writer<NoSeek<BufWriter<Counted>>>,
+    /// The bytes of the file so far.
+    written: Arc<AtomicU64>,
+    /// The chunks that were written, and what the one that is open holds.
+    chunks: u64,
+    open_bytes: u64,
+    opened_ns: Option<Nanoseconds>,
+    /// The bytes before the first cycle; the end of the file repeats a part of them.
+    begun_bytes: u64,
     encoder: CdrEncoder,
     wall_clock: WallClock,
     cycle_channel: u16,
     event_channel: u16,
     group_channels: Vec<u16>,
     axis_channels: Vec<u16>,
-    bus_channels: Vec<BusChannels>,
+    joint_channel: u16,
+    log_channel: u16,
+    /// The machine and its axes, by their names.
+    machine_name: String,
+    axis_names: Vec<String>,
+    group_names: Vec<String>,
+    next_joint_states_ns: Nanoseconds,
+    health_channels: Vec<u16>,
+    frame_channels: Vec<u16>,
     journal_channel: Option<u16>,
     /// The time of the last message.
     last_time: u64,
@@ -63,33 +98,58 @@ pub struct Recording {
     was_stopping: bool,
 }
 
-/// The channels of one bus.
-struct BusChannels {
-    health: u16,
-    frames: u16,
+/// Counts the bytes that pass.
+struct Counted {
+    to: Box<dyn Write + Send>,
+    written: Arc<AtomicU64>,
+}
+
+impl Write for Counted {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let taken = self.to.write(bytes)?;
+        self.written.fetch_add(taken as u64, Ordering::Relaxed);
+        Ok(taken)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
 }
 
 impl Recording {
     /// Writes the beginning: schemas, channels, and the description of the machine.
-    pub fn begin(opened: Opened, machine: &Machine, wall_clock: WallClock) -> McapResult<Self> {
+    pub fn begin(
+        opened: Opened,
+        machine: &Machine,
+        wall_clock: WallClock,
+        is_compressed: bool,
+    ) -> McapResult<Self> {
+        let written = Arc::new(AtomicU64::new(0));
+        let counted = Counted { to: opened.writer, written: Arc::clone(&written) };
         let mut writer = WriteOptions::new()
             .profile("ros2")
             .library(concat!("takt ", env!("CARGO_PKG_VERSION")))
-            .compression(None)
-            .chunk_size(Some(CHUNK_BYTES))
+            .compression(is_compressed.then_some(Compression::Zstd))
+            // No threads beside that of the logger.
+            .compression_threads(0)
+            // `end_chunk` decides.
+            .chunk_size(None)
             .disable_seeking(true)
-            .create(NoSeek::new(BufWriter::new(opened.writer)))?;
+            .create(NoSeek::new(BufWriter::new(counted)))?;
         writer.write_metadata(&Metadata { name: METADATA.to_owned(), metadata: describe(machine) })?;
         let mut schema =
             |message: &MessageType| writer.add_schema(message.name, "ros2msg", message.definition.as_bytes());
         let (cycle, axis, event) =
             (schema(&messages::CYCLE)?, schema(&messages::AXIS)?, schema(&messages::EVENT)?);
-        let group = schema(&messages::GROUP)?;
+        let (group, bus) = (schema(&messages::GROUP)?, schema(&messages::BUS)?);
+        let (joint_state, log) = (schema(&messages::JOINT_STATE)?, schema(&messages::LOG)?);
         let mut channel = |schema, topic: &str, metadata: &BTreeMap<_, _>| {
             writer.add_channel(schema, topic, "cdr", metadata)
         };
         let cycle_channel = channel(cycle, "/cycle", &BTreeMap::new())?;
         let event_channel = channel(event, "/events", &BTreeMap::new())?;
+        let joint_channel = channel(joint_state, "/joint_states", &BTreeMap::new())?;
+        let log_channel = channel(log, "/rosout", &BTreeMap::new())?;
         let mut group_channels = Vec::new();
         let only = [ONLY_GROUP.to_owned()];
         let names = if machine.groups.is_empty() { &only[..] } else { &machine.groups };
@@ -118,22 +178,46 @@ impl Recording {
             metadata.extend(description.bus.clone().map(|bus| ("bus".to_owned(), bus)));
             axis_channels.push(channel(axis, &format!("/axis/{}", description.name), &metadata)?);
         }
+        let mut health_channels = Vec::new();
+        for (index, description) in machine.buses.iter().enumerate() {
+            let topic = format!("/bus/{}", description.name);
+            health_channels.push(channel(bus, &topic, &describe_bus(index, description))?);
+        }
         // A file that cannot be written fails here already, and the file can be opened while it grows.
         writer.flush()?;
         Ok(Self {
             label: opened.label,
             writer,
+            begun_bytes: written.load(Ordering::Relaxed),
+            written,
+            chunks: 0,
+            open_bytes: 0,
+            opened_ns: None,
             encoder: CdrEncoder::default(),
             wall_clock,
             cycle_channel,
             event_channel,
             group_channels,
             axis_channels,
-            bus_channels: Vec::new(),
+            joint_channel,
+            log_channel,
+            machine_name: machine.name.clone(),
+            axis_names: machine.axes.iter().map(|axis| axis.name.clone()).collect(),
+            group_names: machine.groups.clone(),
+            next_joint_states_ns: 0,
+            health_channels,
+            frame_channels: Vec::new(),
             journal_channel: None,
             last_time: 0,
             was_stopping: false,
         })
+    }
+
+    /// Goes on where another file of the same run has ended.
+    pub fn continue_after(&mut self, before: &Self) {
+        self.last_time = before.last_time;
+        self.was_stopping = before.was_stopping;
+        self.next_joint_states_ns = before.next_joint_states_ns;
     }
 
     /// Adds the channel of the journal, and the files that the configuration was made of.
@@ -151,7 +235,9 @@ impl Recording {
             let files = sources.files.iter().map(|(path, bytes)| (path.display().to_string(), text(bytes)));
             self.metadata(CONFIGURATION_FILES, files.collect())?;
         }
-        self.writer.flush()
+        self.end_chunk()?;
+        self.begun_bytes = self.written.load(Ordering::Relaxed);
+        Ok(())
     }
 
     /// Writes a block of the journal.
@@ -159,26 +245,19 @@ impl Recording {
         let Some(channel_id) = self.journal_channel else { return Ok(()) };
         let time = self.last_time;
         let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
-        self.writer.write_to_known_channel(&header, block)
+        self.writer.write_to_known_channel(&header, block)?;
+        self.open_bytes += MESSAGE_BYTES + block.len() as u64;
+        Ok(())
     }
 
-    /// Adds the channels of the buses.
-    pub fn add_buses(&mut self, machine: &Machine) -> McapResult<()> {
-        let mut schema = |message: &MessageType| {
-            self.writer.add_schema(message.name, "ros2msg", message.definition.as_bytes())
-        };
-        let (frame, bus) = (schema(&messages::FRAME)?, schema(&messages::BUS)?);
+    /// Adds the channels of the frames.
+    pub fn add_frames(&mut self, machine: &Machine) -> McapResult<()> {
+        let MessageType { name, definition, .. } = messages::FRAME;
+        let frame = self.writer.add_schema(name, "ros2msg", definition.as_bytes())?;
         for (index, description) in machine.buses.iter().enumerate() {
-            let metadata = BTreeMap::from([
-                ("index".to_owned(), index.to_string()),
-                ("name".to_owned(), description.name.clone()),
-                ("interface".to_owned(), description.interface.clone()),
-            ]);
-            let mut channel = |schema, kind: &str| {
-                self.writer.add_channel(schema, &format!("/{kind}/{}", description.name), "cdr", &metadata)
-            };
-            self.bus_channels
-                .push(BusChannels { health: channel(bus, "bus")?, frames: channel(frame, "frames")? });
+            let topic = format!("/frames/{}", description.name);
+            let metadata = describe_bus(index, description);
+            self.frame_channels.push(self.writer.add_channel(frame, &topic, "cdr", &metadata)?);
         }
         Ok(())
     }
@@ -190,21 +269,36 @@ impl Recording {
 
     /// Writes a frame, if its bus is recorded.
     pub fn frame(&mut self, OnBus { bus, what }: &OnBus<TracedFrame>) -> McapResult<()> {
-        let Some(channels) = self.bus_channels.get(*bus) else { return Ok(()) };
+        let Some(&channel) = self.frame_channels.get(*bus) else { return Ok(()) };
         messages::encode_frame(what, &mut self.encoder);
-        self.write(channels.frames, 0, what.at_ns)
+        self.write(channel, 0, what.at_ns)
     }
 
     /// Writes the health of a bus, if the bus is recorded.
     pub fn health(&mut self, OnBus { bus, what }: &OnBus<TracedHealth>) -> McapResult<()> {
-        let Some(channels) = self.bus_channels.get(*bus) else { return Ok(()) };
+        let Some(&channel) = self.health_channels.get(*bus) else { return Ok(()) };
         messages::encode_bus(what, &mut self.encoder);
-        self.write(channels.health, 0, what.at_ns)
+        self.write(channel, 0, what.at_ns)
     }
 
     /// Writes everything to the file that is still in memory.
-    pub fn flush(&mut self) -> McapResult<()> {
+    pub fn end_chunk(&mut self) -> McapResult<()> {
+        self.chunks += u64::from(self.open_bytes > 0);
+        self.open_bytes = 0;
+        self.opened_ns = None;
         self.writer.flush()
+    }
+
+    /// Whether the file could exceed this size by another chunk, with the index at its end. A file has at least one chunk.
+    pub fn is_full(&self, size_limit_bytes: u64) -> bool {
+        let channels = 4 + self.group_channels.len() + self.axis_channels.len() + self.health_channels.len();
+        let index = CHUNK_INDEX_BYTES + CHANNEL_INDEX_BYTES * (channels + 1) as u64;
+        // What cannot be compressed, and its index.
+        let next_chunk = 2 * CHUNK_BYTES;
+        let at_end = (self.chunks + 1) * index + self.begun_bytes + next_chunk;
+        self.open_bytes == 0
+            && self.chunks > 0
+            && self.written.load(Ordering::Relaxed).saturating_add(at_end) > size_limit_bytes
     }
 
     /// Writes a cycle.
@@ -221,24 +315,49 @@ impl Recording {
             messages::encode_axis(slot, axis, &mut self.encoder);
             self.write(channel, slot, start_ns)?;
         }
+        self.joint_states(record)?;
         // The cycles before a stop show its cause: they are in the file from now on.
         let is_stopping = record.groups().iter().any(|group| group.phase == Phase::Stopping);
         let was_stopping = std::mem::replace(&mut self.was_stopping, is_stopping);
         let begins_to_stop = is_stopping && !was_stopping;
-        if begins_to_stop { self.writer.flush() } else { Ok(()) }
+        if begins_to_stop || self.is_chunk_full(start_ns) { self.end_chunk() } else { Ok(()) }
+    }
+
+    /// A chunk ends between two cycles.
+    fn is_chunk_full(&mut self, now_ns: Nanoseconds) -> bool {
+        let opened_ns = *self.opened_ns.get_or_insert(now_ns);
+        self.open_bytes >= CHUNK_BYTES || now_ns.saturating_sub(opened_ns) >= CHUNK_NS
+    }
+
+    fn joint_states(&mut self, record: &CycleRecord) -> McapResult<()> {
+        let CycleTiming { slot, slot_start_ns, .. } = record.timing;
+        if slot_start_ns < self.next_joint_states_ns || self.axis_names.is_empty() {
+            return Ok(());
+        }
+        self.next_joint_states_ns = slot_start_ns + JOINT_STATES_NS;
+        let time = self.wall_clock.unix_ns(slot_start_ns);
+        messages::encode_joint_state(time, &self.axis_names, record, &mut self.encoder);
+        self.write(self.joint_channel, slot, slot_start_ns)
     }
 
     /// Writes an event and its text.
     pub fn event(&mut self, event: &Event, text: &str) -> McapResult<()> {
         messages::encode_event(event, text, &mut self.encoder);
-        self.write(self.event_channel, event.slot, event.at_ns)
+        self.write(self.event_channel, event.slot, event.at_ns)?;
+        let group = event.group.and_then(|group| self.group_names.get(usize::from(group)));
+        let name = group.unwrap_or(&self.machine_name);
+        let time = self.wall_clock.unix_ns(event.at_ns);
+        messages::encode_log(time, &event.kind, name, text, &mut self.encoder);
+        self.write(self.log_channel, event.slot, event.at_ns)
     }
 
     fn write(&mut self, channel_id: u16, slot: u64, at_ns: u64) -> McapResult<()> {
         let time = self.wall_clock.unix_ns(at_ns);
         self.last_time = time;
         let header = MessageHeader { channel_id, sequence: slot as u32, log_time: time, publish_time: time };
-        self.writer.write_to_known_channel(&header, self.encoder.bytes())
+        self.writer.write_to_known_channel(&header, self.encoder.bytes())?;
+        self.open_bytes += MESSAGE_BYTES + self.encoder.bytes().len() as u64;
+        Ok(())
     }
 
     /// Writes the end of a recording with a journal, of which so many entries were lost.
@@ -254,6 +373,14 @@ impl Recording {
         self.writer.finish()?;
         self.writer.into_inner().into_inner().flush().map_err(McapError::Io)
     }
+}
+
+fn describe_bus(index: usize, description: &BusDescription) -> BTreeMap<String, String> {
+    BTreeMap::from([
+        ("index".to_owned(), index.to_string()),
+        ("name".to_owned(), description.name.clone()),
+        ("interface".to_owned(), description.interface.clone()),
+    ])
 }
 
 fn describe(machine: &Machine) -> BTreeMap<String, String> {

@@ -180,6 +180,13 @@ impl RunReport {
                 telemetry.recording_bytes.map_or_else(String::new, |size| format!(" ({})", bytes(size)));
             lines.push(format!("{}{size}", printable_path(path)));
         }
+        if let Some(first) = telemetry.earlier_recordings.first() {
+            let (kept, removed) = (telemetry.earlier_recordings.len(), telemetry.recordings_removed);
+            lines.push(format!(
+                "{kept} files before it, from {}; {removed} older ones were removed",
+                printable_path(first)
+            ));
+        }
         lines.extend(telemetry.candump.iter().map(|path| printable_path(path)));
         lines.extend(telemetry.not_written.iter().map(|text| printable(text)));
         wrap(text, &emphasis.heading("telemetry"), 9, &lines);

@@ -50,7 +50,7 @@ impl ReplayRecording {
             .open("", "")
             .map_err(|error| ReplayRecordingError::Open(error.to_string()))?;
         let file = opened.path.clone().unwrap_or_else(|| file.to_owned());
-        Ok(Self { file, recording: Recording::begin(opened, machine, wall_clock) })
+        Ok(Self { file, recording: Recording::begin(opened, machine, wall_clock, true) })
     }
 
     /// Writes a cycle and its events. After a failure nothing more is written.

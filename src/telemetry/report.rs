@@ -206,9 +206,13 @@ pub struct TelemetryReport {
     pub dropped: u64,
     /// Frames that found no room on their way to the candump log and the black box.
     pub frames_dropped: u64,
-    /// The recording.
+    /// The recording; of several files, the last one.
     pub recording: Option<PathBuf>,
-    /// Its size.
+    /// The files of the recording before that one, the oldest first.
+    pub earlier_recordings: Vec<PathBuf>,
+    /// How many older files of the recording were removed.
+    pub recordings_removed: u64,
+    /// The size of `recording`.
     pub recording_bytes: Option<u64>,
     /// The candump log.
     pub candump: Option<PathBuf>,
@@ -412,6 +416,8 @@ impl TelemetryReport {
             frames_dropped: log.frames_dropped,
             recording_bytes: log.recording.as_ref().and_then(size),
             recording: log.recording.clone(),
+            earlier_recordings: log.earlier_recordings.clone(),
+            recordings_removed: log.recordings_removed,
             candump: log.candump.clone(),
             black_boxes: log.black_boxes.files.clone(),
             black_boxes_replaced: log.black_boxes.replaced,

@@ -105,6 +105,10 @@ pub struct AxisStatistics {
     pub following_error_max: Option<FollowingErrorMaximum>,
     /// The largest magnitudes of the set-points that were sent while the axis was enabled.
     pub set_point_max: SetPointMagnitudes,
+    /// The lowest and the highest position that the drive has reported; `None` if it has reported none.
+    pub position_range: Option<(f64, f64)>,
+    /// The largest torque that the drive has reported, without sign, in N·m (N).
+    pub torque_max: f64,
     /// The last set-point while enabled, in rad (m). If the axis was never enabled, the last one of the run.
     pub position_set: f64,
     /// The position reported together with it; if the drive did not report any more, its last position before.
@@ -120,6 +124,11 @@ impl AxisStatistics {
     fn add(&mut self, cycle: &CycleRecord, phase: Phase, axis: &AxisRecord) {
         let timing = &cycle.timing;
         let is_enabled = is_enabled(phase);
+        if axis.feedback_age == 0 && axis.position.is_finite() {
+            let (low, high) = self.position_range.unwrap_or((axis.position, axis.position));
+            self.position_range = Some((low.min(axis.position), high.max(axis.position)));
+            self.torque_max = self.torque_max.max(f64::from(axis.torque.abs()));
+        }
         if is_enabled || !self.was_enabled {
             self.position_set = axis.position_set;
             self.is_reported = axis.feedback_age == 0;

@@ -144,7 +144,12 @@ mod tests {
             name: "arm".to_owned(),
             cycle_ns: 1_000_000,
             axes: vec![axis("shoulder", Unit::Radian), axis("slide", Unit::Metre)],
-            buses: vec![BusDescription { name: "left".to_owned(), interface: "can0".to_owned() }],
+            buses: vec![BusDescription {
+                name: "left".to_owned(),
+                interface: "can0".to_owned(),
+                bit_rate: None,
+                data_bit_rate: None,
+            }],
             groups: vec![],
         }
     }

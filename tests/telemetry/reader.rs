@@ -44,6 +44,33 @@ impl Cursor<'_> {
             other => panic!("no such type: {other}"),
         })
     }
+
+    /// Reads the fields of a definition, with `prefix` before their names.
+    fn fields(&mut self, definition: &str, prefix: &str, within: &[&str], fields: &mut Fields) {
+        for line in definition.lines().map(str::trim) {
+            let is_field = !line.is_empty() && !line.starts_with(['#', '=']) && !line.contains('=');
+            let Some((kind, name)) = line.split_once(' ').filter(|_| is_field) else { continue };
+            let name = format!("{prefix}{name}");
+            let of_kind = |kind: &str| within.iter().find_map(|part| part.strip_prefix(kind));
+            match kind.split_once('[') {
+                Some((element, length)) => {
+                    let count = match length.trim_end_matches(']') {
+                        "" => u32::from_le_bytes(self.take()),
+                        fixed => fixed.parse().unwrap(),
+                    };
+                    for index in 0..count {
+                        fields.insert(format!("{name}[{index}]"), self.value(element));
+                    }
+                }
+                None if kind.contains('/') => {
+                    self.fields(of_kind(kind).unwrap(), &format!("{name}."), within, fields);
+                }
+                None => {
+                    fields.insert(name, self.value(kind));
+                }
+            }
+        }
+    }
 }
 
 /// Decodes a message, to its last byte.
@@ -51,24 +78,9 @@ pub fn decode(definition: &str, message: &[u8]) -> Fields {
     assert_eq!(message[..4], [0, 1, 0, 0], "little-endian CDR");
     let mut cursor = Cursor { body: &message[4..], at: 0 };
     let mut fields = Fields::new();
-    for line in definition.lines().map(str::trim) {
-        let is_field = !line.is_empty() && !line.starts_with('#') && !line.contains('=');
-        let Some((kind, name)) = line.split_once(' ').filter(|_| is_field) else { continue };
-        match kind.split_once('[') {
-            Some((element, length)) => {
-                let count = match length.trim_end_matches(']') {
-                    "" => u32::from_le_bytes(cursor.take()),
-                    fixed => fixed.parse().unwrap(),
-                };
-                for index in 0..count {
-                    fields.insert(format!("{name}[{index}]"), cursor.value(element));
-                }
-            }
-            None => {
-                fields.insert(name.to_owned(), cursor.value(kind));
-            }
-        }
-    }
+    // The definitions of the types within follow that of the message.
+    let parts: Vec<&str> = definition.split("====\nMSG: ").collect();
+    cursor.fields(parts[0], "", &parts[1..], &mut fields);
     assert_eq!(cursor.at, cursor.body.len(), "bytes beyond the definition");
     fields
 }

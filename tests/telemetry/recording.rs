@@ -2,13 +2,13 @@ use std::fs;
 use std::path::Path;
 
 use takt::internals::link::trace::traced;
-use takt::telemetry::{Logger, RecordingDestination};
+use takt::telemetry::{Logger, LoggerOptions, RecordingDestination, RecordingOptions};
 use takt_rt::{
     BusHealth, BusPort, EventKind, Frame, HostInterface, Id, Phase, ReceiveBatch, Received, RejectReason,
     RequestError, RequestKind,
 };
 
-use crate::reader::{Value, messages};
+use crate::reader::{Fields, Value, messages};
 use crate::run::{
     CYCLE_NS, Disk, EPOCH_NS, Notices, STOP, UNIX_AT_ZERO_NS, cycle, event, machine, options, run, sides,
 };
@@ -135,7 +135,8 @@ fn a_recording_has_an_index_and_the_description_of_the_machine() {
     let recording = record();
     let summary = mcap::Summary::read(&recording).unwrap().unwrap();
     let statistics = summary.stats.unwrap();
-    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 4 + 4, 5));
+    // Each event is also in words, and the joint states come a hundred times a second.
+    assert_eq!((statistics.message_count, statistics.channel_count), (20 * 4 + 4 * 2 + 2, 8));
     let slide = summary.channels.values().find(|channel| channel.topic == "/axis/slide").unwrap();
     let expected = [
         ("acceleration_limit", "10"),
@@ -155,6 +156,111 @@ fn a_recording_has_an_index_and_the_description_of_the_machine() {
 }
 
 #[test]
+fn programs_of_ros_2_find_all_joints_and_the_events_in_words() {
+    let recording = record();
+    let joints = messages(&recording, "/joint_states");
+    let times: Vec<u64> = joints.iter().map(|(time, _)| time - UNIX_AT_ZERO_NS - EPOCH_NS).collect();
+    assert_eq!(times, [0, 10 * CYCLE_NS]);
+    let (axes, fields) = (cycle(10).axes, &joints[1].1);
+    let expected = [
+        ("header.stamp.sec", number(1_700_000_000)),
+        ("header.stamp.nanosec", number((EPOCH_NS + 10 * CYCLE_NS) as f64)),
+        ("header.frame_id", Value::Text(String::new())),
+        ("name[0]", Value::Text("shoulder".to_owned())),
+        ("name[1]", Value::Text("slide".to_owned())),
+        ("position[0]", number(axes[0].position)),
+        ("position[1]", number(axes[1].position)),
+        ("velocity[0]", number(1.25)),
+        ("velocity[1]", number(1.25)),
+        ("effort[0]", number(-8.5)),
+        ("effort[1]", number(-8.5)),
+    ];
+    assert_eq!(*fields, expected.map(|(name, value)| (name.to_owned(), value)).into());
+
+    let events = messages(&recording, "/events");
+    let log = messages(&recording, "/rosout");
+    let of = |fields: &[(u64, Fields)], key: &str| -> Vec<(u64, Value)> {
+        fields.iter().map(|(time, fields)| (*time, fields[key].clone())).collect()
+    };
+    assert_eq!(of(&log, "msg"), of(&events, "text"));
+    let levels: Vec<Value> = log.iter().map(|(_, fields)| fields["level"].clone()).collect();
+    assert_eq!(levels, [20, 40, 30, 30].map(number), "information, error, and two warnings");
+    assert!(log.iter().all(|(_, fields)| fields["name"] == Value::Text("arm".to_owned())));
+}
+
+/// The bytes of a recording of so many cycles, and the messages that are read from it.
+fn written(is_compressed: bool, cycles: u64) -> (Vec<u8>, Vec<(String, u64, Vec<u8>)>) {
+    let (mut rt, _host, log) = sides(8);
+    let disk = Disk::new(usize::MAX);
+    let recording_options = RecordingOptions { is_compressed, ..RecordingOptions::default() };
+    let options = LoggerOptions { recording_options, ..options(Some(disk.destination())) };
+    let mut logger = Logger::new(log, options, Notices::default().sink());
+    run(&mut rt, &mut logger, 0..cycles);
+    logger.finish();
+    let bytes = disk.bytes.lock().unwrap().clone();
+    let stream = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
+    let messages =
+        stream.map(|message| (message.channel.topic.clone(), message.log_time, message.data.to_vec()));
+    let messages = messages.collect();
+    (bytes, messages)
+}
+
+#[test]
+fn a_compressed_recording_has_the_same_messages_in_less_than_a_third_of_the_bytes() {
+    let (compressed, of_compressed) = written(true, 2000);
+    let (plain, of_plain) = written(false, 2000);
+    assert_eq!(of_compressed, of_plain);
+    assert!(compressed.len() * 3 < plain.len(), "{} of {} bytes", compressed.len(), plain.len());
+}
+
+#[test]
+fn a_recording_in_several_files_keeps_the_newest_each_of_which_can_be_read_alone() {
+    const LIMIT: u64 = 1 << 20;
+    let folder = tempfile::tempdir().unwrap();
+    let (mut rt, _host, log) = sides(8);
+    let recording_options =
+        RecordingOptions { is_compressed: false, size_limit_bytes: Some(LIMIT), keep: Some(3) };
+    let destination = RecordingDestination::File(folder.path().join("run.mcap"));
+    let options = LoggerOptions { recording_options, ..options(Some(destination)) };
+    let mut logger = Logger::new(log, options, Notices::default().sink());
+    run(&mut rt, &mut logger, 0..12_000);
+    let summary = logger.finish();
+    assert_eq!(summary.not_written, [""; 0]);
+    let files: Vec<_> = summary.earlier_recordings.into_iter().chain(summary.recording).collect();
+    let mut found: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    found.sort();
+    assert_eq!((files.len(), &files), (3, &found), "the order of the names is that of time");
+    let first = summary.recordings_removed + 1;
+    assert!(first > 3, "{first}");
+    let mut next_slot = None;
+    for (number, file) in (first..).zip(&files) {
+        assert_eq!(file.file_name().unwrap().to_str().unwrap(), format!("run.{number:04}.mcap"));
+        let bytes = fs::read(file).unwrap();
+        assert!(bytes.len() as u64 <= LIMIT, "{} bytes", bytes.len());
+        let slots: Vec<f64> = messages(&bytes, "/cycle")
+            .iter()
+            .map(|(_, fields)| match fields["slot"] {
+                Value::Number(slot) => slot,
+                Value::Text(_) => panic!("a slot is a number"),
+            })
+            .collect();
+        assert!(slots.windows(2).all(|pair| pair[1] == pair[0] + 1.0));
+        assert_eq!(next_slot.unwrap_or(slots[0]), slots[0], "no cycle between two files is lost");
+        next_slot = slots.last().map(|last| last + 1.0);
+        let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+        let recorded =
+            summary.metadata_indexes.iter().map(|index| mcap::read::metadata(&bytes, index).unwrap());
+        let part = recorded.clone().find(|metadata| metadata.name == "part").unwrap();
+        assert_eq!(
+            (&*part.metadata["first"], &*part.metadata["number"]),
+            ("run.0001.mcap", &*number.to_string())
+        );
+        assert!(recorded.clone().any(|metadata| metadata.name == "takt"));
+    }
+    assert_eq!(next_slot, Some(12_000.0));
+}
+
+#[test]
 fn the_same_run_leaves_the_same_bytes() {
     assert_eq!(record(), record());
 }
@@ -166,11 +272,30 @@ fn a_recording_that_is_cut_off_can_be_read_up_to_its_last_chunk() {
     let mut logger = Logger::new(log, options(Some(disk.destination())), Notices::default().sink());
     run(&mut rt, &mut logger, 0..3000);
     let written = disk.bytes.lock().unwrap().clone();
-    let whole =
-        mcap::read::MessageStream::new_with_options(&written, mcap::read::Options::IgnoreEndMagic.into());
-    let read = whole.unwrap().map_while(Result::ok).filter(|message| message.channel.topic == "/cycle");
-    let read = read.count();
+    let read = cycles_of_unfinished(&written);
     assert!((2000..3000).contains(&read), "{read} cycles");
+}
+
+/// The cycles in the bytes that were written before the end.
+fn cycles_of_unfinished(written: &[u8]) -> usize {
+    let whole =
+        mcap::read::MessageStream::new_with_options(written, mcap::read::Options::IgnoreEndMagic.into());
+    let messages = whole.unwrap().map_while(Result::ok);
+    messages.filter(|message| message.channel.topic == "/cycle").count()
+}
+
+#[test]
+fn a_crash_loses_at_most_a_second_of_a_recording_of_few_axes() {
+    let (mut rt, _host, log) = sides(8);
+    let disk = Disk::new(usize::MAX);
+    let mut options = options(Some(disk.destination()));
+    options.machine.axes.clear();
+    let mut logger = Logger::new(log, options, Notices::default().sink());
+    for seconds in 1..5 {
+        run(&mut rt, &mut logger, (seconds - 1) * 1000..seconds * 1000);
+        let read = cycles_of_unfinished(&disk.bytes.lock().unwrap());
+        assert!(read as u64 + 1001 >= seconds * 1000, "{read} cycles of {seconds} s");
+    }
 }
 
 #[test]

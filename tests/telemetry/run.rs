@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use takt::internals::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
     AxisDescription, BusDescription, Logger, LoggerOptions, Machine, Notice, RecordingDestination,
-    SetPointMagnitudes, Unit, WallClock,
+    RecordingOptions, SetPointMagnitudes, Unit, WallClock,
 };
 use takt_rt::{
     AxisRecord, CycleRecord, CycleTiming, DriveState, Event, EventKind, Fault, GroupRecord, HostInterface,
@@ -60,7 +60,12 @@ pub fn machine() -> Machine {
         name: "arm".to_owned(),
         cycle_ns: CYCLE_NS,
         axes: vec![axis("shoulder", Unit::Radian), axis("slide", Unit::Metre)],
-        buses: vec![BusDescription { name: "left".to_owned(), interface: "can0".to_owned() }],
+        buses: vec![BusDescription {
+            name: "left".to_owned(),
+            interface: "can0".to_owned(),
+            bit_rate: None,
+            data_bit_rate: None,
+        }],
         groups: vec![],
     }
 }
@@ -71,6 +76,7 @@ pub fn options(recording: Option<RecordingDestination>) -> LoggerOptions {
         wall_clock: WallClock::fixed(UNIX_AT_ZERO_NS),
         started_ns: EPOCH_NS,
         recording,
+        recording_options: RecordingOptions::default(),
         candump: None,
         black_box: None,
         traces: Vec::new(),

@@ -132,7 +132,8 @@ pub fn decode_bus(message: &[u8]) -> Option<TracedHealth> {
         rx_overruns: fields.u64()?,
         tx_frames: fields.u64()?,
         rx_frames: fields.u64()?,
-        busy_ns: 0,
+        // Recordings of earlier versions do not have it.
+        busy_ns: fields.u64().unwrap_or(0),
     };
     Some(TracedHealth { at_ns, health })
 }

@@ -1,5 +1,6 @@
 //! Why the group stopped, according to a recording, and which slots and axis show it.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
@@ -39,7 +40,13 @@ impl Recorded {
     /// Why the group stopped: the incident of a black box, or else the first stop for a fault, or else the first stop on
     /// request.
     pub fn cause(&self) -> Option<Cause> {
-        if let Some(incident) = self.incidents.first() {
+        let slot_of = |incident: &BTreeMap<String, String>| incident.get("slot")?.parse::<u64>().ok();
+        let is_read = |slot: u64| self.slots.is_none_or(|(first, last)| (first..=last).contains(&slot));
+        let mut incidents = self.incidents.iter();
+        let is_shown = |incident: &&BTreeMap<String, String>| {
+            self.span_s.is_none() || slot_of(incident).is_some_and(is_read)
+        };
+        if let Some(incident) = incidents.find(is_shown) {
             let text = |key: &str| incident.get(key).cloned();
             let number = |key: &str| incident.get(key)?.parse::<f64>().ok();
             return Some(Cause {
@@ -122,7 +129,14 @@ impl Recorded {
         cause.as_ref().and_then(|cause| position(cause.axis.as_ref()?)).or_else(largest_error)
     }
 
-    pub(in crate::telemetry) fn seconds(&self, at_ns: u64) -> f64 {
-        (at_ns as f64 - self.statistics.first_ns as f64) * 1e-9
+    /// Seconds after the first cycle of the file.
+    pub fn seconds(&self, at_ns: u64) -> f64 {
+        let begin_ns = self.begin.map_or(self.statistics.first_ns, |(_, begin_ns)| begin_ns);
+        (at_ns as f64 - begin_ns as f64) * 1e-9
+    }
+
+    /// The first slot of the file.
+    pub fn first_slot(&self) -> u64 {
+        self.begin.map_or(0, |(slot, _)| slot)
     }
 }

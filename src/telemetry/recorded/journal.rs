@@ -1,6 +1,7 @@
 //! The journal of a recording, and the files of its configuration.
 
 use std::collections::{BTreeMap, HashSet};
+use std::ffi::OsString;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
@@ -9,6 +10,7 @@ use super::records::{self, Record};
 use super::{RecordedError, walk};
 use crate::config::ConfigSources;
 use crate::journal::{Journal, JournalDefect};
+use crate::telemetry::destination::PartNames;
 use crate::telemetry::recording;
 
 /// What a recording has for a replay.
@@ -24,16 +26,39 @@ pub struct RecordedJournal {
     pub defect: Option<JournalDefect>,
     /// Whether this version of takt can read the journal.
     pub is_of_other_version: bool,
+    /// The file that it begins in, if that is an earlier one of the same run.
+    pub begins_in: Option<PathBuf>,
+    /// The files that were read: this one, and those of the same run behind it.
+    pub files: Vec<PathBuf>,
 }
 
-/// Reads the journal of a recording.
+/// Reads the journal of a recording. Of several files, the first one is read with all that follow it.
 ///
 /// # Errors
 /// See [`RecordedError`].
 pub fn journal(path: &Path) -> Result<RecordedJournal, RecordedError> {
+    let mut found = RecordedJournal::default();
+    let mut next = Some(path.to_owned());
+    while let Some(path) = next.take() {
+        let part = add_file(&path, &mut found)?;
+        found.files.push(path.clone());
+        let Some((first, number)) = part else { break };
+        if number > 1 && found.files.len() == 1 {
+            found.begins_in = Some(path.with_file_name(first));
+            break;
+        }
+        let names =
+            PartNames::of_part(&path).filter(|names| names.path(1).file_name() == Some(first.as_ref()));
+        next = names.map(|names| names.path(number + 1)).filter(|next| next.exists());
+    }
+    Ok(found)
+}
+
+/// Adds what one file has. Returns the name of the first file of several, and the number of this one.
+fn add_file(path: &Path, found: &mut RecordedJournal) -> Result<Option<(OsString, u32)>, RecordedError> {
     let unreadable = |error| RecordedError::Unreadable { path: path.to_owned(), error };
     let file = File::open(path).map_err(|error| unreadable(error.into()))?;
-    let mut found = RecordedJournal::default();
+    let mut part = None;
     let mut channels = HashSet::new();
     walk::walk(BufReader::new(file), |opcode, body| match records::parse(opcode, body) {
         Some(Ok(Record::Channel { id, metadata, .. })) => {
@@ -46,11 +71,16 @@ pub fn journal(path: &Path) -> Result<RecordedJournal, RecordedError> {
             let added = found.journal.get_or_insert_default().add_block(data);
             found.defect = found.defect.or(added.err());
         }
+        Some(Ok(Record::Metadata { name, entries })) if name == recording::PART => {
+            let first = entries.get(recording::FIRST_PART).map(OsString::from);
+            let number = entries.get(recording::PART_NUMBER).and_then(|number| number.parse().ok());
+            part = first.zip(number);
+        }
         Some(Ok(Record::Metadata { name, entries })) => found.metadata(&name, entries),
         _ => {}
     })
     .map_err(unreadable)?;
-    Ok(found)
+    Ok(part)
 }
 
 impl RecordedJournal {

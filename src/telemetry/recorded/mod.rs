@@ -10,11 +10,12 @@ mod walk;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
 use std::io::{self, BufReader};
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
 use takt_rt::{
-    AxisRecord, CycleRecord, CycleTiming, EventKind, GroupRecord, MAX_BUSES, MAX_GROUPS, Nanoseconds, Phase,
+    AxisRecord, BusHealth, CycleRecord, CycleTiming, EventKind, GroupRecord, MAX_BUSES, MAX_GROUPS,
+    Nanoseconds, Phase,
 };
 
 use super::black_box;
@@ -100,6 +101,17 @@ pub struct RecordedCycle {
     pub axes: Vec<AxisRecord>,
 }
 
+/// How much of the time a bus was occupied.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RecordedLoad {
+    /// The number of the bus.
+    pub bus: usize,
+    /// The end of the time, on the monotonic clock of the run.
+    pub at_ns: Nanoseconds,
+    /// From 0 to 1.
+    pub load: f64,
+}
+
 impl RecordedCycle {
     fn of(record: &CycleRecord) -> Self {
         let CycleRecord { timing, is_commanded, .. } = *record;
@@ -124,6 +136,14 @@ pub struct Recorded {
     pub events: Vec<RecordedEvent>,
     /// Every change of the health of a bus, with the number of the bus.
     pub health: Vec<(usize, TracedHealth)>,
+    /// The loads of the buses, over about 100 ms each; none in a recording of an earlier version.
+    pub loads: Vec<RecordedLoad>,
+    /// The last health of each bus that was read.
+    known_health: BTreeMap<usize, TracedHealth>,
+    /// The slot and the time of the first cycle of the file.
+    begin: Option<(u64, Nanoseconds)>,
+    /// The part of the recording that is read, in seconds after its first cycle.
+    span_s: Option<Range<f64>>,
     /// What each group was doing in the last cycle.
     pub last_phases: Vec<Phase>,
     /// Timing and following errors of the whole recording.
@@ -142,6 +162,18 @@ impl Recorded {
     /// # Errors
     /// See [`RecordedError`]. A file that is cut off or damaged in parts is read as far as it goes, with a warning.
     pub fn open(path: &Path) -> Result<Self, RecordedError> {
+        Self::open_span(path, None)
+    }
+
+    /// Reads a part of a file: what lies so many seconds after its first cycle.
+    ///
+    /// # Errors
+    /// See [`RecordedError`].
+    pub fn open_between(path: &Path, span_s: Range<f64>) -> Result<Self, RecordedError> {
+        Self::open_span(path, Some(span_s))
+    }
+
+    fn open_span(path: &Path, span_s: Option<Range<f64>>) -> Result<Self, RecordedError> {
         let mut recorded = Self {
             path: path.to_owned(),
             version: String::new(),
@@ -155,6 +187,10 @@ impl Recorded {
             incidents: Vec::new(),
             events: Vec::new(),
             health: Vec::new(),
+            loads: Vec::new(),
+            known_health: BTreeMap::new(),
+            begin: None,
+            span_s,
             last_phases: Vec::new(),
             statistics: Statistics::default(),
             slots: None,
@@ -169,6 +205,12 @@ impl Recorded {
         }
         let decoder = recorded.read(|recorded, item| recorded.take(item))?;
         recorded.machine.axes = decoder.axes.into_values().collect();
+        // An event can come before the first cycle, whose time is not known then.
+        let Self { begin, span_s, events, health, loads, .. } = &mut recorded;
+        let is_inside = |at_ns: Nanoseconds| is_inside(span_s.as_ref(), *begin, at_ns);
+        events.retain(|event| is_inside(event.at_ns));
+        health.retain(|(_, traced)| is_inside(traced.at_ns));
+        loads.retain(|load| is_inside(load.at_ns));
         Ok(recorded)
     }
 
@@ -196,7 +238,9 @@ impl Recorded {
     pub fn each_cycle(&self, mut visit: impl FnMut(&CycleRecord)) -> Result<(), RecordedError> {
         let mut copy = Self { warnings: Vec::new(), ..self.clone() };
         copy.read(|_, item| {
-            if let Item::Cycle { record, .. } = item {
+            if let Item::Cycle { record, .. } = item
+                && is_inside(self.span_s.as_ref(), self.begin, record.timing.slot_start_ns)
+            {
                 visit(record);
             }
         })?;
@@ -210,7 +254,12 @@ impl Recorded {
                 self.version = text("version");
                 self.machine.name = text("machine");
                 self.machine.cycle_ns = text("cycle_ns").parse().unwrap_or(0);
-                let bus = |line: &str| BusDescription { name: name(line), interface: String::new() };
+                let bus = |line: &str| BusDescription {
+                    name: name(line),
+                    interface: String::new(),
+                    bit_rate: None,
+                    data_bit_rate: None,
+                };
                 let buses = described.get("buses").map_or("", String::as_str);
                 self.machine.buses = buses.lines().take(MAX_BUSES).map(bus).collect();
                 let groups = described.get("groups").map_or("", String::as_str);
@@ -222,6 +271,10 @@ impl Recorded {
             }
             Item::Cycle { record, log_time_ns, axes } => {
                 let (slot, start_ns) = (record.timing.slot, record.timing.slot_start_ns);
+                self.begin = self.begin.or(Some((slot, start_ns)));
+                if !is_inside(self.span_s.as_ref(), self.begin, start_ns) {
+                    return;
+                }
                 if self.statistics.cycles == 0 {
                     self.statistics = Statistics::new(axes.values().map(|axis| axis.group).collect());
                 }
@@ -234,7 +287,34 @@ impl Recorded {
                 self.slots = Some((first.min(slot), last.max(slot)));
             }
             Item::Event(event) => self.events.push(RecordedEvent { text: printable(&event.text), ..event }),
-            Item::Health(OnBus { bus, what }) => self.health.push((bus, what)),
+            Item::Health(OnBus { bus, what }) => self.take_health(bus, what),
+        }
+    }
+
+    fn take_health(&mut self, bus: usize, traced: TracedHealth) {
+        let before = self.known_health.insert(bus, traced);
+        let of_interest =
+            |health: &BusHealth| (health.state, health.errors, health.tx_overruns, health.rx_overruns);
+        let known = before.map_or_else(BusHealth::default, |before| before.health);
+        if of_interest(&known) != of_interest(&traced.health) {
+            self.health.push((bus, traced));
+        }
+        if let Some(before) = before.filter(|_| traced.health.busy_ns > 0) {
+            let busy_ns = traced.health.busy_ns.saturating_sub(before.health.busy_ns);
+            let passed_ns = traced.at_ns.saturating_sub(before.at_ns);
+            // A change of the state comes between two loads.
+            if passed_ns >= SHORTEST_LOAD_NS {
+                let load = busy_ns as f64 / passed_ns as f64;
+                self.loads.push(RecordedLoad { bus, at_ns: traced.at_ns, load });
+            } else {
+                self.known_health.insert(
+                    bus,
+                    TracedHealth {
+                        at_ns: before.at_ns,
+                        health: BusHealth { busy_ns: before.health.busy_ns, ..traced.health },
+                    },
+                );
+            }
         }
     }
 
@@ -267,6 +347,15 @@ impl Recorded {
         }
         Ok(decoder)
     }
+}
+
+/// A load is that of a longer time.
+const SHORTEST_LOAD_NS: Nanoseconds = 50_000_000;
+
+/// Whether an instant is in the part of a recording that is read.
+fn is_inside(span_s: Option<&Range<f64>>, begin: Option<(u64, Nanoseconds)>, at_ns: Nanoseconds) -> bool {
+    let (Some(span_s), Some((_, begin_ns))) = (span_s, begin) else { return true };
+    span_s.contains(&((at_ns as f64 - begin_ns as f64) * 1e-9))
 }
 
 /// Names are repeated in every row of a report, so that a longer one would cost much more than its place in the file.

@@ -1,5 +1,5 @@
 //! Splits an MCAP file into its records. A file that was cut off (`kill -9`, a power cut) is read to its last whole record,
-//! also within a chunk. A chunk with a wrong checksum is skipped.
+//! also within a chunk. A chunk with a wrong checksum is skipped. Chunks may be compressed by zstd.
 
 use std::io::{self, Read};
 
@@ -8,8 +8,12 @@ use mcap::records::op;
 
 use crate::printable::printable;
 
-/// No record of takt is longer. A longer record means that the file is damaged.
+/// No record of takt is longer, nor what comes out of a compressed chunk. A longer one means that the file is damaged.
 const LONGEST_RECORD: u64 = 1 << 28;
+/// The memory that a compressed chunk may ask for, as a power of two: more than any that takt writes.
+const LONGEST_WINDOW_LOG: u32 = 24;
+/// The name of the compression that takt writes.
+const ZSTD: &[u8] = b"zstd";
 
 /// The condition of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,15 +37,15 @@ pub enum WalkError {
     /// It is not an MCAP file.
     #[error("this is not an MCAP file; name a recording or a black box of `takt run`")]
     NotMcap,
-    /// takt does not compress chunks.
-    #[error("its chunks are compressed ({0}); takt writes and reads uncompressed ones only")]
+    /// Its chunks are compressed by something else.
+    #[error("its chunks are compressed ({0}); takt reads zstd and uncompressed ones")]
     Compressed(String),
 }
 
 /// Passes every record with its opcode to `visit`, in the order of the file.
 pub fn walk(mut file: impl Read, mut visit: impl FnMut(u8, &[u8])) -> Result<Condition, WalkError> {
     let mut condition = Condition::default();
-    let mut body = Vec::new();
+    let (mut body, mut decompressed) = (Vec::new(), Vec::new());
     read_up_to(&mut file, MAGIC.len() as u64, &mut body)?;
     if body.is_empty() {
         return Err(WalkError::Empty);
@@ -59,7 +63,7 @@ pub fn walk(mut file: impl Read, mut visit: impl FnMut(u8, &[u8])) -> Result<Con
         match opcode {
             op::DATA_END | op::FOOTER => return Ok(Condition { is_whole: true, ..condition }),
             op::CHUNK => {
-                let is_undamaged = walk_chunk(&body, is_whole, &mut visit)?;
+                let is_undamaged = walk_chunk(&body, is_whole, &mut decompressed, &mut visit)?;
                 condition.damaged_chunks += u64::from(!is_undamaged);
             }
             _ if is_whole => visit(opcode, &body),
@@ -87,15 +91,23 @@ fn read_up_to(file: &mut impl Read, length: u64, into: &mut Vec<u8>) -> io::Resu
 }
 
 /// Returns whether the chunk is undamaged. The checksum of a chunk that was cut off cannot be checked.
-fn walk_chunk(body: &[u8], is_whole: bool, visit: &mut impl FnMut(u8, &[u8])) -> Result<bool, WalkError> {
+fn walk_chunk(
+    body: &[u8],
+    is_whole: bool,
+    decompressed: &mut Vec<u8>,
+    visit: &mut impl FnMut(u8, &[u8]),
+) -> Result<bool, WalkError> {
     let Some(chunk) = Chunk::parse(body) else { return Ok(!is_whole) };
-    if !chunk.compression.is_empty() {
-        return Err(WalkError::Compressed(printable(&String::from_utf8_lossy(chunk.compression))));
-    }
-    if is_whole && chunk.crc != 0 && crc32fast::hash(chunk.records) != chunk.crc {
+    let records = match chunk.compression {
+        b"" => chunk.records,
+        ZSTD if decompress(&chunk, decompressed) || !is_whole => decompressed.as_slice(),
+        ZSTD => return Ok(false),
+        other => return Err(WalkError::Compressed(printable(&String::from_utf8_lossy(other)))),
+    };
+    if is_whole && chunk.crc != 0 && crc32fast::hash(records) != chunk.crc {
         return Ok(false);
     }
-    let mut rest = chunk.records;
+    let mut rest = records;
     while let Some((opcode, length, behind)) = prefix(rest) {
         let Some((body, next)) =
             usize::try_from(length).ok().and_then(|length| behind.split_at_checked(length))
@@ -108,7 +120,18 @@ fn walk_chunk(body: &[u8], is_whole: bool, visit: &mut impl FnMut(u8, &[u8])) ->
     Ok(true)
 }
 
+/// Decompresses as much as there is. Returns whether that is all.
+fn decompress(chunk: &Chunk<'_>, into: &mut Vec<u8>) -> bool {
+    into.clear();
+    let Ok(mut decoder) = zstd::stream::read::Decoder::with_buffer(chunk.records) else { return false };
+    let is_bounded = decoder.window_log_max(LONGEST_WINDOW_LOG).is_ok();
+    // What came before an error is kept: the chunk may have been cut off.
+    is_bounded && decoder.take(chunk.length.min(LONGEST_RECORD)).read_to_end(into).is_ok()
+}
+
 struct Chunk<'a> {
+    /// The number of bytes of its records, uncompressed.
+    length: u64,
     crc: u32,
     compression: &'a [u8],
     records: &'a [u8],
@@ -118,14 +141,20 @@ impl<'a> Chunk<'a> {
     /// Reads start time, end time, uncompressed size, CRC, name of the compression, size, and records. The records may have
     /// been cut off.
     fn parse(body: &'a [u8]) -> Option<Self> {
-        let (_, rest) = body.split_at_checked(8 + 8 + 8)?;
+        let (_, rest) = body.split_at_checked(8 + 8)?;
+        let (length, rest) = rest.split_first_chunk::<8>()?;
         let (crc, rest) = rest.split_first_chunk::<4>()?;
         let (name, rest) = rest.split_first_chunk::<4>()?;
         let (compression, rest) = rest.split_at_checked(u32::from_le_bytes(*name) as usize)?;
         let (size, rest) = rest.split_first_chunk::<8>()?;
         let size = usize::try_from(u64::from_le_bytes(*size)).ok()?;
         let records = rest.get(..size).unwrap_or(rest);
-        Some(Self { crc: u32::from_le_bytes(*crc), compression, records })
+        Some(Self {
+            length: u64::from_le_bytes(*length),
+            crc: u32::from_le_bytes(*crc),
+            compression,
+            records,
+        })
     }
 }
 
@@ -139,9 +168,14 @@ mod tests {
     }
 
     fn chunk(compression: &str, crc: u32, records: &[u8]) -> Vec<u8> {
-        let size = (records.len() as u64).to_le_bytes();
+        chunk_of(compression, crc, records.len(), records)
+    }
+
+    /// A chunk whose records have this length when they are decompressed.
+    fn chunk_of(compression: &str, crc: u32, length: usize, records: &[u8]) -> Vec<u8> {
+        let [length, size] = [length, records.len()].map(|size| (size as u64).to_le_bytes());
         let name = (compression.len() as u32).to_le_bytes();
-        let head = [&[0; 16][..], &size, &crc.to_le_bytes(), &name, compression.as_bytes(), &size].concat();
+        let head = [&[0; 16][..], &length, &crc.to_le_bytes(), &name, compression.as_bytes(), &size].concat();
         record(op::CHUNK, &[&head[..], records].concat())
     }
 
@@ -179,9 +213,54 @@ mod tests {
     }
 
     #[test]
-    fn compressed_chunks_and_other_files_are_refused() {
-        let compressed = seen(&file(&[&chunk("zstd", 0, b"...")]));
-        assert!(matches!(compressed, Err(WalkError::Compressed(name)) if name == "zstd"));
+    fn a_compressed_chunk_gives_the_same_records_and_a_damaged_one_none() {
+        let inner = [record(op::MESSAGE, b"one"), record(op::MESSAGE, b"two")].concat();
+        let packed = zstd::encode_all(&inner[..], 0).unwrap();
+        let sound = chunk_of("zstd", crc32fast::hash(&inner), inner.len(), &packed);
+        let (bodies, condition) = seen(&file(&[&sound])).unwrap();
+        assert_eq!((bodies, condition.damaged_chunks), (vec![b"one".to_vec(), b"two".to_vec()], 0));
+        for (what, damaged) in [
+            ("a wrong checksum", chunk_of("zstd", 1, inner.len(), &packed)),
+            ("bytes that are no zstd", chunk_of("zstd", 0, inner.len(), b"no zstd")),
+            ("half of the bytes", chunk_of("zstd", 0, inner.len(), &packed[..packed.len() / 2])),
+        ] {
+            let (bodies, condition) = seen(&file(&[&damaged, &sound])).unwrap();
+            assert_eq!((bodies.len(), condition.damaged_chunks), (2, 1), "{what}");
+        }
+    }
+
+    #[test]
+    fn a_compressed_chunk_that_was_cut_off_gives_the_records_of_its_whole_blocks() {
+        // Numbers that follow no pattern, so that the chunk has several blocks of compressed bytes.
+        let mut seed = 1_u32;
+        let mut body = || {
+            (0..1000)
+                .map(|_| {
+                    seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    (seed >> 24) as u8
+                })
+                .collect::<Vec<u8>>()
+        };
+        let bodies: Vec<Vec<u8>> = (0..1000).map(|_| body()).collect();
+        let inner = bodies.iter().map(|body| record(op::MESSAGE, body)).collect::<Vec<_>>().concat();
+        let packed = zstd::encode_all(&inner[..], 0).unwrap();
+        let whole = chunk_of("zstd", crc32fast::hash(&inner), inner.len(), &packed);
+        let (read, condition) = seen(&file(&[&whole[..whole.len() / 2]])).unwrap();
+        assert!(!condition.is_whole && (300..=500).contains(&read.len()), "{} records", read.len());
+        assert_eq!(read, bodies[..read.len()]);
+    }
+
+    #[test]
+    fn a_chunk_that_decompresses_to_more_than_it_says_gives_no_more_than_that() {
+        let bomb = zstd::encode_all(&vec![0; 1 << 24][..], 0).unwrap();
+        let (bodies, condition) = seen(&file(&[&chunk_of("zstd", 7, 1 << 10, &bomb)])).unwrap();
+        assert_eq!((bodies.len(), condition.damaged_chunks), (0, 1));
+    }
+
+    #[test]
+    fn another_compression_and_other_files_are_refused() {
+        let compressed = seen(&file(&[&chunk("lz4", 0, b"...")]));
+        assert!(matches!(compressed, Err(WalkError::Compressed(name)) if name == "lz4"));
         assert!(matches!(seen(b""), Err(WalkError::Empty)));
         assert!(matches!(seen(b"\x89MCAP1\r\n"), Err(WalkError::NotMcap)));
     }

@@ -12,9 +12,6 @@ use super::recorded::{Cause, Recorded, RecordedCycle, RecordedError};
 use super::report::{BusReport, LatencyReport, SetPointParts};
 use super::words;
 
-/// The numbers of events that are shown before the cause, and after it.
-const EVENTS: (usize, usize) = (24, 12);
-
 /// A recording in numbers and words.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
@@ -29,6 +26,8 @@ pub struct RecordingReport {
     pub cycle_ns: u64,
     /// The time of its first cycle, in UTC.
     pub begins: Option<String>,
+    /// The first and the last cycle that are reported, in seconds after the beginning of the recording.
+    pub span_s: (f64, f64),
     /// Cycles in it.
     pub cycles: u64,
     /// Whether it is the file of a black box.
@@ -42,7 +41,7 @@ pub struct RecordingReport {
     pub groups: Vec<GroupSummary>,
     /// The axis of the cause, or the one that was asked for; `None` if there is no cycle.
     pub axis: Option<AxisCycles>,
-    /// The events around the cause, or the last ones.
+    /// Every event.
     pub events: Vec<ReportedEvent>,
     /// Every emergency message of a drive.
     pub emergencies: Vec<ReportedEvent>,
@@ -61,8 +60,22 @@ pub struct RecordingReport {
     pub missed_slots: u64,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisSummary>,
-    /// The changes of the buses' health. Only a black box has them.
+    /// The changes of the buses' health.
     pub buses: Vec<BusChange>,
+    /// The loads of the buses; none in a recording of an earlier version.
+    pub bus_loads: Vec<BusLoadSummary>,
+}
+
+/// The load of a bus over the whole recording.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct BusLoadSummary {
+    /// Its name.
+    pub name: String,
+    /// The mean, from 0 to 1.
+    pub mean: f64,
+    /// The largest of about 100 ms.
+    pub max: f64,
 }
 
 /// One group of several over the whole recording.
@@ -130,8 +143,16 @@ pub struct AxisSummary {
     pub name: String,
     /// `rad` or `m`.
     pub unit: &'static str,
+    /// The lowest position that the drive has reported.
+    pub position_min: Option<f64>,
+    /// The highest.
+    pub position_max: Option<f64>,
     /// The largest following error while enabled.
     pub following_error_max: Option<f64>,
+    /// When that was, in seconds after the beginning of the recording.
+    pub following_error_max_at_s: Option<f64>,
+    /// The largest torque (force) that the drive has reported, in N·m (N).
+    pub torque_max: f64,
     /// The largest velocity, acceleration and jerk of its set-points.
     pub set_point_max: SetPointMagnitudes,
     /// The same as fractions of their limits.
@@ -209,16 +230,14 @@ impl RecordingReport {
             [] | [_] => vec![],
             several => several.iter().enumerate().map(|group| GroupSummary::new(recorded, group)).collect(),
         };
-        let cause = recorded.cause();
-        let end = match &cause {
-            Some(cause) => events.partition_point(|event| event.slot <= cause.slot) + EVENTS.1,
-            None => events.len(),
-        };
-        let begin = end.saturating_sub(EVENTS.0 + EVENTS.1);
         let axes = machine.axes.iter().zip(&statistics.axes).map(|(description, axis)| AxisSummary {
             name: description.name.clone(),
             unit: description.unit.symbol(),
+            position_min: axis.position_range.map(|(low, _)| low),
+            position_max: axis.position_range.map(|(_, high)| high),
             following_error_max: axis.following_error_max.map(|largest| largest.error),
+            following_error_max_at_s: axis.following_error_max.map(|largest| recorded.seconds(largest.at_ns)),
+            torque_max: axis.torque_max,
             set_point_max: axis.set_point_max,
             set_point_part: SetPointParts::new(&axis.set_point_max, &description.limits),
         });
@@ -236,13 +255,14 @@ impl RecordingReport {
             machine: machine.name.clone(),
             cycle_ns: machine.cycle_ns,
             begins: recorded.wall_clock.map(|clock| clock.moment(statistics.first_ns)),
+            span_s: (recorded.seconds(statistics.first_ns), recorded.seconds(statistics.last_ns)),
             cycles: statistics.cycles,
             is_black_box: !recorded.incidents.is_empty(),
             warnings: recorded.warnings.clone(),
-            cause,
+            cause: recorded.cause(),
             groups,
             axis: shown,
-            events: events.into_iter().take(end).skip(begin).collect(),
+            events,
             emergencies,
             wake_ns: LatencyReport::new(&statistics.wake),
             sync_ns: LatencyReport::new(&statistics.sync),
@@ -252,8 +272,22 @@ impl RecordingReport {
             missed_slots: statistics.missed_slots,
             axes: axes.collect(),
             buses: buses.collect(),
+            bus_loads: bus_loads(recorded),
         })
     }
+}
+
+fn bus_loads(recorded: &Recorded) -> Vec<BusLoadSummary> {
+    let of_bus = |(number, name): (usize, String)| {
+        let loads = || recorded.loads.iter().filter(|load| load.bus == number).map(|load| load.load);
+        let count = loads().count();
+        (count > 0).then(|| BusLoadSummary {
+            name,
+            mean: loads().sum::<f64>() / count as f64,
+            max: loads().fold(0.0, f64::max),
+        })
+    };
+    recorded.machine.buses.iter().map(|bus| bus.name.clone()).enumerate().filter_map(of_bus).collect()
 }
 
 impl GroupSummary {

@@ -4,10 +4,13 @@ use std::fmt::Write;
 
 use takt_rt::Rule;
 
-use super::{AxisCycle, GroupSummary, RecordingReport};
+use super::{AxisCycle, BusLoadSummary, GroupSummary, RecordingReport};
 use crate::telemetry::render::{self, Emphasis, cycle_latencies, line, missed_slots, wrap};
 use crate::telemetry::report::SetPointParts;
 use crate::telemetry::words;
+
+/// The numbers of events that are shown before the cause, and after it.
+const EVENTS: (usize, usize) = (24, 12);
 
 impl RecordingReport {
     /// The report as text of at most 100 columns. Paths are not broken and may be longer.
@@ -17,7 +20,12 @@ impl RecordingReport {
         let cycle_ms = self.cycle_ns as f64 * 1e-6;
         let begins = self.begins.as_ref().map_or_else(String::new, |begins| format!(" from {begins}"));
         let heading = emphasis.heading(&self.machine);
-        line(&mut text, &format!("{heading}  {kind} of {} cycles of {cycle_ms} ms{begins}", self.cycles));
+        let cycles = format!("{heading}  {kind} of {} cycles of {cycle_ms} ms{begins}", self.cycles);
+        line(&mut text, &cycles);
+        let (from_s, to_s) = self.span_s;
+        if from_s > 0.0 {
+            line(&mut text, &format!("from {from_s:.3} s to {to_s:.3} s of it"));
+        }
         for warning in &self.warnings {
             wrap(&mut text, &emphasis.bad("file"), 4, std::slice::from_ref(warning));
         }
@@ -36,14 +44,15 @@ impl RecordingReport {
             None => wrap(&mut text, "stop", 4, &["none".to_owned()]),
         }
         self.group_lines(&mut text, emphasis);
-        self.axis_cycles(&mut text, emphasis);
         self.event_table(&mut text, emphasis);
+        self.axis_table(&mut text, emphasis);
+        self.load_lines(&mut text, emphasis);
+        self.axis_cycles(&mut text, emphasis);
         line(&mut text, "");
         let cycle = [&self.wake_ns, &self.sync_ns, &self.compute_ns, &self.sent_ns];
         let groups = self.groups.iter().map(|group| (group.name.as_str(), group.callback_ns.as_ref()));
         cycle_latencies(&mut text, emphasis, cycle, self.callback_ns.as_ref(), groups);
         missed_slots(&mut text, emphasis, self.missed_slots, self.cycles);
-        self.axis_table(&mut text, emphasis);
         self.bus_table(&mut text, emphasis);
         text
     }
@@ -94,11 +103,27 @@ impl RecordingReport {
             line(text, "");
             line(text, &emphasis.heading(&format!("{:>8} {:>10}  event", "slot", "s")));
         }
-        for event in &self.events {
+        // Those around the cause, or the last ones.
+        let end = match &self.cause {
+            Some(cause) => self.events.partition_point(|event| event.slot <= cause.slot) + EVENTS.1,
+            None => self.events.len(),
+        };
+        let end = end.min(self.events.len());
+        let begin = end.saturating_sub(EVENTS.0 + EVENTS.1);
+        if begin > 0 {
+            line(text, &format!("{begin:>8} events before these (--html and --json have all)"));
+        }
+        for event in self.events.get(begin..end).unwrap_or_default() {
             let is_of_cause = self.cause.as_ref().is_some_and(|cause| cause.slot == event.slot);
             let row = format!("{:>8} {:>10.3}  {}", event.slot, event.at_s, event.text);
             let is_shown_above = is_of_cause && event.text.starts_with("stop: ");
             line(text, &if is_shown_above { emphasis.bad(&cut(&row)) } else { cut(&row) });
+        }
+        if end < self.events.len() {
+            line(
+                text,
+                &format!("{:>8} events after these (--html and --json have all)", self.events.len() - end),
+            );
         }
         if !self.emergencies.is_empty() {
             let lines: Vec<String> =
@@ -124,6 +149,18 @@ impl RecordingReport {
             let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(render::part);
             let name = render::shortened(&axis.name, 16);
             line(text, &format!("{name:<16}{error:>18}{velocity:>14}{acceleration:>14}{jerk:>12}"));
+        }
+    }
+
+    fn load_lines(&self, text: &mut String, emphasis: Emphasis) {
+        if !self.bus_loads.is_empty() {
+            let load = |bus: &BusLoadSummary| {
+                let name = render::shortened(&bus.name, 16);
+                format!("{name}: {:.1} % on average, {:.1} % at most", 100.0 * bus.mean, 100.0 * bus.max)
+            };
+            let lines: Vec<String> = self.bus_loads.iter().map(load).collect();
+            line(text, "");
+            wrap(text, &emphasis.heading("bus load"), 8, &lines);
         }
     }
 

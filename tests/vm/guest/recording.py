@@ -1,7 +1,8 @@
-"""Reads a recording of takt as far as takt writes the format (https://mcap.dev/spec, chunks without compression), so that
-nothing need be installed; tests/read_recording.py reads it with the format's own reader.
+"""Reads a recording of takt as far as takt writes the format (https://mcap.dev/spec, chunks that are compressed by zstd or not), so
+that nothing need be installed but the library that Debian's package manager itself uses; tests/read_recording.py reads it with the format's own reader.
 """
 
+import ctypes
 import mmap
 import struct
 
@@ -16,12 +17,24 @@ def records(data):
         at += 9 + length
 
 
+def decompressed(compression, packed, length):
+    assert compression == b"zstd", f"the chunk is compressed by {compression}"
+    zstd = ctypes.CDLL("libzstd.so.1")
+    zstd.ZSTD_decompress.restype = ctypes.c_size_t
+    zstd.ZSTD_decompress.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_size_t]
+    records = ctypes.create_string_buffer(length)
+    taken = zstd.ZSTD_decompress(records, length, bytes(packed), len(packed))
+    assert taken == length, f"the chunk has {taken} bytes in place of {length}"
+    return memoryview(records.raw)
+
+
 def unpacked(data):
     for code, body in records(data):
         if code == CHUNK:
+            length = struct.unpack_from("<Q", body, 16)[0]
             name_length = struct.unpack_from("<I", body, 28)[0]
-            assert name_length == 0, "the chunk is compressed"
-            yield from records(body[32 + 8 :])
+            compression, packed = bytes(body[32 : 32 + name_length]), body[32 + name_length + 8 :]
+            yield from records(packed if compression == b"" else decompressed(compression, packed, length))
         else:
             yield code, body
 

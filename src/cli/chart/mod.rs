@@ -1,0 +1,280 @@
+//! Curves over time as SVG: one panel below the other, limits as dashed lines, one instant marked.
+
+mod palette;
+mod ticks;
+
+use std::fmt::Write as _;
+
+pub use palette::{COLOURS, SHADED_WORDS};
+use palette::{FILE, PAGE, Palette};
+pub use ticks::ticks;
+
+/// The widths of a file, and of a chart on a page, where the letters are larger on a small screen.
+const FILE_WIDTH: f64 = 900.0;
+const PAGE_WIDTH: f64 = 640.0;
+const PANEL: f64 = 180.0;
+const LEFT: f64 = 80.0;
+const RIGHT_MARGIN: f64 = 20.0;
+const GAP: f64 = 40.0;
+const MARGIN: f64 = 8.0;
+/// The most values beside a panel.
+const VALUES: usize = 6;
+/// The room of a time below a panel.
+const TIME_ROOM: f64 = 85.0;
+/// The longest title, in characters.
+const TITLE_LETTERS: usize = 118;
+
+/// Panels over one time axis.
+#[derive(Debug, Default)]
+pub struct Chart {
+    /// The title above the panels; may be empty.
+    pub title: String,
+    /// The start and the end of the time axis, in seconds.
+    pub span_s: (f64, f64),
+    /// An instant that is marked in every panel.
+    pub mark_s: Option<f64>,
+    /// From top to bottom.
+    pub panels: Vec<Panel>,
+}
+
+/// Curves over one scale.
+#[derive(Debug, Default)]
+pub struct Panel {
+    /// The quantity with its unit.
+    pub name: String,
+    /// Names beside the heading, each with its colour.
+    pub legend: Vec<(String, &'static str)>,
+    /// The curves.
+    pub curves: Vec<Curve>,
+    /// Values that are drawn as dashed lines.
+    pub limits: Vec<(f64, &'static str)>,
+    /// Spans of time that are shaded, in seconds.
+    pub shaded: Vec<(f64, f64)>,
+}
+
+/// A curve.
+#[derive(Debug)]
+pub struct Curve {
+    /// Its colour.
+    pub colour: &'static str,
+    /// Times in seconds and values. Where a value is not finite, the curve has a gap.
+    pub points: Vec<(f64, f64)>,
+}
+
+impl Chart {
+    /// The chart as a file of its own.
+    pub fn draw(&self) -> String {
+        self.draw_as(FILE_WIDTH, &FILE)
+    }
+
+    /// The chart as a part of a page, whose style has the colours.
+    pub fn draw_on_page(&self) -> String {
+        self.draw_as(PAGE_WIDTH, &PAGE)
+    }
+
+    fn draw_as(&self, width: f64, palette: &Palette) -> String {
+        let top = if self.title.is_empty() { 0.0 } else { GAP };
+        let height = top + self.panels.len() as f64 * (PANEL + GAP) + GAP;
+        let mut svg = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
+             font-size=\"12\" fill=\"{}\">\n",
+            palette.words
+        );
+        // Writing to a string cannot fail.
+        if let Some(background) = palette.background {
+            let _ = writeln!(svg, "<rect width=\"{width}\" height=\"{height}\" fill=\"{background}\"/>");
+        }
+        if !self.title.is_empty() {
+            let mut title: String = self.title.chars().take(TITLE_LETTERS).collect();
+            if title.len() < self.title.len() {
+                title.push('…');
+            }
+            let _ = writeln!(svg, "<text x=\"20\" y=\"24\" font-size=\"14\">{}</text>", escaped(&title));
+        }
+        for (index, panel) in self.panels.iter().enumerate() {
+            let top = top + GAP * 0.75 + index as f64 * (PANEL + GAP);
+            Drawing { chart: self, panel, palette, top, right: width - RIGHT_MARGIN }.draw(&mut svg);
+        }
+        svg.push_str("</svg>\n");
+        svg
+    }
+}
+
+/// A panel at its place.
+struct Drawing<'a> {
+    chart: &'a Chart,
+    panel: &'a Panel,
+    palette: &'a Palette,
+    top: f64,
+    right: f64,
+}
+
+/// The values of a panel, from the lowest to the highest.
+#[derive(Clone, Copy)]
+struct Scale {
+    low: f64,
+    high: f64,
+    top: f64,
+}
+
+impl Scale {
+    /// A line at a limit must not lie on the frame.
+    fn y(&self, value: f64) -> f64 {
+        self.top + MARGIN + (PANEL - 2.0 * MARGIN) * (1.0 - (value - self.low) / (self.high - self.low))
+    }
+}
+
+impl Drawing<'_> {
+    fn x(&self, time_s: f64) -> f64 {
+        let (from, to) = self.chart.span_s;
+        LEFT + (self.right - LEFT) * if to > from { (time_s - from) / (to - from) } else { 0.0 }
+    }
+
+    fn scale(&self) -> Scale {
+        let limits = self.panel.limits.iter().map(|(limit, _)| *limit);
+        let points = self.panel.curves.iter().flat_map(|curve| curve.points.iter().map(|(_, value)| *value));
+        let values = points.chain(limits).filter(|value| value.is_finite());
+        let (low, high) = values
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        let (low, high) = if low <= high { (low, high) } else { (0.0, 0.0) };
+        // A value that does not change is in the middle.
+        let room = if low == 0.0 { 1.0 } else { low.abs() * 0.1 };
+        let (low, high) = if high - low > low.abs() * 1e-9 { (low, high) } else { (low - room, high + room) };
+        Scale { low, high, top: self.top }
+    }
+
+    fn draw(&self, svg: &mut String) {
+        let Self { panel, palette, top, right, .. } = self;
+        let (scale, bottom) = (self.scale(), top + PANEL);
+        for (from, to) in &panel.shaded {
+            // A single cycle is visible, too.
+            let (x, width) = (self.x(*from), (self.x(*to) - self.x(*from)).max(1.0));
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                svg,
+                "<rect x=\"{x:.2}\" y=\"{top}\" width=\"{width:.2}\" height=\"{PANEL}\" fill=\"{}\"/>",
+                palette.shade
+            );
+        }
+        self.draw_values(svg, scale);
+        self.draw_times(svg);
+        let _ = writeln!(
+            svg,
+            "<path d=\"M{LEFT} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"{}\"/>\
+             <text x=\"{LEFT}\" y=\"{}\">{}</text>",
+            palette.frame,
+            top - 6.0,
+            escaped(&panel.name),
+        );
+        self.draw_legend(svg);
+        if let Some(mark_s) = self.chart.mark_s {
+            let x = self.x(mark_s);
+            let _ = writeln!(svg, "<path d=\"M{x:.2} {top}V{bottom}\" stroke=\"{}\"/>", palette.mark);
+        }
+        for (limit, colour) in panel.limits.iter().filter(|(limit, _)| limit.is_finite()) {
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{LEFT} {:.2}H{right}\" stroke=\"{}\" stroke-dasharray=\"4 4\" opacity=\"0.5\"/>",
+                scale.y(*limit),
+                palette.of(colour)
+            );
+        }
+        panel.curves.iter().for_each(|curve| self.draw_curve(svg, curve, scale));
+    }
+
+    fn draw_values(&self, svg: &mut String, scale: Scale) {
+        for tick in ticks(scale.low, scale.high, VALUES) {
+            let (y, x) = (scale.y(tick.value), LEFT - 6.0);
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{LEFT} {y:.2}H{}\" stroke=\"{}\"/>\
+                 <text x=\"{x}\" y=\"{:.2}\" text-anchor=\"end\">{}</text>",
+                self.right,
+                self.palette.grid,
+                y + 4.0,
+                tick.label
+            );
+        }
+    }
+
+    fn draw_times(&self, svg: &mut String) {
+        let (bottom, (from, to)) = (self.top + PANEL, self.chart.span_s);
+        for tick in ticks(from, to, ((self.right - LEFT) / TIME_ROOM) as usize) {
+            let x = self.x(tick.value);
+            let _ = writeln!(
+                svg,
+                "<path d=\"M{x:.2} {}V{bottom}\" stroke=\"{}\"/>\
+                 <text x=\"{x:.2}\" y=\"{}\" text-anchor=\"middle\">{} s</text>",
+                self.top,
+                self.palette.grid,
+                bottom + 15.0,
+                tick.label
+            );
+        }
+    }
+
+    fn draw_curve(&self, svg: &mut String, Curve { colour, points }: &Curve, scale: Scale) {
+        let colour = self.palette.of(colour);
+        // Points without a value between them are one line.
+        let lines = points.split(|(_, value)| !value.is_finite()).filter(|line| !line.is_empty());
+        for line in lines {
+            let points: String = line.iter().fold(String::new(), |mut points, (time_s, value)| {
+                let _ = write!(points, "{:.1},{:.1} ", self.x(*time_s), scale.y(*value));
+                points
+            });
+            let _ = writeln!(
+                svg,
+                "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"/>",
+                points.trim_end()
+            );
+        }
+    }
+
+    /// The names at the right, so that the heading keeps its place.
+    fn draw_legend(&self, svg: &mut String) {
+        let names = self.panel.legend.iter().filter(|(name, _)| !name.is_empty());
+        let words: Vec<String> = names
+            .map(|(name, colour)| {
+                format!("<tspan fill=\"{}\">{}</tspan>", self.palette.of(colour), escaped(name))
+            })
+            .collect();
+        if !words.is_empty() {
+            let (x, y) = (self.right, self.top - 6.0);
+            let words = words.join("&#160;&#160; ");
+            let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"end\">{words}</text>");
+        }
+    }
+}
+
+/// Words as a part of a page or a drawing.
+pub fn escaped(words: &str) -> String {
+    words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_that_are_not_finite_and_panels_without_any_are_drawn_without_harm() {
+        let curve =
+            Curve { colour: COLOURS[0], points: vec![(0.0, 1.0), (0.5, f64::NAN), (1.0, f64::INFINITY)] };
+        let panel = Panel { name: "a < b".to_owned(), curves: vec![curve], ..Panel::default() };
+        let chart = Chart { span_s: (0.0, 1.0), panels: vec![panel, Panel::default()], ..Chart::default() };
+        let svg = chart.draw();
+        assert!(!svg.contains("NaN") && !svg.contains("inf") && svg.contains("a &lt; b"), "{svg}");
+    }
+
+    #[test]
+    fn a_curve_has_a_gap_where_a_value_is_missing_and_a_span_of_time_can_be_shaded() {
+        let values = [1.0, 2.0, f64::NAN, f64::NAN, 5.0, 6.0];
+        let points = (0..6).map(|at| (f64::from(at), values[at as usize])).collect();
+        let curves = vec![Curve { colour: COLOURS[0], points }];
+        let panel = Panel { curves, shaded: vec![(2.0, 3.0)], ..Panel::default() };
+        let svg = Chart { span_s: (0.0, 5.0), panels: vec![panel], ..Chart::default() }.draw();
+        let lines: Vec<&str> = svg.lines().filter(|line| line.starts_with("<polyline")).collect();
+        assert_eq!(lines.len(), 2, "{svg}");
+        assert!(lines.iter().all(|line| line.matches(',').count() == 2), "{svg}");
+        assert_eq!(svg.matches("fill=\"#ddd\"").count(), 1, "{svg}");
+    }
+}
