@@ -64,8 +64,8 @@
 //! ```text
 //! internals                           what the tests see beyond the public face
 //! cli                                 the program `takt`
+//! panel                               a running controller in the browser, and commissioning without one
 //! doctor jitter commission play replay  is the machine fit; one drive apart from any run; motion from a file; a run again
-//! panel                               a running controller in the browser
 //! error                               one error for a program that embeds takt
 //! serve                               a running controller, offered to other processes
 //! controller                          the engine of a configuration, its life, its ports, the handles

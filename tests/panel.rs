@@ -1,5 +1,8 @@
 //! The panel's server, as a browser, another site and a lost page meet it. The page itself is driven in `tests/panel/`.
 
+#[path = "panel/bench.rs"]
+mod bench;
+
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -289,6 +292,7 @@ fn every_file_of_the_page_is_there_and_may_load_nothing_from_elsewhere() {
         "/panel.js",
         "/connection.js",
         "/texts.js",
+        "/frame.js",
         "/units.js",
         "/axes.js",
         "/motion.js",
@@ -680,7 +684,7 @@ fn a_panel_of_another_process_commands_by_its_client() {
             }
         });
         shown.until("the lease of the other", |_| page.command(&jog(0, 0.2)).1["error"] == "lease");
-        assert_eq!(page.control("take_lease").0, 200);
+        assert_eq!(post(page.address, "/api/lease", &page.headers(), "").0, 200);
         is_other.store(false, Ordering::Relaxed);
     });
     hold_until(&shown, &mut page, 0.2, |state| state.axes[0].velocity_set > 0.19);

@@ -3,16 +3,27 @@
 use std::fs;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::Args;
 
-use crate::panel::{self, Listening, PanelOptions};
+use crate::commission::{Bus, TargetDrive};
+use crate::config::Interface;
+use crate::link::RealInterface;
+use crate::link::modbus_line::ModbusLine;
+use crate::link::ownership::Ownership;
+use crate::link::serial_line::SerialSettings;
+use crate::monitor::BusDecoder;
+use crate::panel::{self, BenchBus, BenchDrive, BenchLink, Listening, PanelOptions, Workplace};
 use crate::remote;
 
+use super::configuration;
+use super::drive::USUAL_LINE_RATE;
 use super::exit::Exit;
 use super::interruption;
+use super::monitor::bit_rate;
+use super::ownership;
 use super::usage_error::UsageError;
 
 /// How often it is looked whether the panel is to end.
@@ -51,11 +62,28 @@ pub fn greeting(address: SocketAddr) -> String {
     format!("the panel is at http://{address}/, until Ctrl-C")
 }
 
-/// Show and command a controller of another process (`takt run --serve NAME`) in the browser.
+/// Show and command a controller of another process in the browser, or commission drives without one
+///
+/// NAME shows the controller that `takt run --serve NAME` runs. CONFIG.toml, or --bus alone, opens the buses itself, where no
+/// controller runs: scan, information, motion of one drive at a time, monitor, free frames.
 #[derive(Args, Debug)]
 pub struct Arguments {
-    /// The name that the controller is served by
-    name: String,
+    /// The name that a controller is served by, or the configuration (TOML) of the drives to commission
+    #[arg(value_name = "NAME|CONFIG.toml", required_unless_present = "buses")]
+    what: Option<String>,
+    /// The interface whose drives are commissioned: can0, slcan:/dev/ttyACM0, serial:/dev/ttyUSB0; with a configuration
+    /// NAME=INTERFACE (may be given again)
+    #[arg(long = "bus", value_name = "INTERFACE")]
+    buses: Vec<String>,
+    /// The bit rate of an interface without a configuration
+    #[arg(long, value_name = "RATE", value_parser = bit_rate, default_value = "1 Mbit/s")]
+    bit_rate: u32,
+    /// The bit rate of the data phase of CAN FD, for an interface without a configuration
+    #[arg(long, value_name = "RATE", value_parser = bit_rate)]
+    data_bit_rate: Option<u32>,
+    /// Have another takt of this host that commands the buses stop in control first, and take them over
+    #[arg(long)]
+    take_over: bool,
     /// Where the panel listens: a host and a port, or a port on loopback
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1:8080", value_parser = panel::address)]
     address: SocketAddr,
@@ -65,28 +93,38 @@ pub struct Arguments {
 
 /// Shows it until Ctrl-C, or until the controller ends.
 pub fn run(arguments: &Arguments) -> Exit {
-    let interrupted = match interruption::watch() {
-        Ok(interrupted) => interrupted,
-        Err(error) => {
-            say!("takt: cannot watch for Ctrl-C: {error}");
-            return Exit::Stopped;
+    show(arguments).unwrap_or_else(|error| error.print(false))
+}
+
+fn show(arguments: &Arguments) -> Result<Exit, UsageError> {
+    let interrupted = interruption::watch().map_err(|error| format!("cannot watch for Ctrl-C: {error}"))?;
+    match arguments.what.as_deref() {
+        Some(name) if arguments.buses.is_empty() && !is_configuration(name) => {
+            show_controller(arguments, name, &interrupted)
         }
-    };
-    let client = match remote::connect(&arguments.name) {
-        Ok(client) => client,
-        Err(error) => return UsageError::from(error.to_string()).print(false),
-    };
-    let listening = match arguments.access.listen(arguments.address) {
-        Ok(listening) => listening,
-        Err(error) => return error.print(false),
-    };
+        config => commission(arguments, config.map(Path::new), &interrupted),
+    }
+}
+
+/// A name of a controller has no dot and no slash.
+fn is_configuration(what: &str) -> bool {
+    what.contains(['.', '/'])
+}
+
+fn show_controller(
+    arguments: &Arguments,
+    name: &str,
+    interrupted: &AtomicBool,
+) -> Result<Exit, UsageError> {
+    let client = remote::connect(name).map_err(|error| error.to_string())?;
+    let listening = arguments.access.listen(arguments.address)?;
     let lease = client.clone();
     let take_lease: panel::TakeLease = Box::new(move || lease.take_over());
     let panel = match listening.show(client.clone(), Some(take_lease)) {
         Ok(panel) => panel,
         Err(error) => {
             say!("takt: {error}");
-            return Exit::Stopped;
+            return Ok(Exit::Stopped);
         }
     };
     say!("takt: {}", greeting(panel.address()));
@@ -94,8 +132,152 @@ pub fn run(arguments: &Arguments) -> Exit {
         std::thread::sleep(LOOK);
         if client.has_ended() {
             say!("takt: the controller has ended");
-            return Exit::Done;
+            return Ok(Exit::Done);
         }
     }
-    Exit::Interrupted
+    Ok(Exit::Interrupted)
+}
+
+fn commission(
+    arguments: &Arguments,
+    config: Option<&Path>,
+    interrupted: &AtomicBool,
+) -> Result<Exit, UsageError> {
+    // Where nobody may look, nothing is opened.
+    let listening = arguments.access.listen(arguments.address)?;
+    let place = match config {
+        Some(path) => of_configuration(arguments, path)?,
+        None => of_interfaces(arguments)?,
+    };
+    let panel = match listening.commission(place) {
+        Ok(panel) => panel,
+        Err(error) => {
+            say!("takt: {error}");
+            return Ok(Exit::Stopped);
+        }
+    };
+    say!("takt: {}", greeting(panel.address()));
+    while !interrupted.load(Ordering::Relaxed) {
+        std::thread::sleep(LOOK);
+        if panel.is_taken_over() {
+            say!("takt: another process takes the buses over");
+            break;
+        }
+    }
+    Ok(Exit::Interrupted)
+}
+
+/// A bus before it is opened.
+enum Place {
+    Bus(Bus),
+    Line { device: String, bit_rate: u32 },
+}
+
+fn of_configuration(arguments: &Arguments, path: &Path) -> Result<Workplace, UsageError> {
+    let mut config = configuration::load(path, &[])?;
+    for bus in &arguments.buses {
+        let only = match config.buses.as_slice() {
+            [only] => Some(only.name.clone()),
+            _ => None,
+        };
+        let (name, interface) = match (bus.split_once('='), &only) {
+            (Some(named), _) => named,
+            (None, Some(only)) => (only.as_str(), bus.as_str()),
+            (None, None) => return Err(format!("--bus {bus}: say which bus it is, as NAME={bus}").into()),
+        };
+        config.override_interface(name, interface).map_err(|error| format!("--bus {bus}: {error}"))?;
+    }
+    let mut places = vec![];
+    let mut numbers = vec![None; config.buses.len()];
+    for (number, bus) in config.buses.iter().enumerate() {
+        let place = match &bus.interface {
+            Interface::Serial(line) => Place::Line { device: line.device.clone(), bit_rate: bus.bit_rate },
+            _ if config.is_serial_line(number) => {
+                say!("takt: note: the line {} is simulated inside a controller alone: it is left out", bus.name);
+                continue;
+            }
+            _ => Place::Bus(Bus::Configured { config: Box::new(config.clone()), bus: number }),
+        };
+        if let Some(own) = numbers.get_mut(number) {
+            *own = Some(places.len());
+        }
+        places.push((bus.name.clone(), bus.interface.to_string(), place));
+    }
+    let mut drives = vec![];
+    for axis in &config.axes {
+        let Some(bus) = numbers.get(axis.bus).copied().flatten() else { continue };
+        let target = TargetDrive::of(axis)
+            .map_err(|error| format!("axis {}: its units cannot be converted ({error:?})", axis.name))?;
+        drives.push(BenchDrive { bus, target: Some(target) });
+    }
+    open(arguments, config.name.clone(), places, drives)
+}
+
+fn of_interfaces(arguments: &Arguments) -> Result<Workplace, UsageError> {
+    let mut places = vec![];
+    for bus in &arguments.buses {
+        let parsed: Interface =
+            bus.parse().map_err(|error: <Interface as std::str::FromStr>::Err| format!("--bus {bus}: {error}: {}", error.help()))?;
+        let place = match RealInterface::of(&parsed) {
+            Some(RealInterface::Serial(line)) => {
+                Place::Line { device: line.device, bit_rate: line.bit_rate.unwrap_or(USUAL_LINE_RATE) }
+            }
+            Some(interface) => Place::Bus(Bus::Interface {
+                interface,
+                bit_rate: arguments.bit_rate,
+                data_bit_rate: arguments.data_bit_rate,
+            }),
+            None => {
+                return Err("--bus sim: a simulated drive needs a configuration that says what it is".into());
+            }
+        };
+        places.push((bus.clone(), bus.clone(), place));
+    }
+    open(arguments, arguments.buses.join(", "), places, vec![])
+}
+
+/// Owns the buses, and opens them.
+fn open(
+    arguments: &Arguments,
+    name: String,
+    places: Vec<(String, String, Place)>,
+    drives: Vec<BenchDrive>,
+) -> Result<Workplace, UsageError> {
+    let claims = places.iter().filter_map(|(_, _, place)| match place {
+        Place::Bus(bus) => bus.claim(None),
+        Place::Line { .. } => None,
+    });
+    let ownership = Ownership::claim(claims.collect(), ownership::if_owned(arguments.take_over))
+        .map_err(|error| ownership::usage_error(&error))?;
+    let mut buses = vec![];
+    for (name, interface, place) in places {
+        let (link, decoder, has_fd) = match place {
+            Place::Bus(bus) => {
+                let port = bus.open().map_err(|error| error.to_string())?;
+                (BenchLink::Bus(Box::new(port)), bus.decoder(), bus.has_fd())
+            }
+            Place::Line { device, bit_rate } => {
+                let line = ModbusLine::open(&device, &SerialSettings::new(bit_rate))
+                    .map_err(|error| format!("{name}: {error}"))?;
+                (BenchLink::Line(line, bit_rate), BusDecoder::with_drives(&[]), false)
+            }
+        };
+        buses.push(BenchBus { name, interface, link, decoder, has_fd });
+    }
+    Ok(Workplace { name, buses, drives, ownership })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_configuration_is_told_from_the_name_of_a_controller() {
+        for config in ["arm.toml", "configs/arm", "./arm", "/etc/takt/arm.toml"] {
+            assert!(is_configuration(config), "{config}");
+        }
+        for name in ["arm", "left-arm", "arm_2"] {
+            assert!(!is_configuration(name), "{name}");
+        }
+    }
 }

@@ -10,10 +10,13 @@
 //!
 //! Devices without a node ID are set up by [`layer_settings`].
 
+mod bus;
 pub mod bus_scan;
 pub mod bus_session;
 pub mod layer_settings;
 pub mod line_session;
+
+pub(crate) use bus::Bus;
 
 pub(crate) use crate::family::commission::{
     CommandValue, DriveTask, Failure, GainFactors, MotionProfile, MoveKind, ProcedureError, PulseQuantity,

@@ -176,6 +176,9 @@ pub enum CommandRefusal {
     /// Too many commands wait.
     #[error("too many commands wait for the controller")]
     Busy,
+    /// Something is done with a drive already.
+    #[error("something is done with a drive already: wait for its end, or end it")]
+    BusyWithDrive,
     /// The stream of points is refused.
     #[error(transparent)]
     Stream(#[from] crate::command::StreamError),
@@ -190,6 +193,7 @@ impl CommandRefusal {
             Self::NothingToRenew => "nothing_to_renew",
             Self::Discarded => "discarded",
             Self::Busy => "busy",
+            Self::BusyWithDrive => "busy_with_drive",
             _ => "refused",
         }
     }

@@ -13,7 +13,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{Notify, Semaphore};
 use tokio::time::sleep;
 
-use super::server::{self, Server};
+use super::gate::{Visited, show_states};
 
 /// Connections that may be open at the same time: a browser opens six for a page at most.
 const CONNECTIONS_AT_MOST: usize = 320;
@@ -33,17 +33,17 @@ pub struct Connection {
     pub closer: Arc<Notify>,
 }
 
-/// Serves pages until the server ends.
-pub async fn serve(server: Arc<Server>, listener: TcpListener) {
+/// Serves pages until the panel ends.
+pub async fn serve(panel: &impl Visited, routes: axum::Router, listener: TcpListener) {
     tokio::select! {
-        () = accept(&server, listener) => {}
-        () = server.show_states() => sleep(CLOSING_TIME).await,
+        () = accept(routes, listener) => {}
+        () = show_states(panel) => sleep(CLOSING_TIME).await,
     }
 }
 
-async fn accept(server: &Arc<Server>, listener: TcpListener) {
+async fn accept(routes: axum::Router, listener: TcpListener) {
     let room = Arc::new(Semaphore::new(CONNECTIONS_AT_MOST));
-    let routes = TowerToHyperService::new(server::routes(Arc::clone(server)));
+    let routes = TowerToHyperService::new(routes);
     loop {
         let Ok((stream, _)) = listener.accept().await else {
             // Too many files are open, or the connection has gone already.

@@ -1,4 +1,4 @@
-//! The panel: a page in the browser that shows and commands a running controller.
+//! The panel: a page in the browser that shows and commands a running controller, or commissions drives without one.
 //!
 //! ```text
 //! takt-panel          one thread: connections, states twenty times a second to every page, stops
@@ -11,11 +11,14 @@
 //! [`RunningController`]. A stop is taken on the first thread and waits for nobody.
 //!
 //! In the order to read: `access` (who may ask), `pages` (who is there, who commands), `command` and `motions` (what is asked and how it
-//! ends), `view` (what is shown), `server` (the routes), `connections` (sockets and their bounds).
+//! ends), `view` (what is shown), `gate` (what both kinds of panel share), `server` (the routes), `connections` (sockets and their bounds).
+//! Commissioning is `bench`: one thread more, `takt-bench`, which owns the buses.
 
 mod access;
+mod bench;
 mod command;
 mod connections;
+mod gate;
 mod motions;
 mod page;
 mod pages;
@@ -28,11 +31,16 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
+use axum::Router;
+
 use crate::command::{CommandError, RunningController};
 use access::{Access, AccessError};
+use bench::{Bench, Worker};
+use gate::Visited;
 use server::Server;
 
 pub use access::TOKEN_AT_LEAST;
+pub use bench::{BenchBus, BenchDrive, BenchLink, Workplace};
 pub use motions::HELD_FOR;
 pub use pages::{PAGES_AT_MOST, PRESENT_FOR};
 
@@ -141,49 +149,89 @@ impl Listening {
         take_lease: Option<TakeLease>,
     ) -> Result<Panel, PanelError> {
         let server = Arc::new(Server::new(Arc::new(controller), self.access, take_lease));
-        let mut panel = Panel { server, address: self.address, threads: vec![] };
-        panel.start(self.listener).map_err(PanelError::Thread)?;
-        Ok(panel)
+        let mut threads = Threads::new(Arc::<Server>::clone(&server), self.address);
+        let routes = server::routes(&server);
+        let commands = server.commands();
+        let start = || {
+            threads.serve(Arc::clone(&server), routes, self.listener)?;
+            let own = Arc::clone(&server);
+            threads.spawn("takt-panel-event", move || own.collect_events())?;
+            let own = Arc::clone(&server);
+            threads.spawn("takt-panel-command", move || own.carry_out(&commands))?;
+            threads.spawn("takt-panel-motion", move || server.lead_motions())
+        };
+        start().map_err(PanelError::Thread)?;
+        Ok(Panel { threads, is_taken_over: Box::new(|| false) })
+    }
+
+    /// Commissions drives on buses without a controller from now on.
+    ///
+    /// # Errors
+    /// [`PanelError::Thread`].
+    pub fn commission(self, place: Workplace) -> Result<Panel, PanelError> {
+        let bench = Arc::new(Bench::new(self.access, place.told()));
+        let mut threads = Threads::new(Arc::<Bench>::clone(&bench), self.address);
+        let worker = Worker::new(Arc::clone(&bench), place);
+        let routes = bench::routes(&bench);
+        let start = || {
+            threads.serve(Arc::clone(&bench), routes, self.listener)?;
+            threads.spawn("takt-bench", move || worker.run())
+        };
+        start().map_err(PanelError::Thread)?;
+        Ok(Panel { threads, is_taken_over: Box::new(move || bench.is_taken_over()) })
     }
 }
 
-/// A panel that shows a controller as long as it lives. When it is dropped, what its pages have set in motion comes to rest.
+/// A panel that is open as long as it lives. When it is dropped, what its pages have set in motion comes to rest.
 pub struct Panel {
-    server: Arc<Server>,
-    address: SocketAddr,
-    threads: Vec<JoinHandle<()>>,
+    threads: Threads,
+    is_taken_over: Box<dyn Fn() -> bool + Send + Sync>,
 }
 
 impl Panel {
     /// Where it listens.
     pub const fn address(&self) -> SocketAddr {
-        self.address
+        self.threads.address
     }
 
-    fn start(&mut self, listener: TcpListener) -> io::Result<()> {
+    /// Whether it has ended because another process takes the buses of commissioning over.
+    pub fn is_taken_over(&self) -> bool {
+        (self.is_taken_over)()
+    }
+}
+
+/// The threads of a panel. They end when this is dropped.
+struct Threads {
+    panel: Arc<dyn Visited>,
+    address: SocketAddr,
+    running: Vec<JoinHandle<()>>,
+}
+
+impl Threads {
+    fn new(panel: Arc<dyn Visited>, address: SocketAddr) -> Self {
+        Self { panel, address, running: vec![] }
+    }
+
+    /// Serves pages on a thread of its own.
+    fn serve<P: Visited>(&mut self, panel: Arc<P>, routes: Router, listener: TcpListener) -> io::Result<()> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
         let listener = {
             let _guard = runtime.enter();
             tokio::net::TcpListener::from_std(listener)?
         };
-        let commands = self.server.commands();
-        self.spawn("takt-panel", move |server| runtime.block_on(connections::serve(server, listener)))?;
-        self.spawn("takt-panel-event", |server| server.collect_events())?;
-        self.spawn("takt-panel-command", move |server| server.carry_out(&commands))?;
-        self.spawn("takt-panel-motion", |server| server.lead_motions())
+        self.spawn("takt-panel", move || runtime.block_on(connections::serve(&*panel, routes, listener)))
     }
 
-    fn spawn(&mut self, name: &str, run: impl FnOnce(Arc<Server>) + Send + 'static) -> io::Result<()> {
-        let server = Arc::clone(&self.server);
-        self.threads.push(thread::Builder::new().name(name.to_owned()).spawn(move || run(server))?);
+    fn spawn(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<()> {
+        self.running.push(thread::Builder::new().name(name.to_owned()).spawn(run)?);
         Ok(())
     }
 }
 
-impl Drop for Panel {
+impl Drop for Threads {
     fn drop(&mut self) {
-        self.server.end();
-        for thread in self.threads.drain(..) {
+        self.panel.end();
+        for thread in self.running.drain(..) {
             // A thread that has panicked has told so.
             let _ = thread.join();
         }

@@ -16,19 +16,38 @@ macro_rules! file {
     };
 }
 
-/// All of them.
-pub const FILES: [File; 10] = [
-    file!("/", "index.html", "text/html; charset=utf-8"),
+/// What the pages of a running controller and of commissioning share.
+const SHARED: [File; 6] = [
     file!("/panel.css", "panel.css", "text/css; charset=utf-8"),
-    file!("/panel.js", "panel.js", "text/javascript; charset=utf-8"),
     file!("/connection.js", "connection.js", "text/javascript; charset=utf-8"),
     file!("/texts.js", "texts.js", "text/javascript; charset=utf-8"),
+    file!("/frame.js", "frame.js", "text/javascript; charset=utf-8"),
     file!("/units.js", "units.js", "text/javascript; charset=utf-8"),
+    file!("/icon.svg", "icon.svg", "image/svg+xml"),
+];
+const CONTROLLER: [File; 5] = [
+    file!("/", "index.html", "text/html; charset=utf-8"),
+    file!("/panel.js", "panel.js", "text/javascript; charset=utf-8"),
     file!("/axes.js", "axes.js", "text/javascript; charset=utf-8"),
     file!("/motion.js", "motion.js", "text/javascript; charset=utf-8"),
-    file!("/icon.svg", "icon.svg", "image/svg+xml"),
     file!("/plots.js", "plots.js", "text/javascript; charset=utf-8"),
 ];
+const BENCH: [File; 4] = [
+    file!("/", "bench.html", "text/html; charset=utf-8"),
+    file!("/bench.js", "bench.js", "text/javascript; charset=utf-8"),
+    file!("/tasks.js", "tasks.js", "text/javascript; charset=utf-8"),
+    file!("/monitor.js", "monitor.js", "text/javascript; charset=utf-8"),
+];
+
+/// The page of a running controller.
+pub fn of_controller() -> Vec<&'static File> {
+    SHARED.iter().chain(&CONTROLLER).collect()
+}
+
+/// The page of commissioning.
+pub fn of_bench() -> Vec<&'static File> {
+    SHARED.iter().chain(&BENCH).collect()
+}
 
 #[cfg(test)]
 mod tests {
@@ -40,7 +59,11 @@ mod tests {
     use crate::telemetry::words;
 
     fn file(path: &str) -> &'static str {
-        FILES.iter().find(|file| file.path == path).unwrap().text
+        text_of(of_controller(), path)
+    }
+
+    fn text_of(files: Vec<&'static File>, path: &str) -> &'static str {
+        files.into_iter().find(|file| file.path == path).unwrap().text
     }
 
     /// The rows of the table: a key, and its text in English and in Chinese.
@@ -76,14 +99,19 @@ mod tests {
     fn what_the_page_shows_has_a_text() {
         let texts = texts();
         let mut wanted: Vec<String> = vec![];
-        for attribute in ["data-text=\"", "data-label=\""] {
-            let found = file("/").split(attribute).skip(1).filter_map(|rest| rest.split_once('"'));
+        let pages = [file("/"), text_of(of_bench(), "/")];
+        for (page, attribute) in
+            pages.into_iter().flat_map(|page| ["data-text=\"", "data-label=\""].map(|attribute| (page, attribute)))
+        {
+            let found = page.split(attribute).skip(1).filter_map(|rest| rest.split_once('"'));
             wanted.extend(found.map(|(key, _)| key.to_owned()));
         }
-        for path in ["/panel.js", "/axes.js", "/motion.js", "/plots.js"] {
-            let calls = file(path)
+        let scripts = ["/panel.js", "/axes.js", "/motion.js", "/plots.js", "/frame.js"].map(file);
+        let of_bench = ["/bench.js", "/tasks.js", "/monitor.js"].map(|path| text_of(of_bench(), path));
+        for script in scripts.into_iter().chain(of_bench) {
+            let calls = script
                 .split(" text(\"")
-                .chain(file(path).split("(text(\""))
+                .chain(script.split("(text(\""))
                 .filter_map(|rest| rest.split_once('"'));
             wanted.extend(
                 calls

@@ -296,14 +296,19 @@ fn axis_view(number: u8, axis: &takt_rt::AxisSnapshot, state: &Snapshot, machine
     }
 }
 
+/// The state of a bus as pages know it.
+pub const fn bus_state(state: BusState) -> &'static str {
+    match state {
+        BusState::ErrorActive => "error_active",
+        BusState::ErrorPassive => "error_passive",
+        BusState::BusOff => "bus_off",
+        BusState::Down => "down",
+    }
+}
+
 fn bus_view(bus: &BusHealth, load_percent: Option<f64>) -> BusView {
     BusView {
-        state: match bus.state {
-            BusState::ErrorActive => "error_active",
-            BusState::ErrorPassive => "error_passive",
-            BusState::BusOff => "bus_off",
-            BusState::Down => "down",
-        },
+        state: bus_state(bus.state),
         load_percent: load_percent.map(|percent| (percent * 10.0).round() / 10.0),
         tx_frames: bus.tx_frames,
         rx_frames: bus.rx_frames,
@@ -346,6 +351,11 @@ impl EventView {
         Self { number, time_ms: time_ms(), level, words: words::event(event, machine) }
     }
 
+    /// What the panel itself has to say.
+    pub fn said(number: u64, level: &'static str, words: String) -> Self {
+        Self { number, time_ms: time_ms(), level, words }
+    }
+
     /// Of events that came faster than they were read.
     pub fn missed(number: u64, count: u64) -> Self {
         let words = format!("{count} events were missed: they came too fast");
@@ -359,7 +369,7 @@ fn time_ms() -> u64 {
 }
 
 /// To a millionth: a page shows less.
-fn rounded(value: f64) -> f64 {
+pub fn rounded(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
 }
 

@@ -13,7 +13,7 @@ const [takt, folder] = process.argv.slice(2);
 const LONG = 30_000;
 const LAUNCH = {
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+  args: ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
 };
 
 const FAULT = `
@@ -26,8 +26,10 @@ at = "300 ms"
 `;
 
 // A simulated arm with its panel; resolves when the page can be opened.
-function arm(place, ...options) {
-  const process_ = spawn(takt, ["run", path.join(place, "arm.toml"), "--panel", "127.0.0.1:0", ...options], { stdio: ["ignore", "pipe", "pipe"] });
+const arm = (place, ...options) => start("run", path.join(place, "arm.toml"), "--panel", "127.0.0.1:0", ...options);
+
+function start(...command) {
+  const process_ = spawn(takt, command, { stdio: ["ignore", "pipe", "pipe"] });
   return new Promise((resolve, reject) => {
     let said = "";
     process_.stderr.on("data", (data) => {
@@ -49,7 +51,7 @@ class Panel {
     this.page = page;
   }
 
-  static async open(browser, address, options = {}) {
+  static async open(browser, address, { rows = "#axes .axis", ...options } = {}) {
     const context = await browser.newContext({ viewport: { width: 1440, height: 1000 }, locale: "en-US", ...options });
     const page = await context.newPage();
     const problems = [];
@@ -58,7 +60,7 @@ class Panel {
     page.on("request", (request) => request.url().startsWith(address) || problems.push(`asks elsewhere: ${request.url()}`));
     await page.goto(address);
     await page.locator("#link.live").waitFor({ timeout: LONG });
-    await page.locator("#axes .axis").first().waitFor({ timeout: LONG });
+    await page.locator(rows).first().waitFor({ timeout: LONG });
     const panel = new Panel(page);
     panel.problems = problems;
     return panel;
@@ -340,6 +342,113 @@ const steps = {
     await panel.page.keyboard.press("Escape");
     await panel.page.locator("#said", { hasText: "could NOT be sent" }).waitFor({ timeout: LONG });
     await panel.page.context().close();
+  },
+
+  async "drives are commissioned without a controller, in both languages"({ browser }) {
+    const config = path.join(__dirname, "../../configs/single-erob.toml");
+    const bench = await start("panel", config, "--address", "127.0.0.1:0");
+    for (const [name, options] of [
+      ["bench-desk-light", { acceptDownloads: true }],
+      ["bench-phone-dark-chinese", { locale: "zh-CN", colorScheme: "dark", viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true }],
+      ["bench-desk-dark", { colorScheme: "dark" }],
+    ]) {
+      const panel = await Panel.open(browser, bench.address, { ...options, rows: "#drives .axis" });
+      const page = panel.page;
+      const isDone = (words) => page.locator("#result h3.done", { hasText: words }).waitFor({ timeout: LONG });
+      const isChinese = options.locale === "zh-CN";
+      const words = (english, chinese) => (isChinese ? chinese : english);
+      assert.ok(await page.locator("#enable").isDisabled(), "nothing is commanded without command");
+      await panel.take();
+
+      await page.locator("button.scan").click();
+      await page.locator("#drives .facts", { hasText: "CANopen SDO" }).waitFor({ timeout: LONG });
+      await page.locator("#enable:enabled").waitFor({ timeout: LONG });
+      await page.locator("#info").click();
+      await isDone(words("information", "信息"));
+      assert.ok((await page.locator("#result .report div").count()) > 5);
+      await page.locator("#cycle").fill("2000");
+      await page.locator("#cycle-write").click();
+      await isDone(words("communication cycle", "通信周期"));
+
+      await page.locator("#watch:enabled").click();
+      await page.locator("#reading .position dd").waitFor({ timeout: LONG });
+      const at = async () => degrees(await page.locator("#reading .position dd").textContent());
+      const isAt = async (wanted) => {
+        const begun = Date.now();
+        while (Math.abs((await at()) - wanted) > 0.3) {
+          assert.ok(Date.now() - begun < LONG, `at ${await at()}, not at ${wanted}`);
+          await page.waitForTimeout(50);
+        }
+      };
+      await page.locator("#enable:enabled").click();
+      await page.locator("#drives .torque", { hasText: words("torque on", "已上力") }).waitFor({ timeout: LONG });
+      await panel.tab("absolute");
+      for (const target of ["10", "0"]) {
+        await page.locator("#kind .primary:enabled").waitFor({ timeout: LONG });
+        await page.fill("#field-target", target);
+        await page.fill("#field-speed", "60");
+        await page.fill("#field-acceleration", "300");
+        await page.locator("#kind .primary").click();
+        await isAt(Number(target));
+      }
+      await panel.tab("relative");
+      await page.fill("#field-distance", "2,5");
+      await page.locator("#kind button:enabled", { hasText: words("Forwards", "前进") }).click();
+      await isAt(2.5);
+      await looksRight(panel, name);
+
+      // A frame is not sent while the drive has torque.
+      await page.locator("#send:enabled").click();
+      await page.locator("#said", { hasText: "has torque" }).waitFor({ timeout: LONG });
+      await page.locator("#disable:enabled").click();
+      await isDone(words("disable", "去使能"));
+      await page.locator("#drives .torque").waitFor({ state: "hidden", timeout: LONG });
+
+      // What is held ends when it is let go.
+      await panel.tab("velocity");
+      await page.fill("#field-velocity", "20");
+      const from = await at();
+      await page.locator("#jog-plus:enabled").waitFor({ timeout: LONG });
+      for (let press = 0; press < 20 && (await at()) < from + 1; press += 1) {
+        await page.locator("#jog-plus:enabled").focus();
+        await page.keyboard.down("Enter");
+        for (let look = 0; look < 60 && (await page.locator("#jog-plus.held").count()) && (await at()) < from + 1; look += 1) await page.waitForTimeout(50);
+        await page.keyboard.up("Enter");
+        await page.locator("#jog-plus:enabled").waitFor({ timeout: LONG });
+      }
+      assert.ok((await at()) > from + 1, `from ${from} to ${await at()}`);
+      await page.locator("#drives .torque").waitFor({ state: "hidden", timeout: LONG });
+
+      // The stop is there in mid-motion, by key.
+      await panel.tab("continuous");
+      await page.locator("#kind button:enabled", { hasText: words("Backwards", "后退") }).click();
+      await page.locator("#running", { hasText: words("continuous motion", "连续运动") }).waitFor({ timeout: LONG });
+      await page.keyboard.press("Escape");
+      await page.locator("#result h3.interrupted").waitFor({ timeout: LONG });
+      await page.locator("#drives .torque").waitFor({ state: "hidden", timeout: LONG });
+
+      await page.fill("#monitor-filter", "SDO");
+      assert.ok((await page.locator("#frames li").count()) > 3);
+      await page.locator("#monitor-pause").click();
+      if (!isChinese) {
+        const [download] = await Promise.all([page.waitForEvent("download"), page.locator("#monitor-export").click()]);
+        assert.match(fs.readFileSync(await download.path(), "utf8"), /^\(\d+\.\d{6}\) \S+ [0-9A-F]{3}#/);
+      }
+      await page.locator("#monitor-clear").click();
+      assert.equal(await page.locator("#frames li").count(), 0);
+      await page.fill("#send-frame", "601#4000100000000000");
+      await page.locator("#send:enabled").click();
+      await page.locator("#monitor-pause").click();
+      await page.locator("#frames li", { hasText: "601#4000100000000000" }).first().waitFor({ timeout: LONG });
+      for (const tab of ["reciprocating", "torque", "home"]) {
+        await panel.tab(tab);
+        assert.deepEqual(await page.evaluate(nameless), [], `${name} ${tab}`);
+      }
+      await panel.close();
+    }
+    bench.process.removeAllListeners("exit");
+    bench.process.kill("SIGINT");
+    assert.equal(await ended(bench.process), 130, bench.said());
   },
 
   async "twenty pages are open, and a stop of the last one is taken"({ browser, address }) {

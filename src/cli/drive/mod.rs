@@ -19,6 +19,8 @@ use super::exit::Exit;
 use super::ownership::if_owned;
 use target::Place;
 
+pub use target::USUAL_LINE_RATE;
+
 /// Commission one drive: inspect it, move it, set it up
 ///
 /// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only

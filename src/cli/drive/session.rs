@@ -3,13 +3,11 @@
 use std::cell::Cell;
 use std::sync::atomic::Ordering;
 
-use crate::commission::{DriveTask, Failure, ProcedureError, Report, TargetDrive, Task, bus_session};
+use crate::commission::{Bus, DriveTask, Failure, ProcedureError, Report, TargetDrive, Task, bus_session};
 use crate::config::Interface;
 use crate::controller::VirtualClock;
-use crate::controller::port::{Port, open_configured};
-use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
-use crate::link::{InterfaceSettings, OpenError, SocketCanOptions, open_interface};
-use crate::sim::SimulatedBus;
+use crate::controller::port::Port;
+use crate::link::ownership::{IfOwned, Ownership};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, BusState};
 
@@ -19,10 +17,6 @@ use super::super::ownership;
 use super::super::usage_error::UsageError;
 use super::Options;
 use super::output::Output;
-use super::target::Bus;
-
-/// The time in milliseconds after which the kernel restarts a controller that is bus-off.
-const RESTART_MS: u32 = 100;
 
 /// Runs a task on a drive. The error is the end of the program: there was no bus to run it on.
 pub fn run(
@@ -42,12 +36,12 @@ pub fn run(
     };
     output.describe_frames(words);
     // Reading needs it, too: a drive has room for the SDO requests of one master, and a silent one is sent an NMT command.
-    let claim = claim(bus, target.node);
+    let claim = bus.claim(Some(target.node));
     let mut ownership = match Ownership::claim(claim.into_iter().collect(), if_owned) {
         Ok(ownership) => ownership,
         Err(error) => return Err(ownership::usage_error(&error).print(options.json)),
     };
-    let mut port = match open(bus) {
+    let mut port = match bus.open() {
         Ok(port) => port,
         Err(error) => return Err(UsageError::from(error.to_string()).print(options.json)),
     };
@@ -105,46 +99,4 @@ fn not_carried(bus: &Bus, task: &Task) -> Option<Failure> {
 fn is_unacknowledged(port: &mut Port) -> bool {
     let health = port.health();
     health.tx_frames == 0 || health.state != BusState::ErrorActive
-}
-
-fn claim(bus: &Bus, node: u8) -> Option<BusClaim> {
-    match bus {
-        Bus::Configured { config, bus } => BusClaim::of(config, *bus),
-        Bus::Interface { interface, bit_rate } => Some(BusClaim {
-            bus: interface.to_string(),
-            interface: interface.clone(),
-            settings: settings(*bit_rate),
-            traffic: MasterTraffic::without_configuration(Some(node)),
-        }),
-    }
-}
-
-const fn settings(bit_rate: u32) -> InterfaceSettings {
-    InterfaceSettings { bit_rate, data_bit_rate: None, restart_ms: RESTART_MS }
-}
-
-/// Opens the port without filters: a scan has to see all nodes.
-fn open(bus: &Bus) -> Result<Port, OpenError> {
-    match bus {
-        Bus::Configured { config, bus } => {
-            let settings = config.buses.get(*bus);
-            let socket = SocketCanOptions {
-                data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
-                ..of_bit_rate(settings.map(|bus| bus.bit_rate))
-            };
-            Ok(match open_configured(config, *bus, &socket)? {
-                Some(port) => port.into(),
-                None => Port::Simulated(Box::new(SimulatedBus::new(config, *bus))),
-            })
-        }
-        Bus::Interface { interface, bit_rate } => {
-            let (name, options) = (interface.to_string(), of_bit_rate(Some(*bit_rate)));
-            open_interface(&name, interface, &settings(*bit_rate), &options).map(Port::from)
-        }
-    }
-}
-
-fn of_bit_rate(bit_rate: Option<u32>) -> SocketCanOptions {
-    let usual = SocketCanOptions::default();
-    SocketCanOptions { bit_rate: bit_rate.unwrap_or(usual.bit_rate), ..usual }
 }

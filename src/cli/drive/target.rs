@@ -6,8 +6,8 @@ use std::str::FromStr;
 
 use clap::Args;
 
-use crate::commission::TargetDrive;
-use crate::config::{Config, DriveFamily, Interface, Quantity, SerialDevice};
+use crate::commission::{Bus, TargetDrive};
+use crate::config::{DriveFamily, Interface, Quantity, SerialDevice};
 use crate::family::cia402::{self, Device};
 use crate::family::{self, Family};
 use crate::link::RealInterface;
@@ -66,7 +66,7 @@ fn bit_rate(text: &str) -> Result<u32, String> {
 /// How a serial line begins.
 const SERIAL: &str = "serial:";
 /// The bit rate of a serial line that says none.
-const USUAL_LINE_RATE: u32 = 115_200;
+pub const USUAL_LINE_RATE: u32 = 115_200;
 
 /// What the drive is connected to.
 pub enum Place {
@@ -99,24 +99,6 @@ impl From<SerialDevice> for Line {
     fn from(line: SerialDevice) -> Self {
         Self { device: line.device, bit_rate: line.bit_rate.unwrap_or(USUAL_LINE_RATE) }
     }
-}
-
-/// The bus of the drive.
-pub enum Bus {
-    /// A bus of a configuration.
-    Configured {
-        /// The configuration.
-        config: Box<Config>,
-        /// The index of the bus.
-        bus: usize,
-    },
-    /// An interface of this machine.
-    Interface {
-        /// The interface.
-        interface: RealInterface,
-        /// bit/s
-        bit_rate: u32,
-    },
 }
 
 /// A family on the command line.
@@ -204,7 +186,11 @@ impl Target {
         match interface.map(|interface| RealInterface::of(&interface)) {
             Ok(Some(RealInterface::Serial(line))) => Ok((unconfigured()?, Place::Line(line.into()))),
             Ok(Some(interface)) => {
-                Ok((unconfigured()?, Place::Bus(Bus::Interface { interface, bit_rate: self.bit_rate })))
+                Ok((unconfigured()?, Place::Bus(Bus::Interface {
+                    interface,
+                    bit_rate: self.bit_rate,
+                    data_bit_rate: self.data_bit_rate,
+                })))
             }
             Ok(None) => {
                 Err("a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …"

@@ -1,12 +1,7 @@
 // The axes, their bars and figures; the groups with what they can be told.
 
-import { element, text, textOr } from "./texts.js";
+import { element, put, text, textOr } from "./texts.js";
 import { position, shown, torque, unitOf, velocity } from "./units.js";
-
-// Sets only what has changed, so that a screen reader and the layout rest.
-export function put(node, words) {
-  if (node.textContent !== words) node.textContent = words;
-}
 
 const FIGURES = ["velocity", "following_error_short", "torque", "current", "temperature"];
 

@@ -138,6 +138,24 @@ export class Connection {
     return this.#post("/api/control", { do: what });
   }
 
+  // Takes the controller over from another process.
+  takeLease() {
+    return this.#post("/api/lease", null);
+  }
+
+  // What the panel shows, where that has changed.
+  async describe() {
+    const answer = await fetch("/api/machine", { headers: this.#headers() });
+    if (answer.ok) this.machine = await answer.json();
+    return this.machine;
+  }
+
+  // The frames after one with this number.
+  async frames(after) {
+    const answer = await fetch(`/api/frames/${after}`, { headers: this.#headers() });
+    return answer.ok ? answer.json() : null;
+  }
+
   stop(category, group = null) {
     this.#number += 1;
     return this.#post("/api/stop", { category, group, number: this.#number });

@@ -1,8 +1,7 @@
 // The motion page of the chosen axis: what its mode allows.
 
-import { element, text } from "./texts.js";
-import { put } from "./axes.js";
-import { digits, position, torque, unitOf, velocity } from "./units.js";
+import { element, put, text } from "./texts.js";
+import { digits, parse, position, torque, unitOf, velocity } from "./units.js";
 
 const RENEW_EVERY_MS = 80;
 const POSITION_TABS = ["absolute", "relative", "reciprocating"];
@@ -22,9 +21,6 @@ function tabsOf(mode, groupSize) {
   const takesMoves = mode === 1 || mode >= 7;
   return [...tabs, ...(groupSize > 1 && takesMoves ? ["group"] : []), "mode"];
 }
-
-// A number as people write it.
-const parse = (written) => (written.trim() === "" ? NaN : Number(written.trim().replace(",", ".").replace("−", "-")));
 
 export class Motion {
   #place;

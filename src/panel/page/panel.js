@@ -1,14 +1,12 @@
 // The page: what comes is shown, what is pressed is sent.
 
-import { Axes, Groups, put } from "./axes.js";
+import { Axes, Groups } from "./axes.js";
 import { Connection } from "./connection.js";
+import { askToken, find, forgetEvents, isTyping, link, say, sayProblem as sayIt, showCommander, showEvent, wireCommand, wireStop } from "./frame.js";
 import { Motion } from "./motion.js";
 import { Histogram, Plots } from "./plots.js";
-import { element, fill, isChinese, switchLanguage, text, textOr } from "./texts.js";
+import { element, fill, isChinese, put, switchLanguage, text, textOr } from "./texts.js";
 import { isInDegrees, shown, switchUnit } from "./units.js";
-
-const find = (id) => document.getElementById(id);
-const EVENTS_SHOWN = 400;
 
 let machine = null;
 let axes = null;
@@ -16,32 +14,19 @@ let groups = null;
 let motion = null;
 let plots = null;
 let state = null;
-let lastEvent = 0;
-let linkState = "connecting";
 let heldByOther = false;
 const histogram = new Histogram(find("histogram"));
 
-// Told once, seen for some seconds.
-let sayTimer = 0;
-function say(words) {
-  find("said").textContent = words;
-  clearTimeout(sayTimer);
-  sayTimer = setTimeout(() => (find("said").textContent = ""), 6000);
-}
-
-function sayProblem({ error, words }) {
-  heldByOther = error === "lease";
-  // What takt says itself is in English; for what has a text here, that comes first.
-  const own = textOr(`error_${error}`, "");
-  say(isChinese() && own ? (error === "refused" ? `${own} ${words}` : own) : words || own);
+function sayProblem(problem) {
+  heldByOther = problem.error === "lease";
+  sayIt(problem);
 }
 
 const connection = new Connection({
   open(description) {
     const isOther = machine === null || JSON.stringify(machine) !== JSON.stringify(description);
     machine = description;
-    lastEvent = 0;
-    find("events").replaceChildren();
+    forgetEvents();
     if (isOther) draw();
     link("live");
   },
@@ -55,26 +40,8 @@ const connection = new Connection({
     showCommand();
     setUsable(false);
   },
-  token() {
-    const dialog = find("ask-token");
-    dialog.showModal();
-    return new Promise((given) => {
-      dialog.addEventListener("close", () => {
-        connection.token = find("token").value;
-        find("token").value = "";
-        given();
-      }, { once: true });
-    });
-  },
+  token: () => askToken(() => connection),
 });
-
-function link(key) {
-  linkState = key;
-  const place = find("link");
-  place.dataset.text = key;
-  put(place, text(key));
-  place.className = `link ${key === "live" ? "live" : key === "connecting" ? "" : "lost"}`;
-}
 
 // Sends a command; whether it was taken.
 async function command(what) {
@@ -193,15 +160,8 @@ function setUsable(isUsable) {
 }
 
 function showCommand() {
-  const commander = state?.commander ?? null;
   const isMine = commands();
-  const isOther = commander !== null && !isMine;
-  const words = state === null ? "" : isMine ? text("you_command", connection.page, state.pages) : isOther ? text("other_commands", commander, connection.page) : text("nobody_commands");
-  put(find("who"), words);
-  find("take").hidden = isMine;
-  find("take").disabled = state === null;
-  put(find("take"), text(isOther ? "take_over" : "take"));
-  find("release").hidden = !isMine;
+  showCommander(state, connection.page, isMine);
   find("take-lease").hidden = !(isMine && heldByOther);
 }
 
@@ -264,38 +224,11 @@ function drawBuses() {
   find("buses").replaceChildren(...machine.buses.map(bus));
 }
 
-function showEvent(event) {
-  if (event.number <= lastEvent) return;
-  lastEvent = event.number;
-  const time = new Date(event.time_ms);
-  const clock = time.toLocaleTimeString("en-GB") + "." + String(time.getMilliseconds()).padStart(3, "0");
-  const list = find("events");
-  list.prepend(element("li", {}, element("time", { datetime: time.toISOString() }, clock), element("span", { class: event.level }, event.words)));
-  while (list.children.length > EVENTS_SHOWN) list.lastChild.remove();
-}
-
-async function sure(words, yes) {
-  put(find("ask-words"), words);
-  put(find("ask-yes"), yes);
-  const dialog = find("ask");
-  dialog.returnValue = "no";
-  dialog.showModal();
-  await new Promise((closed) => dialog.addEventListener("close", closed, { once: true }));
-  return dialog.returnValue === "yes";
-}
-
-find("stop").addEventListener("pointerdown", () => stop());
-find("stop").addEventListener("click", (event) => {
-  // A press has stopped already; a click without one comes from a keyboard or a screen reader.
-  if (event.detail === 0) stop();
+wireStop(() => stop());
+wireCommand(() => state?.commander ?? null, control);
+find("take-lease").addEventListener("click", async () => {
+  await connection.takeLease().then(() => (heldByOther = false), sayProblem);
 });
-find("take").addEventListener("click", async () => {
-  const other = state?.commander ?? null;
-  if (other === null) await control("take");
-  else if (await sure(text("take_over_sure", other), text("take_over"))) await control("take_over");
-});
-find("release").addEventListener("click", () => control("release"));
-find("take-lease").addEventListener("click", () => control("take_lease"));
 find("clear-events").addEventListener("click", () => find("events").replaceChildren());
 find("unit").addEventListener("click", () => {
   switchUnit();
@@ -307,7 +240,7 @@ find("language").addEventListener("click", () => {
   motion?.redraw();
   faultsShown = "";
   draw();
-  link(linkState);
+  link();
   showCommand();
 });
 find("chosen").addEventListener("change", (event) => choose(Number(event.target.value)));
@@ -319,22 +252,16 @@ find("pause").addEventListener("click", (event) => {
   plots?.pause(isPaused);
 });
 
-const isTyping = (target) => target.matches?.("input, select, textarea") ?? false;
 const ARROWS = { ArrowLeft: -1, ArrowRight: 1 };
 
 document.addEventListener("keydown", (event) => {
-  if (event.key === "Escape" || (event.key === " " && !isTyping(event.target))) {
-    if (event.key === " ") event.preventDefault();
-    if (!event.repeat) stop();
-  } else if (ARROWS[event.key] && !isTyping(event.target) && !event.ctrlKey && !event.altKey && !event.metaKey) {
+  if (ARROWS[event.key] && !isTyping(event.target) && !event.ctrlKey && !event.altKey && !event.metaKey) {
     if (event.target.getAttribute?.("role") === "tab") return;
     if (motion?.jog(ARROWS[event.key])) event.preventDefault();
   }
 });
 document.addEventListener("keyup", (event) => {
   if (ARROWS[event.key]) motion?.release();
-  // A button would be pressed by the space bar that has stopped.
-  if (event.key === " " && !isTyping(event.target)) event.preventDefault();
 });
 for (const end of ["blur", "pagehide"]) window.addEventListener(end, () => motion?.release());
 document.addEventListener("visibilitychange", () => document.hidden && motion?.release());

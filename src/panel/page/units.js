@@ -11,10 +11,14 @@ export function switchUnit() {
 
 // Of an axis: the factor from SI, the symbol, and the digits of positions.
 export function unitOf(axis) {
+  if (axis.unit === "counts") return { factor: 1, symbol: "", digits: 0, force: "" };
   if (axis.unit === "m") return { factor: 1000, symbol: "mm", digits: 2, force: "N" };
   if (inDegrees) return { factor: 180 / Math.PI, symbol: "°", digits: 2, force: "N·m" };
   return { factor: 1, symbol: "rad", digits: 4, force: "N·m" };
 }
+
+// A number as people write it.
+export const parse = (written) => (written.trim() === "" ? NaN : Number(written.trim().replace(",", ".").replace("−", "-")));
 
 // A number without "-0.00".
 export function digits(value, count) {
@@ -26,7 +30,7 @@ const minus = (text) => text.replace("-", "−");
 
 export function shown(value, count, symbol) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  return `${minus(digits(value, count))}${symbol === "°" ? "" : " "}${symbol}`;
+  return `${minus(digits(value, count))}${symbol === "°" || symbol === "" ? "" : " "}${symbol}`;
 }
 
 export const position = (value, axis) => {
