@@ -111,11 +111,7 @@ fn is_configuration(what: &str) -> bool {
     what.contains(['.', '/'])
 }
 
-fn show_controller(
-    arguments: &Arguments,
-    name: &str,
-    interrupted: &AtomicBool,
-) -> Result<Exit, UsageError> {
+fn show_controller(arguments: &Arguments, name: &str, interrupted: &AtomicBool) -> Result<Exit, UsageError> {
     let client = remote::connect(name).map_err(|error| error.to_string())?;
     let listening = arguments.access.listen(arguments.address)?;
     let lease = client.clone();
@@ -193,7 +189,10 @@ fn of_configuration(arguments: &Arguments, path: &Path) -> Result<Workplace, Usa
         let place = match &bus.interface {
             Interface::Serial(line) => Place::Line { device: line.device.clone(), bit_rate: bus.bit_rate },
             _ if config.is_serial_line(number) => {
-                say!("takt: note: the line {} is simulated inside a controller alone: it is left out", bus.name);
+                say!(
+                    "takt: note: the line {} is simulated inside a controller alone: it is left out",
+                    bus.name
+                );
                 continue;
             }
             _ => Place::Bus(Bus::Configured { config: Box::new(config.clone()), bus: number }),
@@ -216,8 +215,9 @@ fn of_configuration(arguments: &Arguments, path: &Path) -> Result<Workplace, Usa
 fn of_interfaces(arguments: &Arguments) -> Result<Workplace, UsageError> {
     let mut places = vec![];
     for bus in &arguments.buses {
-        let parsed: Interface =
-            bus.parse().map_err(|error: <Interface as std::str::FromStr>::Err| format!("--bus {bus}: {error}: {}", error.help()))?;
+        let parsed: Interface = bus.parse().map_err(|error: <Interface as std::str::FromStr>::Err| {
+            format!("--bus {bus}: {error}: {}", error.help())
+        })?;
         let place = match RealInterface::of(&parsed) {
             Some(RealInterface::Serial(line)) => {
                 Place::Line { device: line.device, bit_rate: line.bit_rate.unwrap_or(USUAL_LINE_RATE) }

@@ -20,6 +20,6 @@ pub(crate) use bus::Bus;
 
 pub(crate) use crate::family::commission::{
     CommandValue, DriveTask, Failure, GainFactors, MotionProfile, MoveKind, ProcedureError, PulseQuantity,
-    PulseWidth, Report, RunningTask, TargetDrive, Task, ValueText, command_value, dictionary,
+    PulseWidth, Report, ReportItem, RunningTask, TargetDrive, Task, ValueText, command_value, dictionary,
 };
 pub(crate) use crate::procedure::{AxisReading, ProcedureEvent};

@@ -400,7 +400,10 @@ pub async fn body<T: DeserializeOwned>(request: Request) -> Result<(HeaderMap, T
     Ok((parts.headers, value))
 }
 
-async fn confirm<P: Visited>(State(panel): State<Arc<P>>, headers: HeaderMap) -> Result<Response, Problematic> {
+async fn confirm<P: Visited>(
+    State(panel): State<Arc<P>>,
+    headers: HeaderMap,
+) -> Result<Response, Problematic> {
     panel.gate().pages().confirm(page_key(&headers)?, Instant::now())?;
     Ok(done())
 }
@@ -417,10 +420,7 @@ enum Control {
     Release {},
 }
 
-async fn control<P: Visited>(
-    State(panel): State<Arc<P>>,
-    request: Request,
-) -> Result<Response, Problematic> {
+async fn control<P: Visited>(State(panel): State<Arc<P>>, request: Request) -> Result<Response, Problematic> {
     let (headers, control) = body::<Control>(request).await?;
     let key = page_key(&headers)?;
     let gone = match control {

@@ -100,8 +100,9 @@ mod tests {
         let texts = texts();
         let mut wanted: Vec<String> = vec![];
         let pages = [file("/"), text_of(of_bench(), "/")];
-        for (page, attribute) in
-            pages.into_iter().flat_map(|page| ["data-text=\"", "data-label=\""].map(|attribute| (page, attribute)))
+        for (page, attribute) in pages
+            .into_iter()
+            .flat_map(|page| ["data-text=\"", "data-label=\""].map(|attribute| (page, attribute)))
         {
             let found = page.split(attribute).skip(1).filter_map(|rest| rest.split_once('"'));
             wanted.extend(found.map(|(key, _)| key.to_owned()));

@@ -118,8 +118,7 @@ impl Server {
             match source.wait(LOOK) {
                 Ok(event) => {
                     let machine = self.controller.machine();
-                    self.gate
-                        .tell(None, |number| message("event", &EventView::of(number, &event, machine)));
+                    self.gate.tell(None, |number| message("event", &EventView::of(number, &event, machine)));
                 }
                 Err(WaitError::NotInTime) => {}
                 Err(WaitError::Ended) => return,

@@ -28,8 +28,11 @@ at = "300 ms"
 // A simulated arm with its panel; resolves when the page can be opened.
 const arm = (place, ...options) => start("run", path.join(place, "arm.toml"), "--panel", "127.0.0.1:0", ...options);
 
+const started = [];
+
 function start(...command) {
   const process_ = spawn(takt, command, { stdio: ["ignore", "pipe", "pipe"] });
+  started.push(process_);
   return new Promise((resolve, reject) => {
     let said = "";
     process_.stderr.on("data", (data) => {
@@ -111,6 +114,7 @@ class Panel {
   }
 
   async screenshot(name) {
+    await this.page.evaluate(() => scrollTo(0, 0));
     await this.page.screenshot({ path: path.join(folder, `${name}.png`), fullPage: true });
   }
 
@@ -395,6 +399,8 @@ const steps = {
       await page.fill("#field-distance", "2,5");
       await page.locator("#kind button:enabled", { hasText: words("Forwards", "前进") }).click();
       await isAt(2.5);
+      await isDone(words("relative move", "相对运动"));
+      await page.locator("#send:enabled").waitFor({ timeout: LONG });
       await looksRight(panel, name);
 
       // A frame is not sent while the drive has torque.
@@ -488,6 +494,11 @@ async function main() {
     shared.process.removeAllListeners("exit");
     shared.process.kill("SIGINT");
     await ended(shared.process);
+    // A step that has failed has left its own.
+    for (const left of started.filter(({ exitCode, signalCode }) => exitCode === null && signalCode === null)) {
+      left.removeAllListeners("exit");
+      left.kill("SIGKILL");
+    }
     fs.rmSync(place, { recursive: true });
   }
 }

@@ -7,10 +7,13 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::commission::bus_session::SessionEvent;
-use crate::commission::{AxisReading, Failure, ProcedureError, ProcedureEvent, Report, TargetDrive};
+use crate::commission::{
+    AxisReading, Failure, ProcedureError, ProcedureEvent, Report, ReportItem, TargetDrive,
+};
 use crate::config::Quantity;
 use takt_rt::{Frame, Nanoseconds};
 
+use super::super::columns::paragraph;
 use super::super::exit::Exit;
 use super::super::print;
 use super::Options;
@@ -247,6 +250,9 @@ fn seconds(at_ns: Nanoseconds) -> String {
 pub fn render(report: &Report) -> String {
     let findings = report.items();
     let width = findings.iter().map(|finding| finding.label.chars().count()).max().unwrap_or(0);
-    let lines = findings.iter().map(|finding| format!("  {:<width$}  {}\n", finding.label, finding.text));
-    lines.collect()
+    let line = |finding: &ReportItem| {
+        let line = format!("  {:<width$}  {}", finding.label, finding.text);
+        paragraph(&line, width + 4) + "\n"
+    };
+    findings.iter().map(line).collect()
 }

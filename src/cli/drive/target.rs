@@ -185,13 +185,14 @@ impl Target {
         }
         match interface.map(|interface| RealInterface::of(&interface)) {
             Ok(Some(RealInterface::Serial(line))) => Ok((unconfigured()?, Place::Line(line.into()))),
-            Ok(Some(interface)) => {
-                Ok((unconfigured()?, Place::Bus(Bus::Interface {
+            Ok(Some(interface)) => Ok((
+                unconfigured()?,
+                Place::Bus(Bus::Interface {
                     interface,
                     bit_rate: self.bit_rate,
                     data_bit_rate: self.data_bit_rate,
-                })))
-            }
+                }),
+            )),
             Ok(None) => {
                 Err("a simulated drive needs a configuration that says what it is: takt drive CONFIG AXIS …"
                     .into())

@@ -165,12 +165,9 @@ impl Ask {
                 let is_right = (1..=127).contains(from) && (*from..=127).contains(to);
                 (!is_right).then(|| "node IDs are 1 to 127".to_owned())
             }
-            Self::Add { node, .. } => {
-                (!(1..=127).contains(node)).then(|| "node IDs are 1 to 127".to_owned())
-            }
-            Self::Watch { every_ms, .. } => (!READING_MS.contains(every_ms)).then(|| {
-                format!("readings come every {} to {} ms", READING_MS.start(), READING_MS.end())
-            }),
+            Self::Add { node, .. } => (!(1..=127).contains(node)).then(|| "node IDs are 1 to 127".to_owned()),
+            Self::Watch { every_ms, .. } => (!READING_MS.contains(every_ms))
+                .then(|| format!("readings come every {} to {} ms", READING_MS.start(), READING_MS.end())),
             Self::Send { count, period_ms, .. } => {
                 let is_right = (1..=FRAMES_AT_MOST).contains(count) && FRAME_PERIOD_MS.contains(period_ms);
                 (!is_right).then(|| {
@@ -204,15 +201,7 @@ impl AskedTask {
 
     /// Whether the drive may have torque while it runs, or after it.
     pub const fn may_give_torque(&self) -> bool {
-        !matches!(
-            self,
-            Self::Info {} | Self::Cycle { .. } | Self::Disable {} | Self::ClearFault { .. }
-        )
-    }
-
-    /// Whether it moves the axis.
-    pub const fn moves(&self) -> bool {
-        self.may_give_torque() && !matches!(self, Self::Enable {})
+        !matches!(self, Self::Info {} | Self::Cycle { .. } | Self::Disable {} | Self::ClearFault { .. })
     }
 
     /// The task to the drive. `keeps_enabled`: a drive that has torque keeps it afterwards.
@@ -256,9 +245,7 @@ impl AskedTask {
                 velocity_limit: max_velocity.map(|velocity| magnitude(target, velocity)).transpose()?,
                 duration_ns: None,
             },
-            Self::Home { method } => {
-                Task::Home { method: *method, within_ns: HOMING_NS, is_forced: false }
-            }
+            Self::Home { method } => Task::Home { method: *method, within_ns: HOMING_NS, is_forced: false },
         })
     }
 }
@@ -342,10 +329,7 @@ mod tests {
         let task = AskedTask::Relative { by: 0.1, profile: AskedProfile::default() };
         for keeps in [true, false] {
             let task = task.task(&target, keeps).unwrap();
-            assert!(
-                matches!(task, Task::Move { keeps_enabled, .. } if keeps_enabled == keeps),
-                "{task:?}"
-            );
+            assert!(matches!(task, Task::Move { keeps_enabled, .. } if keeps_enabled == keeps), "{task:?}");
         }
     }
 

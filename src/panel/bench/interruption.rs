@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use super::Bench;
 use super::super::pages::PageNumber;
+use super::Bench;
 use crate::link::ownership::Ownership;
 
 /// How often it is looked whether the page is there. A poll of a bus is much shorter.
@@ -34,11 +34,6 @@ impl<'a> Interruption<'a> {
         Self { bench, page: None, gives_way: false, stops: 0, interrupted: None, looked: None }
     }
 
-    /// Whether it was interrupted.
-    pub const fn has_come(&self) -> bool {
-        self.interrupted.is_some()
-    }
-
     /// Whether the errand is to be interrupted now: each `true` is an interruption of its own.
     pub fn poll(&mut self, ownership: &mut Ownership) -> bool {
         let now = Instant::now();
@@ -54,7 +49,8 @@ impl<'a> Interruption<'a> {
         let is_stopped = stops != self.stops;
         match self.interrupted {
             None => {
-                let is_due = is_stopped || self.bench.is_taken_over() || self.ends(now) || !self.bench.may_move(page);
+                let is_due =
+                    is_stopped || self.bench.is_taken_over() || self.ends(now) || !self.bench.may_move(page);
                 if is_due {
                     (self.interrupted, self.stops) = (Some(now), stops);
                 }

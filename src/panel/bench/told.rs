@@ -4,9 +4,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use takt_rt::BusHealth;
 
-use super::super::view::{bus_state, rounded};
 use super::super::pages::PageNumber;
-use crate::commission::{AxisReading, Failure, ProcedureError, Report, TargetDrive};
+use super::super::view::{bus_state, rounded};
+use crate::commission::{AxisReading, Failure, ProcedureError, Report, ReportItem, TargetDrive};
 use crate::family::scan::FoundDevice;
 
 /// A drive as pages see it.
@@ -123,7 +123,7 @@ pub enum Torque {
 }
 
 /// What runs.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct RunningView {
     /// The drive; `None` for what concerns a whole bus.
     pub drive: Option<usize>,
@@ -164,7 +164,8 @@ impl Told {
 
     /// What changes often.
     pub fn state(&self) -> Value {
-        let buses: Vec<Value> = self.health.iter().map(|health| health.as_ref().map_or(Value::Null, bus)).collect();
+        let buses: Vec<Value> =
+            self.health.iter().map(|health| health.as_ref().map_or(Value::Null, bus)).collect();
         let torque: Vec<&str> = self
             .torque
             .iter()
@@ -198,7 +199,12 @@ fn view(drive: usize, reading: &AxisReading) -> Value {
 }
 
 /// How an errand with a drive has ended.
-pub fn outcome(drive: usize, action: &str, outcome: &Result<Report, ProcedureError>, notes: &[String]) -> Value {
+pub fn outcome(
+    drive: usize,
+    action: &str,
+    outcome: &Result<Report, ProcedureError>,
+    notes: &[String],
+) -> Value {
     let failed = outcome.as_ref().err();
     let ended = match failed {
         None => "done",
@@ -209,9 +215,7 @@ pub fn outcome(drive: usize, action: &str, outcome: &Result<Report, ProcedureErr
     let items: Vec<Value> = outcome.as_ref().map_or_else(
         |_| vec![],
         |report| {
-            let item = |item: &crate::family::commission::ReportItem| {
-                json!({ "key": item.key, "label": item.label, "text": item.text })
-            };
+            let item = |item: &ReportItem| json!({ "key": item.key, "label": item.label, "text": item.text });
             report.items().iter().map(item).collect()
         },
     );

@@ -89,7 +89,8 @@ impl Workplace {
             interface: bus.interface.clone(),
             is_line: matches!(bus.link, BenchLink::Line(..)),
         });
-        let drives = self.drives.iter().filter_map(|drive| Some(DriveView::of(drive.target.as_ref()?, drive.bus)));
+        let drives =
+            self.drives.iter().filter_map(|drive| Some(DriveView::of(drive.target.as_ref()?, drive.bus)));
         let families = family::all().into_iter().filter(|family| family.unconfigured().is_some());
         Told {
             name: self.name.clone(),
@@ -164,7 +165,8 @@ impl Worker {
             next.is_busy = !is_ended;
             (!is_ended).then_some(errand)
         };
-        let errand = errand.filter(|errand| errand.stops == self.bench.stops() && self.bench.may_move(errand.page));
+        let errand =
+            errand.filter(|errand| errand.stops == self.bench.stops() && self.bench.may_move(errand.page));
         if errand.is_none() {
             self.finish();
         }
@@ -204,7 +206,8 @@ impl Worker {
     }
 
     fn running(&self, drive: Option<usize>, bus: usize, action: &'static str, is_watch: bool) {
-        self.bench.told().running = Some(RunningView { drive, bus, action, step: "", done: 0, of: 0, is_watch });
+        self.bench.told().running =
+            Some(RunningView { drive, bus, action, step: "", done: 0, of: 0, is_watch });
     }
 
     /// Nothing is asked: the watched drive is read, or the buses are listened to.
@@ -241,7 +244,12 @@ impl Worker {
         }
     }
 
-    fn choose_watched(&mut self, page: PageNumber, drive: Option<usize>, every_ms: u32) -> Result<(), String> {
+    fn choose_watched(
+        &mut self,
+        page: PageNumber,
+        drive: Option<usize>,
+        every_ms: u32,
+    ) -> Result<(), String> {
         if let Some(drive) = drive {
             self.drive(drive).ok_or_else(no_such_drive)?;
         }
@@ -284,7 +292,8 @@ impl Worker {
             // From the first frame on: whatever ends this thread finds it.
             self.set_torque(drive, Torque::Held(page));
         }
-        let ended = self.carry(drive, bus, target, carried, &|bench| Interruption::of(bench, page, false, stops));
+        let ended =
+            self.carry(drive, bus, target, carried, &|bench| Interruption::of(bench, page, false, stops));
         let told = outcome(drive, task.name(), &ended.outcome, &ended.notes);
         match &ended.outcome {
             Ok(_) if task.may_give_torque() && !keeps => self.set_torque(drive, Torque::Off),
@@ -315,7 +324,10 @@ impl Worker {
     fn give_up(&self, drive: usize) {
         self.set_torque(drive, Torque::Unsure);
         let name = self.name(drive);
-        self.bench.tell("fault", format!("{name} may still have torque: it could not be disabled. Use the emergency stop"));
+        self.bench.tell(
+            "fault",
+            format!("{name} may still have torque: it could not be disabled. Use the emergency stop"),
+        );
     }
 
     fn disable_where(&mut self, is_meant: impl Fn(Torque) -> bool) {
@@ -379,7 +391,8 @@ impl Worker {
         interruption: &dyn for<'a> Fn(&'a Bench) -> Interruption<'a>,
     ) -> Ended {
         let bench = Arc::clone(&self.bench);
-        let mut watcher = Watcher { bench: &bench, bus: number, drive: Some(drive), notes: vec![], has_sent: false };
+        let mut watcher =
+            Watcher { bench: &bench, bus: number, drive: Some(drive), notes: vec![], has_sent: false };
         let Workplace { buses, ownership, .. } = &mut self.place;
         let outcome = match buses.get_mut(number) {
             None => Err(refused(Failure::Unsuitable("there is no such bus".to_owned()))),
@@ -432,7 +445,8 @@ impl Worker {
                 let scan = Box::new(scan_line(what));
                 let is_interrupted = || interruption.poll(ownership);
                 let see = |_, event: LineEvent<'_>| watcher.see_line(&event);
-                let scanned = line_session::run(scan, line, is_interrupted, see).map_err(|error| error.to_string())?;
+                let scanned =
+                    line_session::run(scan, line, is_interrupted, see).map_err(|error| error.to_string())?;
                 scanned.map_err(|failed| failed.failure.to_string())?
             }
         };
@@ -462,7 +476,8 @@ impl Worker {
             return;
         }
         let drive = device.drive.and_then(family::named).and_then(|family| family.unconfigured());
-        let target = device.node.zip(drive).and_then(|(node, drive)| TargetDrive::unconfigured(node, drive).ok());
+        let target =
+            device.node.zip(drive).and_then(|(node, drive)| TargetDrive::unconfigured(node, drive).ok());
         let mut view = DriveView::found(device, bus);
         if let Some(target) = &target {
             view = DriveView { found: view.found, ..DriveView::of(target, bus) };
@@ -488,7 +503,9 @@ impl Worker {
                 return Err(format!("node {node} is in the list already"));
             }
             Some(known) => {
-                if let (Some(view), Some(own)) = (told.drives.get_mut(known), self.place.drives.get_mut(known)) {
+                if let (Some(view), Some(own)) =
+                    (told.drives.get_mut(known), self.place.drives.get_mut(known))
+                {
                     *view = DriveView { found: view.found.take(), ..DriveView::of(&target, bus) };
                     own.target = Some(target);
                 }
@@ -571,7 +588,8 @@ impl Worker {
 
     fn hand_over(&mut self, number: usize, frame: &Frame) -> Result<(), String> {
         let bench = Arc::clone(&self.bench);
-        let Some(BenchBus { link: BenchLink::Bus(port), decoder, .. }) = self.place.buses.get_mut(number) else {
+        let Some(BenchBus { link: BenchLink::Bus(port), decoder, .. }) = self.place.buses.get_mut(number)
+        else {
             return Err("there is no such bus".to_owned());
         };
         if port.send(MonotonicClock::default().now_ns(), &[*frame]) != 1 {
@@ -615,10 +633,12 @@ fn on(
                 refused(Failure::Unsuitable(words))
             })?;
             let see = |_, event: LineEvent<'_>| watcher.see_line(&event);
-            line_session::run(task.map_err(refused)?.procedure, line, is_interrupted, see).unwrap_or_else(|error| {
-                let failure = Failure::Request { what: error.to_string(), cure: None };
-                Err(ProcedureError { step: "serial line", failure })
-            })
+            line_session::run(task.map_err(refused)?.procedure, line, is_interrupted, see).unwrap_or_else(
+                |error| {
+                    let failure = Failure::Request { what: error.to_string(), cure: None };
+                    Err(ProcedureError { step: "serial line", failure })
+                },
+            )
         }
     }
 }
@@ -651,7 +671,10 @@ impl Watcher<'_> {
         };
         self.has_sent |= direction == '>';
         let frame: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
-        push(self.bench, FrameView { direction, bus: self.bus, frame, number: 0, time: 0.0, words: String::new() });
+        push(
+            self.bench,
+            FrameView { direction, bus: self.bus, frame, number: 0, time: 0.0, words: String::new() },
+        );
     }
 
     fn see_procedure(&mut self, event: &ProcedureEvent) {
@@ -674,7 +697,13 @@ impl Watcher<'_> {
 }
 
 /// Keeps a frame for the monitor. Returns who has shown torque by it.
-fn keep(bench: &Bench, bus: usize, decoder: &mut BusDecoder, direction: char, frame: &Frame) -> Option<String> {
+fn keep(
+    bench: &Bench,
+    bus: usize,
+    decoder: &mut BusDecoder,
+    direction: char,
+    frame: &Frame,
+) -> Option<String> {
     let decoded = decoder.decode(frame);
     let words = decoded.line();
     push(bench, FrameView { direction, bus, frame: format!("{frame:?}"), number: 0, time: 0.0, words });

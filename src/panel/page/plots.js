@@ -1,7 +1,6 @@
 // Live plots of the chosen axis, and the histogram of the cycle.
 
-import { element, text } from "./texts.js";
-import { put } from "./axes.js";
+import { element, put, text } from "./texts.js";
 import { position, torque, unitOf, velocity } from "./units.js";
 
 const SECONDS = 20;
@@ -119,7 +118,7 @@ export class Plots {
       context.moveTo(left, y(step));
       context.lineTo(width - 4, y(step));
       context.stroke();
-      context.fillText(step.toFixed(digits).replace("-", "−"), left - 6, y(step));
+      context.fillText(step.toFixed(digits).replace("-", "−"), left - 6, Math.max(8, y(step)));
     }
     context.textBaseline = "alphabetic";
     context.textAlign = "center";
