@@ -74,7 +74,7 @@ impl Chart {
 
     fn draw_as(&self, width: f64, palette: &Palette) -> String {
         let top = if self.title.is_empty() { 0.0 } else { GAP };
-        let height = top + self.panels.len() as f64 * (PANEL + GAP) + GAP;
+        let height = top + self.panels.len() as f64 * (PANEL + GAP) + 0.5 * GAP;
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
              font-size=\"12\" fill=\"{}\">\n",

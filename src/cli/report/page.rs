@@ -101,7 +101,7 @@ fn head(page: &mut String, report: &RecordingReport) {
     }
     page.push_str("<nav>");
     for (number, axis) in report.axes.iter().enumerate() {
-        let _ = write!(page, "<a href=\"#axis{number}\">{}</a>", escaped(&axis.name));
+        let _ = write!(page, "<a href=\"#axis{number}\">{}</a> ", escaped(&axis.name));
     }
     page.push_str("<a href=\"#timing\">timing and buses</a></nav>\n");
 }
@@ -126,7 +126,7 @@ fn events(page: &mut String, recorded: &Recorded, curves: &Curves) {
         );
     }
     if !shown.is_empty() {
-        page.push_str("<div class=\"scroll\" tabindex=\"0\"><table><thead><tr><th class=\"number\">s</th><th class=\"number\">slot</th><th>event</th></tr></thead><tbody>\n");
+        page.push_str("<div class=\"scroll\" tabindex=\"0\"><table class=\"events\"><thead><tr><th class=\"number\">s</th><th class=\"number\">slot</th><th>event</th></tr></thead><tbody>\n");
         for event in shown {
             let _ = writeln!(
                 page,
@@ -153,8 +153,9 @@ fn summary(page: &mut String, report: &RecordingReport) {
         let AxisSummary { unit, set_point_max, set_point_part, .. } = axis;
         let (milli, torque) = if *unit == "m" { ("mm", "N") } else { ("mrad", "N·m") };
         let position = axis.position_min.zip(axis.position_max);
-        let position = position
-            .map_or("never reported".to_owned(), |(low, high)| format!("{low:.4} to {high:.4} {unit}"));
+        let position = position.map_or("never reported".to_owned(), |(low, high)| {
+            format!("{:.4} to {:.4} {unit}", unsigned(low), unsigned(high))
+        });
         let error = axis
             .following_error_max
             .map_or("never enabled".to_owned(), |error| format!("{:.3} {milli}", error * 1e3));
@@ -180,6 +181,11 @@ fn summary(page: &mut String, report: &RecordingReport) {
         "</tbody></table></div><p class=\"faint\">The largest of each; velocity, acceleration and jerk of the set-points, with their part of \
          the limit.</p></section>\n",
     );
+}
+
+/// A value that rounds to 0 has no sign.
+fn unsigned(value: f64) -> f64 {
+    if value.abs() < 5e-5 { 0.0 } else { value }
 }
 
 fn figure(page: &mut String, of: &str, chart: &impl Fn(Panel) -> Chart, panel: Panel) {
