@@ -93,6 +93,8 @@
 // Some names are passed on for the tests alone, to whom types of private modules are open.
 #![cfg_attr(not(feature = "internals"), allow(unused_imports))]
 #![cfg_attr(feature = "internals", allow(unnameable_types))]
+// Some functions are for the program alone.
+#![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
 mod bus_log;
 pub mod canopen;
