@@ -1,8 +1,6 @@
 //! Programs in C and C++ that command a controller of another process. That process is this test program, started with the name of the
 //! ignored test.
 
-mod installed;
-
 use std::env;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -10,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use installed::{Installed, Library, MEMORY, THREADS, program};
+use crate::library::{Installed, Library, MEMORY, THREADS, program};
 use takt::config::Interface;
 use takt::{Config, Controller, ServeOptions, SessionOptions};
 use tempfile::TempDir;
@@ -31,7 +29,7 @@ impl Served {
     fn start(config: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let process = Command::new(env::current_exe().unwrap())
-            .args(["--ignored", "--exact", "serves_a_controller_until_it_is_killed"])
+            .args(["--ignored", "--exact", "served::serves_a_controller_until_it_is_killed"])
             .env(NAME, name_in(&folder))
             .env(CONFIGURATION, Path::new(env!("CARGO_MANIFEST_DIR")).join("../../configs").join(config))
             .stdout(Stdio::null())

@@ -1,5 +1,4 @@
-//! takt as a user installs it, and programs compiled against it.
-#![allow(dead_code, reason = "each test program uses a part of it")]
+//! takt as `bindings/c/install` installs it, and what compiles programs against it.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -1,13 +1,11 @@
 //! The examples and the programs of `tests/programs`, compiled as a user compiles them, against what `bindings/c/install` installs, and run:
 //! as they are, and under the sanitizers of gcc and valgrind.
 
-mod installed;
-
 use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use installed::{Installed, Library, MEMORY, THREADS, crate_folder, program, repository, succeeds};
+use crate::library::{Installed, Library, MEMORY, THREADS, crate_folder, program, repository, succeeds};
 
 /// Each program with its configuration, and what it says in the end.
 const EXAMPLES: [(&str, &str, &str); 6] = [
