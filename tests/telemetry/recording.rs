@@ -188,8 +188,11 @@ fn programs_of_ros_2_find_all_joints_and_the_events_in_words() {
     assert!(log.iter().all(|(_, fields)| fields["name"] == Value::Text("arm".to_owned())));
 }
 
+/// A message of a recording: its topic, its time and its bytes.
+type RecordedMessage = (String, u64, Vec<u8>);
+
 /// The bytes of a recording of so many cycles, and the messages that are read from it.
-fn written(is_compressed: bool, cycles: u64) -> (Vec<u8>, Vec<(String, u64, Vec<u8>)>) {
+fn written(is_compressed: bool, cycles: u64) -> (Vec<u8>, Vec<RecordedMessage>) {
     let (mut rt, _host, log) = sides(8);
     let disk = Disk::new(usize::MAX);
     let recording_options = RecordingOptions { is_compressed, ..RecordingOptions::default() };
