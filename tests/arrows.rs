@@ -8,12 +8,12 @@ use std::path::{Path, PathBuf};
 const ORDER: [&str; 36] = [
     "internals",
     "cli",
+    "panel",
     "doctor",
     "jitter",
     "commission",
     "play",
     "replay",
-    "panel",
     "error",
     "serve",
     "controller",
