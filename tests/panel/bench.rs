@@ -23,16 +23,8 @@ impl Bench {
             .stdin(Stdio::null());
         let mut program = command.spawn().unwrap();
         let mut said = BufReader::new(program.stderr.take().unwrap());
-        let mut all = String::new();
-        loop {
-            let mut line = String::new();
-            assert!(said.read_line(&mut line).unwrap() > 0, "it has ended: {all}");
-            all.push_str(&line);
-            if let Some((_, rest)) = line.split_once("http://") {
-                let address = rest.split('/').next().unwrap().parse().unwrap();
-                return Self { program, address, _said: said };
-            }
-        }
+        let address = shown_address(&mut said);
+        Self { program, address, _said: said }
     }
 
     fn open(&self) -> Page {
@@ -73,6 +65,19 @@ impl Drop for Bench {
         // It may have ended.
         let _ = self.program.kill();
         self.program.wait().unwrap();
+    }
+}
+
+/// The address that the program says it listens at.
+fn shown_address(said: &mut impl BufRead) -> SocketAddr {
+    let mut all = String::new();
+    loop {
+        let mut line = String::new();
+        assert!(said.read_line(&mut line).unwrap() > 0, "it has ended: {all}");
+        all.push_str(&line);
+        if let Some((_, rest)) = line.split_once("http://") {
+            return rest.split('/').next().unwrap().parse().unwrap();
+        }
     }
 }
 

@@ -14,8 +14,8 @@ struct Point {
     position: f64,
     /// As it went onto the wire; `None` where the wire carries no position.
     counts: Option<i32>,
-    /// Whether the wire carries the one that was planned for this time.
-    is_meant: bool,
+    /// By how much the wire differs from what was planned for this time, in counts; `None` where it carries another set-point.
+    rounding: Option<f64>,
     /// Since the set-point before: cycles in which the trajectory went on.
     cycles: u32,
 }
@@ -137,14 +137,37 @@ impl SetPoints {
         if cycles == 0 {
             return Ok(());
         }
-        let meant = self.planned.get(self.delay_cycles).map(|due| self.scale.position_to_counts(*due));
+        let due = self.planned.get(self.delay_cycles).copied();
+        let meant = due.map(|due| self.meant_counts(axis, due));
         let on_wire = position_on_wire(seen, index);
-        let is_meant = meant.is_none() || on_wire == meant;
-        let point = Point { position: record.position_set, counts: on_wire, is_meant, cycles };
+        let rounding = match (due, meant) {
+            (Some(due), Some(meant)) if on_wire == Some(meant) => {
+                Some((self.scale.position_from_counts(meant) - due).abs() * self.scale.resolution())
+            }
+            (None, _) => Some(0.5),
+            _ => None,
+        };
+        let point = Point { position: record.position_set, counts: on_wire, rounding, cycles };
         self.check_on_way(axis, &point, meant, nominal_s)?;
         self.check_point(axis, &point)?;
         self.points = [Some(point), self.points[0], self.points[1]];
         Ok(())
+    }
+
+    /// The nearest count, or the next one inwards where the nearest lies outside of a limit, and farther out than the set-point.
+    fn meant_counts(&self, axis: &Axis, position: f64) -> i32 {
+        let nearest = self.scale.position_to_counts(position);
+        let at = self.scale.position_from_counts(nearest);
+        // A limit that is a whole count is reached, whatever the last digits say.
+        let room = 1e-6 / self.scale.resolution();
+        let inwards = if at > axis.limits.position_max.max(position) + room {
+            -1.0
+        } else if at < axis.limits.position_min.min(position) - room {
+            1.0
+        } else {
+            return nearest;
+        };
+        self.scale.position_to_counts(at + inwards / self.scale.resolution())
     }
 
     /// What is on the wire is the set-point that is meant. After some that could not leave, it is on the way there at the velocity
@@ -197,12 +220,13 @@ impl SetPoints {
             return Err(format!("set-point with acceleration {acceleration} beyond {limit}"));
         }
         if next.cycles == last.cycles
-            && [next, &last, &before].iter().all(|point| point.is_meant)
+            && let (Some(of_newest), Some(of_newer), Some(of_older)) =
+                (next.rounding, last.rounding, before.rounding)
             && let (Some(newest), Some(newer), Some(older)) = (next.counts, last.counts, before.counts)
         {
-            // Each of the three is rounded by up to half a count, the one in the middle counts twice.
             let second = i64::from(newest) - 2 * i64::from(newer) + i64::from(older);
-            let allowed = limit * span_s * span_s * self.scale.resolution() * (1.0 + ROUNDING) + 2.0;
+            let rounding = of_newest + 2.0 * of_newer + of_older + ROUNDING;
+            let allowed = limit * span_s * span_s * self.scale.resolution() * (1.0 + ROUNDING) + rounding;
             if second.unsigned_abs() as f64 > allowed {
                 return Err(format!("second difference of {second} counts on the wire beyond {allowed}"));
             }
