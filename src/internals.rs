@@ -115,6 +115,7 @@ pub mod journal {
 
 pub mod link {
     pub use crate::link::interface::*;
+    #[cfg(feature = "cli")]
     pub mod modbus_line {
         pub use crate::link::modbus_line::*;
     }

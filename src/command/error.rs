@@ -77,7 +77,10 @@ pub enum CommandError {
         axes: usize,
     },
     /// There is no group of this name.
-    #[error("there is no group {name:?}: the groups are: {}", groups.join(", "))]
+    #[error("there is no group {name:?}: {}", match groups.is_empty() {
+        true => "all axes are one group, without a name".to_owned(),
+        false => format!("the groups are: {}", groups.join(", ")),
+    })]
     NoSuchGroup {
         /// The name.
         name: String,
@@ -310,3 +313,18 @@ macro_rules! debug_as_displayed {
 }
 
 debug_as_displayed!(Refused, Stopped, CommandError, MotionError, WaitError);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_group_that_does_not_exist_is_told_with_those_that_do() {
+        let text = |groups: &[&str]| {
+            let groups = groups.iter().map(|group| (*group).to_owned()).collect();
+            CommandError::NoSuchGroup { name: "hand".to_owned(), groups }.to_string()
+        };
+        assert_eq!(text(&["arm", "gripper"]), "there is no group \"hand\": the groups are: arm, gripper");
+        assert_eq!(text(&[]), "there is no group \"hand\": all axes are one group, without a name");
+    }
+}
