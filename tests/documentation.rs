@@ -61,5 +61,5 @@ fn the_program_for_another_process_is_an_example() {
     let page = fs::read_to_string(root().join("docs/another-process.md")).unwrap();
     let example = fs::read_to_string(root().join("examples/remote.rs")).unwrap();
     let (_, program) = example.split_once("\n\n").unwrap();
-    assert!(page.contains(&format!("```rust\n{program}```")), "the page does not show\n{program}");
+    assert!(page.contains(&format!("```rust,no_run\n{program}```")), "the page does not show\n{program}");
 }
