@@ -44,6 +44,9 @@ pub struct JournalDefect {
     pub at: usize,
 }
 
+/// The latest time of a journal: no machine has run for 292 years. The cycle adds its phases to the times that its clock tells.
+const LATEST_NS: Nanoseconds = i64::MAX as Nanoseconds;
+
 const EPOCH: u8 = 0;
 const NOW: u8 = 1;
 const WOKE: u8 = 2;
@@ -261,12 +264,17 @@ impl Decoder<'_> {
     fn time(&mut self) -> Result<Nanoseconds, Malformed> {
         let number = self.number()?;
         let difference = (number >> 1) as i64 ^ -((number & 1) as i64);
-        self.last_ns = self.last_ns.wrapping_add(difference as u64);
+        let at_ns = self.last_ns.checked_add_signed(difference).filter(|at_ns| *at_ns <= LATEST_NS);
+        self.last_ns = at_ns.ok_or(Malformed)?;
         Ok(self.last_ns)
     }
 
     fn wake(&mut self) -> Result<Wake, Malformed> {
-        Ok(Wake { now_ns: self.time()?, timer_latency_ns: self.number()? })
+        let (now_ns, timer_latency_ns) = (self.time()?, self.number()?);
+        if timer_latency_ns > now_ns {
+            return Err(Malformed);
+        }
+        Ok(Wake { now_ns, timer_latency_ns })
     }
 
     fn bus(&mut self) -> Result<usize, Malformed> {
