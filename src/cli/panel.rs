@@ -15,7 +15,9 @@ use crate::link::modbus_line::ModbusLine;
 use crate::link::ownership::Ownership;
 use crate::link::serial_line::SerialSettings;
 use crate::monitor::BusDecoder;
-use crate::panel::{self, BenchBus, BenchDrive, BenchLink, Listening, PanelOptions, Workplace};
+use crate::panel::{
+    self, BenchBus, BenchDrive, BenchLink, Listening, Panel, PanelError, PanelOptions, Workplace,
+};
 use crate::remote;
 
 use super::configuration;
@@ -116,22 +118,14 @@ fn show_controller(arguments: &Arguments, name: &str, interrupted: &AtomicBool) 
     let listening = arguments.access.listen(arguments.address)?;
     let lease = client.clone();
     let take_lease: panel::TakeLease = Box::new(move || lease.take_over());
-    let panel = match listening.show(client.clone(), Some(take_lease)) {
-        Ok(panel) => panel,
-        Err(error) => {
-            say!("takt: {error}");
-            return Ok(Exit::Stopped);
-        }
-    };
-    say!("takt: {}", greeting(panel.address()));
-    while !interrupted.load(Ordering::Relaxed) {
-        std::thread::sleep(LOOK);
-        if client.has_ended() {
+    let panel = listening.show(client.clone(), Some(take_lease));
+    let is_over = |_: &Panel| {
+        client.has_ended().then(|| {
             say!("takt: the controller has ended");
-            return Ok(Exit::Done);
-        }
-    }
-    Ok(Exit::Interrupted)
+            Exit::Done
+        })
+    };
+    Ok(keep_open(panel, is_over, interrupted))
 }
 
 fn commission(
@@ -145,22 +139,36 @@ fn commission(
         Some(path) => of_configuration(arguments, path)?,
         None => of_interfaces(arguments)?,
     };
-    let panel = match listening.commission(place) {
+    let is_over = |panel: &Panel| {
+        panel.is_taken_over().then(|| {
+            say!("takt: another process takes the buses over");
+            Exit::Interrupted
+        })
+    };
+    Ok(keep_open(listening.commission(place), is_over, interrupted))
+}
+
+/// Says where the panel is, and keeps it until it is over or Ctrl-C comes.
+fn keep_open(
+    panel: Result<Panel, PanelError>,
+    is_over: impl Fn(&Panel) -> Option<Exit>,
+    interrupted: &AtomicBool,
+) -> Exit {
+    let panel = match panel {
         Ok(panel) => panel,
         Err(error) => {
             say!("takt: {error}");
-            return Ok(Exit::Stopped);
+            return Exit::Stopped;
         }
     };
     say!("takt: {}", greeting(panel.address()));
     while !interrupted.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
-        if panel.is_taken_over() {
-            say!("takt: another process takes the buses over");
-            break;
+        if let Some(exit) = is_over(&panel) {
+            return exit;
         }
     }
-    Ok(Exit::Interrupted)
+    Exit::Interrupted
 }
 
 /// A bus before it is opened.
