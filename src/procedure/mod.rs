@@ -16,7 +16,7 @@
 //!    └── modbus_session ── registers of a slave on a Modbus line
 //! ```
 //!
-//! A waiting procedure is given up by dropping its code: [`ProcedureSession::give_up_when`], or the whole [`Procedure`].
+//! A waiting procedure is abandoned by dropping its code: [`ProcedureSession::unless_over`], or the whole [`Procedure`].
 //! A family with a protocol of its own has its session in its folder. The engine knows no family of drives, and no failure of its users: they say what a failed transfer means.
 
 mod access;

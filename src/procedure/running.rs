@@ -145,7 +145,7 @@ mod tests {
             session.client_mut().outgoing.push_back(vec![question]);
             let answer = session.until(|| session.client_mut().answer.take());
             let end_ns = session.now_ns() + 10;
-            if let Some(answer) = session.give_up_when(|| session.now_ns() >= end_ns, answer).await {
+            if let Some(answer) = session.unless_over(|| session.now_ns() >= end_ns, answer).await {
                 return Ok(answer);
             }
         }

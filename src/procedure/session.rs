@@ -203,11 +203,11 @@ impl<C> ProcedureSession<C> {
 
     /// Waits for a time, or until it is interrupted.
     pub async fn pause(&self, duration_ns: Nanoseconds) {
-        self.give_up_when(|| self.is_interrupted(), self.sleep(duration_ns)).await;
+        self.unless_over(|| self.is_interrupted(), self.sleep(duration_ns)).await;
     }
 
     /// Runs `work` to its end, or until `is_over`: then `work` is dropped where it waits, and the result is `None`.
-    pub async fn give_up_when<T>(
+    pub async fn unless_over<T>(
         &self,
         is_over: impl Fn() -> bool,
         work: impl Future<Output = T>,

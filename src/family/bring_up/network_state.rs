@@ -107,7 +107,7 @@ impl AxisSession<'_> {
         }
         self.bus.begin_collecting();
         let question = self.bus.exchange(Transfer::Upload { object: DEVICE_TYPE.address });
-        let answer = self.bus.give_up_when(|| self.bus.has_reported(awaited), question).await;
+        let answer = self.bus.unless_over(|| self.bus.has_reported(awaited), question).await;
         let frames = self.bus.end_collecting();
         let Some(answer) = answer else {
             self.bus.reset_transfer();

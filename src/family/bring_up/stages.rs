@@ -471,7 +471,7 @@ type FailedAxis = (usize, FailureCause);
 async fn carry_out<'a>(part: Part, axes: &'a [AxisSession<'a>]) -> Option<FailedAxis> {
     let bus = &axes.first()?.bus;
     loop {
-        if let Some(failed) = bus.give_up_when(|| bus.has_restarted(), each(part, axes)).await {
+        if let Some(failed) = bus.unless_over(|| bus.has_restarted(), each(part, axes)).await {
             return failed;
         }
         bus.accept_restart();

@@ -49,7 +49,7 @@ impl SdoSession {
     /// # Errors
     /// [`Failure::Interrupted`]
     pub async fn pause(&self, duration_ns: Nanoseconds) -> Result<(), Failure> {
-        let pause = self.give_up_when(|| self.is_interrupted(), self.sleep(duration_ns));
+        let pause = self.unless_over(|| self.is_interrupted(), self.sleep(duration_ns));
         pause.await.ok_or(Failure::Interrupted)
     }
 

@@ -91,6 +91,6 @@ impl ErobCanSession {
         self.client_mut().probe(question, answer);
         let end_ns = self.now_ns().saturating_add(within_ns);
         let has_answer = self.until(|| self.client().has_probe_answer().then_some(()));
-        self.give_up_when(|| self.now_ns() >= end_ns, has_answer).await.is_some()
+        self.unless_over(|| self.now_ns() >= end_ns, has_answer).await.is_some()
     }
 }

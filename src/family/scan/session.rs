@@ -98,7 +98,7 @@ impl ScanSession {
             }
             None
         });
-        self.give_up_when(|| self.now_ns() >= end_ns, reply).await
+        self.unless_over(|| self.now_ns() >= end_ns, reply).await
     }
 
     /// Reads an object of a node. Nothing is repeated.

@@ -56,7 +56,7 @@ async fn read(c: &LineSession) -> Result<EncoderReading, Failure> {
             None
         });
         let end_ns = c.now_ns().saturating_add(REPLY_NS);
-        let reply = c.give_up_when(|| c.now_ns() >= end_ns || c.is_interrupted(), reply).await;
+        let reply = c.unless_over(|| c.now_ns() >= end_ns || c.is_interrupted(), reply).await;
         if c.is_interrupted() {
             return Err(Failure::Interrupted);
         }
