@@ -1,7 +1,7 @@
 # takt itself, with `takt sim` as the other side, its SYNC seen by a listener of its own: six axes on two virtual
 # interfaces, idle and under load, at 1 ms and 2 ms, with and without the spin guard; and three axes on the two emulated
 # controllers; and a stream, beside clients of every kind that behave badly: threads of a program in Rust, other processes, a program in C,
-# one in Python; and three hollow-shaft motors over CAN FD, whose requests take the place
+# one in Python; and watched by twenty pages of the panel and twenty monitors; and three hollow-shaft motors over CAN FD, whose requests take the place
 # of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT, UNRULY_CLIENTS, UNRULY_PROCESSES and
 # UNRULY_C name the programs, PYTHON an interpreter with takt; CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long; EVERY_KIND_LOADED=yes has clients of every kind
 # under load, too. Leaves product.txt (the table, and
@@ -118,6 +118,36 @@ beside_clients() { # idle|load ALLOWANCE
     try beside "bad Python" "$arm" "$@" "$PYTHON" tests/vm/unruly_program.py
 }
 
+# Watched: twenty pages of the panel are open and twenty monitors run. An axis moves to and fro for the first page.
+watched() { # idle|load ALLOWANCE
+    local load=$1 log=$OUT/watched-$1 run pages monitor monitors=() bus found status=0
+    chrt --other 0 "$TAKT" run "$arm" --bus base=vcan0 --bus wrist=vcan1 --require-realtime --panel 127.0.0.1:8080 --record "$log.mcap" > "$log.txt" 2>&1 & run=$!
+    chrt --other 0 python3 $guest/open_pages.py 8080 20 > "$log-pages.txt" 2>&1 & pages=$!
+    for bus in vcan{0,1}{,,,,,,,,,}; do
+        chrt --other 0 "$TAKT" monitor --bus "$bus" > "$log-monitor.txt" 2>&1 & monitors+=($!)
+    done
+    until grep -q 'an axis moves' "$log-pages.txt"; do
+        kill -0 $pages && kill -0 $run || { status=1; break; }
+        sleep 0.2
+    done
+    if [ $status = 0 ]; then
+        record vcan0 "$other_cycles" "$log.log"
+        for monitor in "${monitors[@]}"; do kill -0 "$monitor" || status=1; done
+    fi
+    kill $pages; wait $pages || status=1
+    kill "${monitors[@]}"; wait "${monitors[@]}"
+    # 130: ended by Ctrl-C, as a person does.
+    kill -INT $run; wait $run
+    [ $? = 130 ] && [ $status = 0 ] || { cat "$log.txt" "$log-pages.txt" "$log-monitor.txt"; return 1; }
+    read -r -a found <<< "$(periods "$log.log" 1000)"
+    row "takt, watched" vcan0 "$load" "${found[@]}"
+    tail -n 1 "$log-pages.txt" | sed 's/^/  /' | tee -a "$OUT/product.txt"
+    limits_verdict "$arm" "$log.mcap" || status=1
+    rm -f "$log.mcap" "$log-monitor.txt"
+    verdict 1000 "${found[0]}" "${found[1]}" "${found[5]}" "${found[6]}" $((latency_max + $2)) || status=1
+    return $status
+}
+
 # A leg of hollow-shaft motors, each of which answers its request 500 us later; the request to the first of them is timed.
 requests_of_leg() { # idle|load ALLOWANCE
     local timed=001 drive_frames="002:7FF 003:7FF 065:7FF 066:7FF 067:7FF"
@@ -177,6 +207,7 @@ try measure "takt" idle "$cycles" $idle_allowance 1000 "$arm" vcan0 vcan0 vcan1
 try measure "takt, sleep only" idle "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
 beside_clients idle $idle_allowance
+try watched idle $idle_allowance
 try system_calls
 try jitter idle vcan0
 
@@ -186,6 +217,7 @@ try measure "takt" load "$load_cycles" $load_allowance 1000 "$arm" vcan0 vcan0 v
 try measure "takt, sleep only" load "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" load "$other_cycles" $load_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
 beside_clients load $load_allowance
+[ -z "${EVERY_KIND_LOADED:-}" ] || try watched load $load_allowance
 try jitter load vcan0
 load_off
 drives_off
