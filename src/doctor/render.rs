@@ -4,14 +4,13 @@ use super::examination::Examination;
 use super::finding::{Finding, Group, Verdict};
 use super::self_test::{Grade, SelfTest};
 use crate::telemetry::Emphasis;
-use crate::telemetry::render::{duration, line};
+use crate::telemetry::render::{self, duration, line};
 
 /// Where the text of a check begins: mark, title.
 const INDENT: usize = 24;
-const COLUMNS: usize = 100;
 
 impl Examination {
-    /// The findings as text of at most 100 columns (but for commands, which are not broken).
+    /// The findings as text of at most 80 columns (but for commands, which are not broken).
     pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         let class =
@@ -130,21 +129,7 @@ fn show_self_test(text: &mut String, emphasis: Emphasis, test: &SelfTest) {
     }
 }
 
-/// Writes words behind a label that is as wide as the indent, broken between words where a line gets too long.
+/// Writes words behind a label that is as wide as the indent.
 fn paragraph(text: &mut String, label: &str, words: &str) {
-    let mut current = label.to_owned();
-    let mut columns = INDENT;
-    for word in words.split(' ') {
-        let length = word.chars().count();
-        if columns > INDENT && columns + 1 + length > COLUMNS {
-            line(text, &current);
-            (current, columns) = (" ".repeat(INDENT), INDENT);
-        } else if columns > INDENT {
-            current.push(' ');
-            columns += 1;
-        }
-        current.push_str(word);
-        columns += length;
-    }
-    line(text, &current);
+    render::paragraph(text, label, words, INDENT, INDENT);
 }

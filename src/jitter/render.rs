@@ -5,7 +5,7 @@ use crate::telemetry::Emphasis;
 use crate::telemetry::render::{duration, histograms, latency_table, line, missed_slots, realtime};
 
 impl JitterReport {
-    /// The report as text of at most 100 columns (but for commands, which are not broken).
+    /// The report as text of at most 80 columns (but for commands, which are not broken).
     pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         let cycle = duration(self.cycle_ns);
@@ -36,7 +36,7 @@ fn show_pass(text: &mut String, emphasis: Emphasis, pass: &PassReport) {
         "sleep" => "sleep only".to_owned(),
         _ => format!("sleep, then spin for the last {}", duration(pass.spin_guard_ns)),
     };
-    line(text, &emphasis.heading(&format!("── {title} {:─<1$}", "", 90 - title.chars().count())));
+    line(text, &emphasis.heading(&format!("── {title} {:─<1$}", "", 76 - title.chars().count())));
     histograms(text, emphasis, &pass.wake_ns, &pass.sync_ns);
     line(text, "");
     latency_table(text, emphasis, &[("wake-up", &pass.wake_ns), ("SYNC release", &pass.sync_ns)]);

@@ -1,4 +1,4 @@
-//! Renders the report of a run as text for people, in at most 100 columns. Histograms consist of block characters. Colours
+//! Renders the report of a run as text for people, in at most 80 columns. Histograms consist of block characters. Colours
 //! are optional. Other reports use parts of it.
 
 use std::fmt::Write;
@@ -9,13 +9,12 @@ use super::report::{
 };
 use crate::printable::{printable, printable_path};
 
-/// Rows of a histogram.
-const ROWS: usize = 4;
+/// Rows of the bars of a histogram.
+const ROWS: usize = 3;
 const EIGHTHS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 const DECADE_LABELS: [&str; DECADES + 1] = ["100ns", "1µs", "10µs", "100µs", "1ms", "10ms", "100ms"];
-/// Columns of a histogram: the counts at the left, the bars, and half a label at the right.
-const HISTOGRAM_COLUMNS: usize = 6 + 1 + RANGES_PER_DECADE * DECADES + 5;
-const COLUMNS: usize = 100;
+/// The width of a report: that of the smallest usual terminal.
+pub(crate) const COLUMNS: usize = 80;
 /// The column at which the text of a paragraph begins.
 const INDENT: usize = 13;
 
@@ -58,7 +57,7 @@ impl Emphasis {
 }
 
 impl RunReport {
-    /// The report as text of at most 100 columns. Paths and commands are not broken and may be longer.
+    /// The report as text of at most 80 columns. Paths and commands are not broken and may be longer.
     pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         self.headline(&mut text, emphasis);
@@ -129,8 +128,8 @@ impl RunReport {
         line(
             text,
             &emphasis.heading(&format!(
-                "{:<16}{:>16}   {:<36}{:>16}{:>12}",
-                "axis", "following error", "at its largest", "final position", "counts off"
+                "{:<16}{:>16}   {}",
+                "axis", "following error", "at its largest"
             )),
         );
         for axis in &self.axes {
@@ -140,12 +139,12 @@ impl RunReport {
         line(
             text,
             &emphasis.heading(&format!(
-                "{:<16}{:>16}{:>16}{:>16}   {}",
-                "set-points", "velocity", "acceleration", "jerk", "the largest, of the limit"
+                "{:<16}{:>11}{:>14}{:>11}{:>16}{:>12}",
+                "of the limits", "velocity", "acceleration", "jerk", "final position", "counts off"
             )),
         );
         for axis in &self.axes {
-            line(text, &part_row(axis));
+            line(text, &end_row(axis));
         }
     }
 
@@ -157,7 +156,7 @@ impl RunReport {
         line(
             text,
             &emphasis.heading(&format!(
-                "{:<16}{:<12}{:>9}{:>12}{:>12}{:>11}{:>9}  {}",
+                "{:<12}{:<9}{:>8}{:>10}{:>10}{:>9}{:>7}  {}",
                 "bus", "interface", "load", "sent", "received", "overruns", "errors", "state"
             )),
         );
@@ -206,14 +205,18 @@ impl RunReport {
     }
 }
 
-/// The histograms of wake-up latency and SYNC release error, side by side.
+/// The histograms of wake-up latency and SYNC release error, one above the other on one axis of time. All axes are logarithmic, so that a
+/// single late cycle among millions is visible.
 pub(crate) fn histograms(text: &mut String, emphasis: Emphasis, wake: &LatencyReport, sync: &LatencyReport) {
-    let left = histogram("wake-up latency (cycles, logarithmic)", wake);
-    let right = histogram("SYNC release error", sync);
-    for (row, (left, right)) in left.iter().zip(&right).enumerate() {
-        let both = format!("{left:<HISTOGRAM_COLUMNS$} {right}");
-        line(text, &if row == 0 { emphasis.heading(&both) } else { both });
+    for (title, latency) in [("wake-up latency (cycles, logarithmic)", wake), ("SYNC release error", sync)] {
+        line(text, &emphasis.heading(&format!("       {title}")));
+        bars(latency).iter().for_each(|row| line(text, row));
     }
+    let decade = format!("┬{:─<width$}", "", width = RANGES_PER_DECADE - 1);
+    line(text, &format!("{:>6}└{}┬", "", decade.repeat(DECADES)));
+    let labels: String =
+        DECADE_LABELS.iter().map(|label| format!("{label:<width$}", width = RANGES_PER_DECADE)).collect();
+    line(text, &format!("{:>6} {labels}", ""));
 }
 
 /// A table of the latencies of a cycle: wake-up, SYNC, computing, and set-points; then the callbacks, where one was called. Where
@@ -286,9 +289,8 @@ fn realtime_lines(realtime: &RealtimeReport) -> Vec<String> {
     lines
 }
 
-/// The rows of a histogram: a title, the bars, and the axis with its labels. Both axes are logarithmic, so that a single
-/// late cycle among millions is visible.
-fn histogram(title: &str, latency: &LatencyReport) -> Vec<String> {
+/// The bars of a histogram, with their counts.
+fn bars(latency: &LatencyReport) -> Vec<String> {
     let most = latency.histogram.iter().copied().max().unwrap_or(0);
     let height = |count: u64| match (count, most) {
         (0, _) => 0,
@@ -299,25 +301,16 @@ fn histogram(title: &str, latency: &LatencyReport) -> Vec<String> {
         }
     };
     let heights: Vec<usize> = latency.histogram.iter().copied().map(height).collect();
-    let mut rows = vec![format!("       {title}")];
-    for row in (0..ROWS).rev() {
-        let label = if row == ROWS - 1 && most > 1 {
-            short_count(most)
-        } else if row == 0 && most > 0 {
-            "1".to_owned()
-        } else {
-            String::new()
+    let row = |row: usize| {
+        let label = match row {
+            _ if row == ROWS - 1 && most > 1 => short_count(most),
+            0 if most > 0 => "1".to_owned(),
+            _ => String::new(),
         };
         let bar = |height: &usize| EIGHTHS[height.saturating_sub(row * 8).min(8)];
-        let bars: String = heights.iter().map(bar).collect();
-        rows.push(format!("{label:>6}┤{bars}"));
-    }
-    let decade = format!("┬{:─<width$}", "", width = RANGES_PER_DECADE - 1);
-    rows.push(format!("{:>6}└{}┬", "", decade.repeat(DECADES)));
-    let labels: String =
-        DECADE_LABELS.iter().map(|label| format!("{label:<width$}", width = RANGES_PER_DECADE)).collect();
-    rows.push(format!("{:>6} {}", "", labels.trim_end()));
-    rows
+        format!("{label:>6}┤{}", heights.iter().map(bar).collect::<String>())
+    };
+    (0..ROWS).rev().map(row).collect()
 }
 
 fn latency_row([name, min, p50, p99, p999, max]: [String; 6]) -> String {
@@ -340,10 +333,7 @@ fn axis_row(axis: &AxisReport) -> String {
             }
             _ => ("never enabled".to_owned(), String::new()),
         };
-    let name = shortened(&axis.name, 16);
-    let end = final_columns(axis);
-    let width = 64_usize.saturating_sub(circumstances.chars().count());
-    format!("{name:<16}{largest:>16}   {circumstances}{end:>width$}")
+    format!("{:<16}{largest:>16}   {circumstances}", shortened(&axis.name, 16))
 }
 
 /// The final position and the counts that it is off its target, if the drive has reported it.
@@ -351,7 +341,7 @@ fn final_columns(axis: &AxisReport) -> String {
     let (Some(position), Some(off)) = (axis.final_position, axis.final_error_counts) else {
         return axis
             .final_report_slot
-            .map_or_else(|| " never reported".to_owned(), |slot| format!(" not reported since slot {slot}"));
+            .map_or_else(|| "  never reported".to_owned(), |slot| format!("  none since slot {slot}"));
     };
     // Rounding first and then adding 0 avoids "-0".
     let rounded = (position * 1e5).round() / 1e5 + 0.0;
@@ -364,17 +354,19 @@ pub(super) fn part(part: Option<f64>) -> String {
     part.map_or_else(|| "no limit".to_owned(), |part| format!("{:.2} %", 100.0 * part))
 }
 
-fn part_row(axis: &AxisReport) -> String {
+/// The largest set-points as parts of the limits, and where the axis ended.
+fn end_row(axis: &AxisReport) -> String {
     let SetPointParts { velocity, acceleration, jerk } = axis.set_point_part;
     let [velocity, acceleration, jerk] = [velocity, acceleration, jerk].map(part);
-    format!("{:<16}{velocity:>16}{acceleration:>16}{jerk:>16}", shortened(&axis.name, 16))
+    let (name, end) = (shortened(&axis.name, 16), final_columns(axis));
+    format!("{name:<16}{velocity:>11}{acceleration:>14}{jerk:>11}{end}")
 }
 
 fn bus_row(bus: &BusReport) -> String {
-    let (name, interface) = (shortened(&bus.name, 16), shortened(&bus.interface, 12));
+    let (name, interface) = (shortened(&bus.name, 12), shortened(&bus.interface, 9));
     let (load, overruns) = (format!("{:.1} %", bus.load_percent), bus.tx_overruns + bus.rx_overruns);
     format!(
-        "{name:<16}{interface:<12}{load:>9}{:>12}{:>12}{overruns:>11}{:>9}  {}",
+        "{name:<12}{interface:<9}{load:>8}{:>10}{:>10}{overruns:>9}{:>7}  {}",
         bus.tx_frames, bus.rx_frames, bus.errors, bus.state
     )
 }
@@ -426,24 +418,32 @@ pub(crate) fn line(text: &mut String, line: &str) {
 
 /// Writes lines behind a label, which has `label_columns` visible characters. A long line is broken between words.
 pub(crate) fn wrap(text: &mut String, label: &str, label_columns: usize, lines: &[String]) {
-    let mut current = format!("{label}{:width$}", "", width = INDENT - label_columns);
-    let mut columns = INDENT;
-    for paragraph in lines {
-        for word in paragraph.split(' ') {
-            let length = word.chars().count();
-            if columns > INDENT && columns + 1 + length > COLUMNS {
-                line(text, &current);
-                (current, columns) = (" ".repeat(INDENT + 2), INDENT + 2);
-            } else if columns > INDENT {
-                current.push(' ');
-                columns += 1;
-            }
-            current.push_str(word);
-            columns += length;
-        }
-        line(text, &current);
-        (current, columns) = (" ".repeat(INDENT), INDENT);
+    let mut label = format!("{label}{:width$}", "", width = INDENT - label_columns);
+    for words in lines {
+        paragraph(text, &label, words, INDENT, INDENT + 2);
+        label = " ".repeat(INDENT);
     }
+}
+
+/// Writes words behind a label of `indent` visible characters, broken between words where a line gets too long; the lines after the first
+/// begin at `hanging`.
+pub(crate) fn paragraph(text: &mut String, label: &str, words: &str, indent: usize, hanging: usize) {
+    let mut current = label.to_owned();
+    let (mut begin, mut columns) = (indent, indent);
+    for word in words.split(' ') {
+        let length = word.chars().count();
+        if columns > begin && columns + 1 + length > COLUMNS {
+            line(text, &current);
+            current = " ".repeat(hanging);
+            (begin, columns) = (hanging, hanging);
+        } else if columns > begin {
+            current.push(' ');
+            columns += 1;
+        }
+        current.push_str(word);
+        columns += length;
+    }
+    line(text, &current);
 }
 
 #[cfg(test)]

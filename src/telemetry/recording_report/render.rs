@@ -1,11 +1,9 @@
 //! Renders the report of a recording as text for people.
 
-use std::fmt::Write;
-
 use takt_rt::Rule;
 
 use super::{AxisCycle, BusLoadSummary, GroupSummary, RecordingReport};
-use crate::telemetry::render::{self, Emphasis, cycle_latencies, line, missed_slots, wrap};
+use crate::telemetry::render::{self, Emphasis, cycle_latencies, line, missed_slots, paragraph, wrap};
 use crate::telemetry::report::SetPointParts;
 use crate::telemetry::words;
 
@@ -13,7 +11,7 @@ use crate::telemetry::words;
 const EVENTS: (usize, usize) = (24, 12);
 
 impl RecordingReport {
-    /// The report as text of at most 100 columns. Paths are not broken and may be longer.
+    /// The report as text of at most 80 columns. Paths are not broken and may be longer.
     pub fn render(&self, emphasis: Emphasis) -> String {
         let mut text = String::new();
         let kind = if self.is_black_box { "black box" } else { "recording" };
@@ -88,12 +86,17 @@ impl RecordingReport {
         line(
             text,
             &emphasis.heading(&format!(
-                "{:>8} {:<9}{:>10}{:>10}{:>9}{:>9}  {:<28}{:>6}{:>4}",
-                "slot", "phase", "set", "actual", "velocity", "error", "statusword", "6040", "age"
+                "{:>8} {:<9}{:>10}{:>10}{:>9}{:>9}{:>6}{:>6}{:>4}",
+                "slot", "phase", "set", "actual", "velocity", "error", "6041", "6040", "age"
             )),
         );
         line(text, &format!("{:>8} {:<9}{set:>10}{actual:>10}{velocity:>9}{error:>9}", "", ""));
+        let mut state = "";
         for cycle in &axis.cycles {
+            if cycle.state != state {
+                state = cycle.state;
+                line(text, &format!("{:>8} the drive: {state}", ""));
+            }
             line(text, &cycle.row());
         }
     }
@@ -115,9 +118,11 @@ impl RecordingReport {
         }
         for event in self.events.get(begin..end).unwrap_or_default() {
             let is_of_cause = self.cause.as_ref().is_some_and(|cause| cause.slot == event.slot);
-            let row = format!("{:>8} {:>10.3}  {}", event.slot, event.at_s, event.text);
+            let mut row = String::new();
+            let time = format!("{:>8} {:>10.3}  ", event.slot, event.at_s);
+            paragraph(&mut row, &time, &event.text, 21, 23);
             let is_shown_above = is_of_cause && event.text.starts_with("stop: ");
-            line(text, &if is_shown_above { emphasis.bad(&cut(&row)) } else { cut(&row) });
+            text.push_str(&if is_shown_above { emphasis.bad(&row) } else { row });
         }
         if end < self.events.len() {
             line(
@@ -136,8 +141,8 @@ impl RecordingReport {
     fn axis_table(&self, text: &mut String, emphasis: Emphasis) {
         line(text, "");
         let titles = format!(
-            "{:<16}{:>18}{:>14}{:>14}{:>12}   {}",
-            "axis", "following error", "velocity", "acceleration", "jerk", "(largest, of the limit)"
+            "{:<16}{:>18}{:>14}{:>14}{:>12}",
+            "largest", "following error", "velocity", "acceleration", "jerk"
         );
         line(text, &emphasis.heading(&titles));
         for axis in &self.axes {
@@ -170,14 +175,14 @@ impl RecordingReport {
         }
         line(text, "");
         let titles = format!(
-            "{:<16}{:>10}  {:<16}{:>10}{:>18}{:>20}",
-            "bus", "s", "state", "errors", "sending overruns", "receiving overruns"
+            "{:<14}{:>10}  {:<14}{:>7}{:>15}{:>18}",
+            "bus", "s", "state", "errors", "send overruns", "receive overruns"
         );
         line(text, &emphasis.heading(&titles));
         for bus in &self.buses {
-            let name = render::shortened(&bus.name, 16);
+            let name = render::shortened(&bus.name, 14);
             let row = format!(
-                "{name:<16}{:>10.3}  {:<16}{:>10}{:>18}{:>20}",
+                "{name:<14}{:>10.3}  {:<14}{:>7}{:>15}{:>18}",
                 bus.at_s, bus.state, bus.errors, bus.tx_overruns, bus.rx_overruns
             );
             line(text, &row);
@@ -185,29 +190,26 @@ impl RecordingReport {
     }
 }
 
-/// At most 100 columns of a line.
-fn cut(row: &str) -> String {
-    let mut cut: String = row.chars().take(99).collect();
-    if row.chars().count() > 99 {
-        let _ = write!(cut, "…");
-    }
-    cut
-}
-
 impl AxisCycle {
     fn row(&self) -> String {
-        let status = format!("{:04X} {}", self.statusword, self.state);
         let reported = match (self.position, self.velocity, self.following_error) {
             (Some(position), Some(velocity), Some(error)) => {
-                format!("{position:>10.5}{velocity:>+9.3}{:>+9.3}  {status:<28}", error * 1e3)
+                format!("{position:>10.5}{velocity:>+9.3}{:>+9.3}{:>6}", error * 1e3, hex(self.statusword))
             }
             // What was reported last is in an earlier row.
-            _ => format!("{:>28}  {:<28}", "no feedback", format!("({status})")),
+            _ => format!("{:>28}{:>6}", "no feedback", "–"),
         };
-        let controlword = format!("{:04X}", self.controlword);
         format!(
-            "{:>8} {:<9}{:>10.5}{reported}{controlword:>6}{:>4}",
-            self.slot, self.phase, self.position_set, self.feedback_age
+            "{:>8} {:<9}{:>10.5}{reported}{:>6}{:>4}",
+            self.slot,
+            self.phase,
+            self.position_set,
+            hex(self.controlword),
+            self.feedback_age
         )
     }
+}
+
+fn hex(word: u16) -> String {
+    format!("{word:04X}")
 }
