@@ -108,9 +108,9 @@ fn show(arguments: &Arguments) -> Result<Exit, UsageError> {
     }
 }
 
-/// A name of a controller has no dot and no slash.
+/// A configuration is a path, or ends as those that come with takt do; a name of a controller has no slash.
 fn is_configuration(what: &str) -> bool {
-    what.contains(['.', '/'])
+    what.contains('/') || what.ends_with(".toml")
 }
 
 fn show_controller(arguments: &Arguments, name: &str, interrupted: &AtomicBool) -> Result<Exit, UsageError> {

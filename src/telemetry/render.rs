@@ -474,10 +474,10 @@ mod tests {
         latency.histogram[8] = 5_000_000;
         latency.histogram[9] = 2_000;
         latency.histogram[32] = 1;
-        let rows = histogram("t", &latency);
-        assert_eq!(rows[1], format!("    5M┤{:36}", "        █"));
-        assert_eq!(rows[3], format!("      ┤{:36}", "        ██"));
-        assert_eq!(rows[4], format!("     1┤{:36}", "        ██                      ▁"));
+        let rows = bars(&latency);
+        assert_eq!(rows[0], format!("    5M┤{:36}", "        █"));
+        assert_eq!(rows[1], format!("      ┤{:36}", "        █▄"));
+        assert_eq!(rows[2], format!("     1┤{:36}", "        ██                      ▁"));
     }
 
     #[test]
