@@ -377,7 +377,7 @@ fn the_text_shows_every_check_in_a_hundred_columns_and_colours_only_when_asked()
         assert!(plain.contains(check.title), "{}", check.title);
     }
     for line in plain.lines().filter(|line| !line.contains('→')) {
-        assert!(line.chars().count() <= 100, "{line}");
+        assert!(line.chars().count() <= 80, "{line}");
     }
     assert_eq!(plain.matches("isolcpus=managed_irq").count(), 1, "a command is shown once:\n{plain}");
     assert!(plain.contains("✗ 2 things forbid real time"), "{plain}");

@@ -223,7 +223,7 @@ fn the_last_position_of_a_drive_that_has_fallen_silent_is_not_its_final_position
             "{axis}"
         );
         let reported = axis["final_report_slot"].as_u64().unwrap();
-        let is_shown = text.contains(&format!("not reported since slot {reported}"));
+        let is_shown = text.contains(&format!("none since slot {reported}"));
         assert_eq!((reported <= lost_in, is_shown), (is_lost, is_lost), "{axis}, lost in {lost_in}\n{text}");
     }
 }

@@ -15,6 +15,8 @@ const EIGHTHS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇'
 const DECADE_LABELS: [&str; DECADES + 1] = ["100ns", "1µs", "10µs", "100µs", "1ms", "10ms", "100ms"];
 /// The width of a report: that of the smallest usual terminal.
 pub(crate) const COLUMNS: usize = 80;
+/// Units that no other word begins with.
+const UNITS: [&str; 2] = ["µs", "%"];
 /// The column at which the text of a paragraph begins.
 const INDENT: usize = 13;
 
@@ -127,10 +129,7 @@ impl RunReport {
         line(text, "");
         line(
             text,
-            &emphasis.heading(&format!(
-                "{:<16}{:>16}   {}",
-                "axis", "following error", "at its largest"
-            )),
+            &emphasis.heading(&format!("{:<16}{:>16}   {}", "axis", "following error", "at its largest")),
         );
         for axis in &self.axes {
             line(text, &axis_row(axis));
@@ -430,7 +429,11 @@ pub(crate) fn wrap(text: &mut String, label: &str, label_columns: usize, lines: 
 pub(crate) fn paragraph(text: &mut String, label: &str, words: &str, indent: usize, hanging: usize) {
     let mut current = label.to_owned();
     let (mut begin, mut columns) = (indent, indent);
-    for word in words.split(' ') {
+    // A number stays with its unit: the space between them is no place for a break.
+    let whole = UNITS
+        .iter()
+        .fold(words.to_owned(), |words, unit| words.replace(&format!(" {unit}"), &format!("\u{a0}{unit}")));
+    for word in whole.split(' ') {
         let length = word.chars().count();
         if columns > begin && columns + 1 + length > COLUMNS {
             line(text, &current);
@@ -440,7 +443,7 @@ pub(crate) fn paragraph(text: &mut String, label: &str, words: &str, indent: usi
             current.push(' ');
             columns += 1;
         }
-        current.push_str(word);
+        current.extend(word.chars().map(|letter| if letter == '\u{a0}' { ' ' } else { letter }));
         columns += length;
     }
     line(text, &current);

@@ -47,6 +47,12 @@ impl Transmission {
     }
 }
 
+/// A limit that becomes a whole code of its field which is not beyond it: the nearest one could be by half a code.
+fn largest_within(limit: f64, code: f64) -> f64 {
+    // A little less than half: a limit that is a whole number of codes is reached, whatever the last digits say.
+    (limit - 0.499_999 * code).max(0.0)
+}
+
 impl FieldDevice {
     /// What one SI unit at the joint is in the unit of a field.
     fn per_joint_unit(&self, unit: FieldUnit, by: Transmission) -> f64 {
@@ -131,8 +137,10 @@ impl FieldDevice {
             Some(states) => reply.with_states(states),
             None => reply,
         };
+        let command = self.frame(&description.command, axis.node, to_drive)?;
+        let torque_code = command.unit_of(CommandValue::Torque).abs();
         Ok(FieldDriveParameters {
-            command: self.frame(&description.command, axis.node, to_drive)?,
+            command,
             reply: match self.sender_byte(axis.node) {
                 Some(sender) => reply.sent_by(sender),
                 None => reply,
@@ -144,7 +152,7 @@ impl FieldDevice {
                 // A limit has no direction.
                 BesideTargetKind::Limits => BesideTarget::Limits {
                     velocity: by.direction * CATCHING_UP * axis.limits.velocity,
-                    torque: by.direction * axis.limits.torque,
+                    torque: by.direction * largest_within(axis.limits.torque, torque_code),
                 },
             },
             gains: self.gains(&axis.control),
