@@ -363,7 +363,7 @@ fn a_machine_that_shows_nothing_is_judged_by_the_attempt_alone() {
 }
 
 #[test]
-fn the_text_shows_every_check_in_a_hundred_columns_and_colours_only_when_asked() {
+fn the_text_shows_every_check_in_eighty_columns_and_colours_only_when_asked() {
     let mut machine = prepared();
     machine.answers.insert(IP.to_owned(), can0("ERROR-PASSIVE", 0, "fq_codel", 7));
     machine.file("proc/cmdline", b"quiet");

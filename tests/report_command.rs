@@ -113,6 +113,7 @@ fn the_report_of_a_black_box_has_the_reason_the_axis_its_last_cycles_the_events_
     let output = report(&left.black_box, &["--cycles", "7"]);
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
     let text = text(&output);
+    let unbroken = text.split_whitespace().collect::<Vec<_>>().join(" ");
     for part in [
         "black box of ",
         "joint3 was 0.0",
@@ -121,12 +122,12 @@ fn the_report_of_a_black_box_has_the_reason_the_axis_its_last_cycles_the_events_
         "moving → stopping",
         "operation enabled",
         "computing",
-        "missed slots           0 of ",
+        "missed slots 0 of ",
         "2023-11-14 22:13:20",
     ] {
-        assert!(text.contains(part), "{part:?} is not in\n{text}");
+        assert!(unbroken.contains(part), "{part:?} is not in\n{text}");
     }
-    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
 }
 
 #[test]
@@ -259,11 +260,8 @@ fn cycles_without_feedback_are_shown_as_such_and_not_as_the_last_values() {
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
     let text = text(&output);
     let row = text.lines().find(|line| line.contains("no feedback")).expect(&text);
-    assert!(
-        row.contains("(") && row.contains("operation enabled)") && row.ends_with(char::is_numeric),
-        "{row}"
-    );
-    assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+    assert!(row.contains('–') && row.ends_with(char::is_numeric), "{row}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
 
     let told = json(&report(&recording, &["--cycles", "4", "--json"]));
     let cycles = told["axis"]["cycles"].as_array().unwrap();

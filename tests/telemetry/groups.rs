@@ -14,6 +14,7 @@ use takt_rt::{
 use tempfile::TempDir;
 
 use crate::reader::{Value, messages};
+use crate::report::unbroken;
 use crate::run::{Notices, cycle, event, machine, options, sides};
 
 const STOP: StopReason = StopReason {
@@ -135,11 +136,6 @@ fn the_report_of_a_run_has_the_stop_and_the_callbacks_of_each_group() {
     ] {
         assert!(unbroken(&text).contains(&unbroken(part)), "{part:?} is not in\n{text}");
     }
-}
-
-/// A text whose lines are not broken, with single spaces.
-fn unbroken(text: &str) -> String {
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[test]
