@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 36] = [
+const ORDER: [&str; 37] = [
     "internals",
     "cli",
     "panel",
@@ -39,6 +39,7 @@ const ORDER: [&str; 36] = [
     "packet",
     "frame_time",
     "sleep_alignment",
+    "monotonic_clock",
     "source_text",
     "printable",
     "text_file",

@@ -14,6 +14,8 @@ mod black_box;
 mod bus_load;
 mod candump;
 mod cdr;
+#[cfg_attr(not(target_os = "linux"), path = "compression_elsewhere.rs")]
+mod compression;
 mod destination;
 mod history;
 mod journal_keeper;
@@ -23,6 +25,7 @@ mod loop_timing;
 mod machine;
 mod messages;
 mod own_errors;
+#[cfg(target_os = "linux")]
 mod realtime;
 mod recorded;
 mod recording;
@@ -34,6 +37,7 @@ mod replay_recording;
 mod report;
 mod severity;
 mod statistics;
+#[cfg(target_os = "linux")]
 pub(crate) mod thread;
 mod wall_clock;
 pub(crate) mod words;
@@ -69,6 +73,7 @@ pub use report::{
 #[cfg(feature = "cli")]
 pub(crate) use severity::Severity;
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
+#[cfg(target_os = "linux")]
 pub(crate) use thread::LoggerThread;
 pub use wall_clock::WallClock;
 pub use words::{event as event_words, phase as phase_words};

@@ -3,13 +3,13 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use takt_rt::linux::MonotonicClock;
 use takt_rt::{Clock, Nanoseconds};
 
 use super::life::Life;
 use crate::channels::LogSide;
 use crate::controller::outcome::{Interrupt, Outcome};
 use crate::controller::virtual_time::VirtualRun;
+use crate::monotonic_clock::MonotonicClock;
 use crate::sim::SimulatedBus;
 use crate::telemetry::EachCycle;
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use takt_rt::StopCategory;
-use takt_rt::linux::ThreadReport;
 
 use super::in_loop::Callbacks;
 use super::life::Life;
@@ -15,9 +14,8 @@ use super::trajectory::Trajectories;
 use super::{Handle, Shared};
 use crate::channels::MotionEnd;
 use crate::config::Config;
-use crate::controller::assemble;
+use crate::controller::assemble::{self, AssembleError};
 use crate::controller::outcome::Outcome;
-use crate::controller::session::SessionError;
 use crate::controller::supervisor::AfterBringUp;
 use crate::controller::virtual_time::VirtualRun;
 use crate::sim::SimulatedBus;
@@ -70,16 +68,16 @@ impl VirtualController {
         each_cycle: Option<EachCycle>,
         after_bring_up: AfterBringUp,
     ) -> Result<Self, StartFailure> {
-        config.validate().map_err(|error| SessionError::Assemble(error.into()))?;
+        config.validate().map_err(AssembleError::from)?;
         let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
-        let begun = VirtualRun::serving(config, ports, after_bring_up);
-        let (mut run, log) = begun.map_err(SessionError::Assemble)?;
+        let (mut run, log) = VirtualRun::serving(config, ports, after_bring_up)?;
         let host = run.host();
         let shared = Shared {
             axes: config.axes.clone(),
             groups: config.groups.clone(),
             machine: Machine::of(config),
-            realtime: ThreadReport::of_ordinary_thread(),
+            #[cfg(target_os = "linux")]
+            realtime: takt_rt::linux::ThreadReport::of_ordinary_thread(),
             // Nothing is ever counted: no time passes within a virtual cycle.
             timing: shown_timing().1,
             clients: host.clients(),
