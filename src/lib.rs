@@ -63,7 +63,7 @@
 //!
 //! ```text
 //! internals                           what the tests see beyond the public face
-//! cli                                 the program `takt`
+//! cli browser                         the program `takt`; takt in a page without a machine
 //! panel                               a running controller in the browser, and commissioning without one
 //! doctor jitter commission play replay  is the machine fit; one drive apart from any run; motion from a file; a run again
 //! error                               one error for a program that embeds takt
@@ -96,6 +96,9 @@
 // Some functions are for the program alone.
 #![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
+#[cfg(feature = "browser")]
+#[doc(hidden)]
+pub mod browser;
 mod bus_log;
 pub mod canopen;
 mod channels;
@@ -144,7 +147,7 @@ mod modbus;
 mod monitor;
 mod monotonic_clock;
 mod packet;
-#[cfg(feature = "panel")]
+#[cfg(feature = "browser")]
 mod panel;
 #[cfg(feature = "cli")]
 mod play;
@@ -152,7 +155,7 @@ mod printable;
 mod procedure;
 #[cfg(target_os = "linux")]
 mod remote;
-#[cfg(feature = "cli")]
+#[cfg(feature = "browser")]
 mod replay;
 pub mod schedule;
 #[cfg(target_os = "linux")]

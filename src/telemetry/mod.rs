@@ -17,6 +17,7 @@ mod cdr;
 #[cfg_attr(not(target_os = "linux"), path = "compression_elsewhere.rs")]
 mod compression;
 mod destination;
+mod files_in_memory;
 mod history;
 mod journal_keeper;
 mod listener;
@@ -43,9 +44,13 @@ mod wall_clock;
 pub(crate) mod words;
 
 pub use crate::channels::LogSide;
+#[cfg(feature = "browser")]
+pub(crate) use black_box::BlackBox;
 pub use black_box::{BlackBoxOptions, Incident};
 pub use cdr::{CdrDecoder, CdrEncoder};
 pub use destination::RecordingDestination;
+#[cfg(feature = "browser")]
+pub(crate) use files_in_memory::FilesInMemory;
 pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub(crate) use loop_timing::{LOOP_TIMING_WORDS, ShownTiming, newest_timing, shown_timing};
@@ -56,8 +61,10 @@ pub use recorded::{
     Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, RecordedFrame, RecordedFrames,
     RecordedLoad, WalkError,
 };
-#[cfg(feature = "cli")]
-pub(crate) use recorded::{RecordedJournal, journal as recorded_journal};
+#[cfg(feature = "browser")]
+pub(crate) use recorded::{
+    RecordedJournal, journal as recorded_journal, journal_in_memory as recorded_journal_in_memory,
+};
 pub use recording_report::{
     AxisCycle, AxisCycles, AxisSummary, BusChange, BusLoadSummary, GroupSummary, RecordingReport,
     ReportedEvent,
