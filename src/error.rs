@@ -5,12 +5,16 @@ use std::fmt;
 use crate::command::{CommandError, MotionError, StreamError, WaitError};
 use crate::config::{ConfigError, OverrideError};
 use crate::controller::StartFailure;
+#[cfg(target_os = "linux")]
 use crate::controller::session::SessionError;
 use crate::faults::ScenarioError;
+#[cfg(target_os = "linux")]
 use crate::remote::ConnectError;
+#[cfg(target_os = "linux")]
 use crate::serve::ServeError;
 
 pub use crate::controller::assemble::AssembleError;
+#[cfg(target_os = "linux")]
 pub use crate::controller::realtime_thread::StartError;
 
 /// The result of a program, or of a function of it.
@@ -45,15 +49,18 @@ pub enum Error {
     #[error(transparent)]
     Start(#[from] StartFailure),
     /// A run could not be started.
+    #[cfg(target_os = "linux")]
     #[error(transparent)]
     Session(#[from] SessionError),
     /// A controller in virtual time could not be made.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
     /// A controller of another process cannot be connected to.
+    #[cfg(target_os = "linux")]
     #[error(transparent)]
     Connect(#[from] ConnectError),
     /// A controller cannot be offered to other processes.
+    #[cfg(target_os = "linux")]
     #[error(transparent)]
     Serve(#[from] ServeError),
     /// A command was not executed.
@@ -77,9 +84,12 @@ impl fmt::Debug for Error {
             Self::Override(error) => error,
             Self::Scenario(error) => error,
             Self::Start(error) => error,
+            #[cfg(target_os = "linux")]
             Self::Session(error) => error,
             Self::Assemble(error) => error,
+            #[cfg(target_os = "linux")]
             Self::Connect(error) => error,
+            #[cfg(target_os = "linux")]
             Self::Serve(error) => error,
             Self::Command(error) => error,
             Self::Motion(error) => error,

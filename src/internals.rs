@@ -174,6 +174,7 @@ pub mod sim {
     pub use crate::sim::mailbox::*;
     pub use crate::sim::medium::*;
     pub mod serial_line {
+        pub use crate::sim::serial_host::*;
         pub use crate::sim::serial_line::*;
     }
     pub mod pseudo_terminal {

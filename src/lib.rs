@@ -63,7 +63,7 @@
 //!
 //! ```text
 //! internals                           what the tests see beyond the public face
-//! cli                                 the program `takt`
+//! cli browser                         the program `takt`; takt in a page without a machine
 //! panel                               a running controller in the browser, and commissioning without one
 //! doctor jitter commission play replay  is the machine fit; one drive apart from any run; motion from a file; a run again
 //! error                               one error for a program that embeds takt
@@ -83,7 +83,7 @@
 //! hollow_lines                        the serial lines of the hollow-shaft motors, without I/O
 //! channels                            the lock-free channels to the real-time thread
 //! bus_log                             logs of frames, as other programs write and read them
-//! trajectory packet frame_time sleep_alignment source_text printable text_file
+//! trajectory packet frame_time sleep_alignment monotonic_clock source_text printable text_file
 //! ```
 //!
 //! A run meets the parts in this order: `config` reads the file, `link` opens the buses, `schedule` says whether everything fits,
@@ -96,6 +96,9 @@
 // Some functions are for the program alone.
 #![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
+#[cfg(feature = "browser")]
+#[doc(hidden)]
+pub mod browser;
 mod bus_log;
 pub mod canopen;
 mod channels;
@@ -142,19 +145,23 @@ pub mod link;
 mod modbus;
 #[cfg(feature = "cli")]
 mod monitor;
+mod monotonic_clock;
 mod packet;
-#[cfg(feature = "panel")]
+#[cfg(feature = "browser")]
 mod panel;
 #[cfg(feature = "cli")]
 mod play;
 mod printable;
 mod procedure;
+#[cfg(target_os = "linux")]
 mod remote;
-#[cfg(feature = "cli")]
+#[cfg(feature = "browser")]
 mod replay;
 pub mod schedule;
+#[cfg(target_os = "linux")]
 mod serve;
 pub mod sim;
+#[cfg(target_os = "linux")]
 mod sleep_alignment;
 mod source_text;
 pub mod telemetry;
@@ -171,28 +178,37 @@ pub use command::{
     PointRefusal, Refused, RunningController, Stopped, StreamError, TrajectoryProgress, WaitError,
 };
 pub use config::{Config, ConfigError};
+#[cfg(target_os = "linux")]
+pub use controller::Controller;
 pub use controller::port::Port;
+#[cfg(target_os = "linux")]
 pub use controller::realtime_thread::{Begun, Ended};
+#[cfg(target_os = "linux")]
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
-    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, Controller, Events,
-    GroupHandle, Handle, Interrupt, LinePort, Outcome, SharedLine, StartFailure, StreamHandle, VirtualClock,
+    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, Events, GroupHandle,
+    Handle, Interrupt, LinePort, Outcome, SharedLine, StartFailure, StreamHandle, VirtualClock,
     VirtualController, VirtualRun,
 };
 pub use error::{Error, Result};
 pub use faults::{FaultInjector, Scenario};
+#[cfg(target_os = "linux")]
 pub use link::IfOwned;
+#[cfg(target_os = "linux")]
 pub use remote::{Client, ClientEvents, ClientGroup, ClientStream, ConnectError, connect};
+#[cfg(target_os = "linux")]
 pub use serve::{ServeError, ServeOptions, Server, serve};
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
 
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;
+#[cfg(target_os = "linux")]
+pub use takt_rt::linux::ThreadReport;
 pub use takt_rt::{
     AxisPoint, AxisSnapshot, AxisTarget, BusHealth, CallbackCycle, DriveState, Event, EventKind, Follow,
     OperationMode, Origin, Phase, RejectReason, RequestError, RequestId, Rule, Snapshot, StopCategory,
-    StopCause, StopReason, StreamCounts, StreamReport, StreamState, TimingLevel, linux::ThreadReport, plan,
+    StopCause, StopReason, StreamCounts, StreamReport, StreamState, TimingLevel, plan,
 };
 
 #[cfg(doctest)]

@@ -4,7 +4,6 @@ use std::ops::Index;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-use takt_rt::linux::MonotonicClock;
 use takt_rt::plan::State;
 use takt_rt::{
     AxisLimits, AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, Clock,
@@ -14,6 +13,7 @@ use takt_rt::{
 use super::callback_panic::{self, CaughtPanic};
 use super::callback_record::CallbackRecord;
 use super::lending::{Borrower, LENT_AT_MOST, Lender, lending};
+use crate::monotonic_clock::MonotonicClock;
 
 /// A function that leads a group from inside the real-time thread.
 pub type LoopCallback = dyn FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send;

@@ -284,9 +284,7 @@ fn play_in_real_time(
         }
         Err(StartFailure::NotEnabled(session)) => (Err(PlayError::Ended), Ok(*session), false),
         Err(StartFailure::Session(error)) => return Err(Refused::Session(error)),
-        Err(error @ (StartFailure::Died | StartFailure::NotEnabledVirtually { .. })) => {
-            return Err(Refused::Words(error.to_string()));
-        }
+        Err(error) => return Err(Refused::Words(error.to_string())),
     };
     let session = session.map_err(|error| Refused::Words(error.to_string()))?;
     let (axes, not_written) = log.finish();

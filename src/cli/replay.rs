@@ -1,15 +1,14 @@
 //! `takt replay`: runs the engine again on what a recording holds.
 
 use std::fmt::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
 use takt_rt::{CycleRecord, Event};
 
 use crate::config::{Config, ConfigSources, SourcesError};
-use crate::replay::{Comparison, Setting, apply, compare};
-use crate::telemetry::{Machine, RecordedJournal, ReplayRecording, recorded_journal, words};
+use crate::replay::{Comparison, ComparisonReport, Setting, apply, compare, complete_journal};
+use crate::telemetry::{Machine, Recorded, ReplayRecording, recorded_journal, words};
 
 use super::exit::Exit;
 use super::print;
@@ -36,51 +35,6 @@ pub struct Arguments {
     json: bool,
 }
 
-/// The result as an object.
-#[derive(Serialize)]
-struct Printed {
-    identical: bool,
-    cycles: u64,
-    compared: u64,
-    missing: u64,
-    differing: u64,
-    first_difference: Option<PrintedDifference>,
-    axes: Vec<PrintedAxis>,
-    stops: Vec<String>,
-    last_motion_s: Pair,
-}
-
-#[derive(Serialize)]
-struct PrintedDifference {
-    slot: u64,
-    what: String,
-    recorded: String,
-    replayed: String,
-}
-
-#[derive(Serialize)]
-struct PrintedAxis {
-    name: String,
-    position_difference: f64,
-    slot: u64,
-    velocity: Pair,
-    acceleration: Pair,
-    jerk: Pair,
-}
-
-/// A value of the recording, and of the replay.
-#[derive(Serialize)]
-struct Pair {
-    recorded: f64,
-    replayed: f64,
-}
-
-impl From<(f64, f64)> for Pair {
-    fn from((recorded, replayed): (f64, f64)) -> Self {
-        Self { recorded, replayed }
-    }
-}
-
 /// Runs it. The exit code is 0 when the replay is as the recording, or when it was to be another one; 1 when it differs though the
 /// configuration is the same; 2 when there is nothing to be replayed.
 pub fn run(arguments: &Arguments) -> Exit {
@@ -95,7 +49,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
     let found = recorded_journal(path).map_err(|error| error.to_string())?;
     let is_changed = arguments.config.is_some() || !arguments.settings.is_empty();
     let (sources, files) = (found.sources.clone(), found.files.clone());
-    let journal = complete(path, found)?;
+    let journal = complete_journal(&path.display().to_string(), found)?;
     let config = configuration(arguments, sources)?;
     let machine = Machine::of(&config);
     let mut written = match &arguments.record {
@@ -107,7 +61,8 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
             written.cycle(record, events, &machine);
         }
     };
-    let comparison = compare(&files, &config, journal, each).map_err(|error| error.to_string())?;
+    let files = files.iter().map(|file| Recorded::open(file));
+    let comparison = compare(files, &config, journal, each).map_err(|error| error.to_string())?;
     let is_written = written.is_none_or(|written| match written.finish() {
         Ok(file) => {
             say!("takt: the replay is recorded in {}", file.display());
@@ -123,7 +78,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
         false => Exit::Stopped,
     };
     Ok(if arguments.json {
-        print::json(&printed(&comparison, &config, &machine), exit)
+        print::json(&ComparisonReport::new(&comparison, &config, &machine), exit)
     } else {
         print::text(&text(&comparison, &config, &machine, is_changed), exit)
     })
@@ -145,43 +100,6 @@ fn configuration(arguments: &Arguments, recorded: ConfigSources) -> Result<Confi
     })?;
     config.validate()?;
     Ok(config)
-}
-
-/// The journal, if all of it is there.
-fn complete(path: &Path, found: RecordedJournal) -> Result<crate::journal::Journal, UsageError> {
-    let path = path.display();
-    if let Some(first) = found.begins_in {
-        let is_there = if first.exists() {
-            "replay that one, and this one follows it"
-        } else {
-            "which is not there any more"
-        };
-        return Err(format!(
-            "{path}: the journal of this run begins in an earlier file, {}: {is_there}",
-            first.display()
-        )
-        .into());
-    }
-    if found.is_of_other_version {
-        return Err(format!(
-            "{path}: its journal is of another version of takt; replay it with that version"
-        )
-        .into());
-    }
-    if let Some(defect) = found.defect {
-        return Err(format!("{path}: {defect}").into());
-    }
-    match (found.journal, found.lost) {
-        (None, _) => Err(format!(
-            "{path}: this has no journal: only recordings of `takt run` have one, not black boxes, and not those of takt 0.1"
-        )
-        .into()),
-        (_, Some(lost)) if lost > 0 => Err(format!(
-            "{path}: {lost} entries of the journal were lost, because the logger was late: it cannot be replayed"
-        )
-        .into()),
-        (Some(journal), _) => Ok(journal),
-    }
 }
 
 fn text(comparison: &Comparison, config: &Config, machine: &Machine, is_changed: bool) -> String {
@@ -238,35 +156,4 @@ fn axes(comparison: &Comparison, config: &Config) -> Table {
         ]);
     }
     table
-}
-
-fn printed(comparison: &Comparison, config: &Config, machine: &Machine) -> Printed {
-    Printed {
-        identical: comparison.is_identical(),
-        cycles: comparison.cycles,
-        compared: comparison.compared,
-        missing: comparison.missing,
-        differing: comparison.differing,
-        first_difference: comparison.first.clone().map(|first| PrintedDifference {
-            slot: first.slot,
-            what: first.what,
-            recorded: first.values.0,
-            replayed: first.values.1,
-        }),
-        axes: config
-            .axes
-            .iter()
-            .zip(&comparison.axes)
-            .map(|(axis, difference)| PrintedAxis {
-                name: axis.name.clone(),
-                position_difference: difference.position,
-                slot: difference.slot,
-                velocity: difference.velocity.into(),
-                acceleration: difference.acceleration.into(),
-                jerk: difference.jerk.into(),
-            })
-            .collect(),
-        stops: comparison.stops.iter().map(|(_, stop)| words::stop(stop, machine)).collect(),
-        last_motion_s: comparison.last_motion_s.into(),
-    }
 }

@@ -15,7 +15,7 @@ use std::thread;
 use clap::Args;
 
 use crate::config::Config;
-use crate::controller::port::open_configured;
+use crate::controller::opening::open_configured;
 use crate::family::simulated_drives;
 use crate::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
 use crate::link::{OpenError, RealInterface, SocketCanOptions};

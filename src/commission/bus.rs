@@ -1,7 +1,8 @@
 //! The bus of a drive that is commissioned, and how it is opened.
 
 use crate::config::Config;
-use crate::controller::port::{Port, open_configured};
+use crate::controller::opening::open_configured;
+use crate::controller::port::Port;
 use crate::link::ownership::{BusClaim, MasterTraffic};
 use crate::link::{InterfaceSettings, OpenError, RealInterface, SocketCanOptions, open_interface};
 use crate::monitor::BusDecoder;

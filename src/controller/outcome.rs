@@ -3,7 +3,7 @@
 use takt_rt::{Phase, RequestError, StopReason};
 
 use crate::family::bring_up::BringUpError;
-use crate::link::ownership::Process;
+use crate::link::Process;
 use crate::telemetry::{Machine, words};
 
 /// How a run ended.

@@ -2,15 +2,12 @@
 
 use arrayvec::ArrayVec;
 use takt_rt::Frame;
-use takt_rt::linux::{SlcanPort, SocketCanPort, TransparentPort};
 use takt_rt::{BusHealth, BusPort, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
-use super::buses::socket_options;
 use super::lines::LinePort;
-use crate::config::Config;
 use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
+use crate::link::LinkPort;
 use crate::link::trace::{Trace, TracedPort, traced};
-use crate::link::{InterfaceSettings, LinkPort, OpenError, RealInterface, SocketCanOptions, open_interface};
 use crate::sim::SimulatedBus;
 
 /// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
@@ -21,12 +18,8 @@ const TRACE_FRAMES: usize = 1 << 13;
 pub enum Port {
     /// A bus with simulated drives inside this process.
     Simulated(Box<SimulatedBus>),
-    /// A CAN interface of this machine.
-    SocketCan(Box<SocketCanPort>),
-    /// An SLCAN adapter on a serial line of this machine.
-    Slcan(Box<SlcanPort>),
-    /// A transparent converter between RS-485 and CAN FD on a serial line of this machine.
-    Converter(Box<TransparentPort>),
+    /// A CAN interface of this machine, or an adapter on a serial line of it.
+    Link(LinkPort),
     /// A serial line, whose drives are spoken to outside of the cycle.
     Line(Box<LinePort>),
     /// Any port whose frames are copied to the logger.
@@ -36,23 +29,11 @@ pub enum Port {
 }
 
 impl Port {
-    /// Opens bus number `bus` of a configuration.
-    ///
-    /// # Errors
-    /// See [`OpenError`].
-    pub fn open(config: &Config, bus: usize) -> Result<Self, OpenError> {
-        let options = socket_options(config, bus);
-        match open_configured(config, bus, &options)? {
-            Some(port) => Ok(port.into()),
-            None => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
-        }
-    }
-
     /// The simulated bus behind this port, if it is a simulated one.
     pub fn simulated_mut(&mut self) -> Option<&mut SimulatedBus> {
         match self {
             Self::Simulated(bus) => Some(bus),
-            Self::SocketCan(_) | Self::Slcan(_) | Self::Converter(_) | Self::Line(_) => None,
+            Self::Link(_) | Self::Line(_) => None,
             Self::Traced(port) => port.inner_mut().simulated_mut(),
             Self::Faulty(port) => port.inner_mut().simulated_mut(),
         }
@@ -65,28 +46,9 @@ impl Port {
     }
 }
 
-/// Brings the interface of bus number `bus` up, as far as needed and permitted, and opens it. Returns `None` for a simulated
-/// bus.
-///
-/// # Errors
-/// See [`OpenError`].
-pub fn open_configured(
-    config: &Config,
-    bus: usize,
-    options: &SocketCanOptions,
-) -> Result<Option<LinkPort>, OpenError> {
-    let Some(bus) = config.buses.get(bus) else { return Ok(None) };
-    let Some(interface) = RealInterface::of(&bus.interface) else { return Ok(None) };
-    open_interface(&bus.name, &interface, &InterfaceSettings::of(bus), options).map(Some)
-}
-
 impl From<LinkPort> for Port {
     fn from(port: LinkPort) -> Self {
-        match port {
-            LinkPort::SocketCan(port) => Self::SocketCan(port),
-            LinkPort::Slcan(port) => Self::Slcan(port),
-            LinkPort::Converter(port) => Self::Converter(port),
-        }
+        Self::Link(port)
     }
 }
 
@@ -100,9 +62,7 @@ impl BusPort for Port {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
         match self {
             Self::Simulated(port) => port.send(now_ns, frames),
-            Self::SocketCan(port) => port.send(now_ns, frames),
-            Self::Slcan(port) => port.send(now_ns, frames),
-            Self::Converter(port) => port.send(now_ns, frames),
+            Self::Link(port) => port.send(now_ns, frames),
             Self::Line(port) => port.send(now_ns, frames),
             Self::Traced(port) => port.send(now_ns, frames),
             Self::Faulty(port) => port.send(now_ns, frames),
@@ -110,21 +70,19 @@ impl BusPort for Port {
     }
 
     fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
-        let mut sockets = ArrayVec::<_, MAX_BUSES>::new();
+        let mut links = ArrayVec::<_, MAX_BUSES>::new();
         let mut traced = ArrayVec::<_, MAX_BUSES>::new();
         for Outgoing { port, frames, taken } in outgoing.iter_mut().take(MAX_BUSES) {
             match port {
-                Self::SocketCan(port) => sockets.push(Outgoing { port: port.as_mut(), frames, taken }),
+                Self::Link(port) => links.push(Outgoing { port, frames, taken }),
                 Self::Traced(port) => traced.push(Outgoing { port: port.as_mut(), frames, taken }),
                 Self::Simulated(port) => **taken = port.send(now_ns, frames),
-                Self::Slcan(port) => **taken = port.send(now_ns, frames),
-                Self::Converter(port) => **taken = port.send(now_ns, frames),
                 Self::Line(port) => **taken = port.send(now_ns, frames),
                 Self::Faulty(port) => **taken = port.send(now_ns, frames),
             }
         }
-        if !sockets.is_empty() {
-            SocketCanPort::send_together(now_ns, &mut sockets);
+        if !links.is_empty() {
+            LinkPort::send_together(now_ns, &mut links);
         }
         if !traced.is_empty() {
             TracedPort::send_together(now_ns, &mut traced);
@@ -134,9 +92,7 @@ impl BusPort for Port {
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
         match self {
             Self::Simulated(port) => port.receive(now_ns, batch),
-            Self::SocketCan(port) => port.receive(now_ns, batch),
-            Self::Slcan(port) => port.receive(now_ns, batch),
-            Self::Converter(port) => port.receive(now_ns, batch),
+            Self::Link(port) => port.receive(now_ns, batch),
             Self::Line(port) => port.receive(now_ns, batch),
             Self::Traced(port) => port.receive(now_ns, batch),
             Self::Faulty(port) => port.receive(now_ns, batch),
@@ -146,9 +102,7 @@ impl BusPort for Port {
     fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
         match self {
             Self::Simulated(port) => port.unconfirmed(now_ns),
-            Self::SocketCan(port) => port.unconfirmed(now_ns),
-            Self::Slcan(port) => port.unconfirmed(now_ns),
-            Self::Converter(port) => port.unconfirmed(now_ns),
+            Self::Link(port) => port.unconfirmed(now_ns),
             Self::Line(port) => port.unconfirmed(now_ns),
             Self::Traced(port) => port.unconfirmed(now_ns),
             Self::Faulty(port) => port.unconfirmed(now_ns),
@@ -158,9 +112,7 @@ impl BusPort for Port {
     fn health(&mut self) -> BusHealth {
         match self {
             Self::Simulated(port) => port.health(),
-            Self::SocketCan(port) => port.health(),
-            Self::Slcan(port) => port.health(),
-            Self::Converter(port) => port.health(),
+            Self::Link(port) => port.health(),
             Self::Line(port) => port.health(),
             Self::Traced(port) => port.health(),
             Self::Faulty(port) => port.health(),
@@ -172,15 +124,7 @@ impl Injectable for Port {
     fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Delivery {
         match self {
             Self::Simulated(port) => Injectable::send_foreign(port.as_mut(), now_ns, frame),
-            Self::SocketCan(port) => {
-                port.send(now_ns, &[*frame]);
-                Delivery::ToOthers
-            }
-            Self::Slcan(port) => {
-                port.send(now_ns, &[*frame]);
-                Delivery::ToOthers
-            }
-            Self::Converter(port) => {
+            Self::Link(port) => {
                 port.send(now_ns, &[*frame]);
                 Delivery::ToOthers
             }
@@ -193,7 +137,7 @@ impl Injectable for Port {
     fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
         match self {
             Self::Simulated(port) => port.inject(node, effect, is_present),
-            Self::SocketCan(_) | Self::Slcan(_) | Self::Converter(_) => Err(InjectError::NotSimulated),
+            Self::Link(_) => Err(InjectError::NotSimulated),
             Self::Line(port) => port.inject(node, effect, is_present),
             Self::Traced(port) => port.inject(node, effect, is_present),
             Self::Faulty(port) => port.inject(node, effect, is_present),

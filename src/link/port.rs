@@ -1,7 +1,8 @@
 //! The port of a real interface, of any kind.
 
+use arrayvec::ArrayVec;
 use takt_rt::linux::{SlcanPort, SocketCanPort, TransparentPort};
-use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch};
+use takt_rt::{BusHealth, BusPort, Frame, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 #[cfg(feature = "cli")]
 use crate::sim::LivePort;
@@ -35,6 +36,20 @@ impl BusPort for LinkPort {
             Self::SocketCan(port) => port.send(now_ns, frames),
             Self::Slcan(port) => port.send(now_ns, frames),
             Self::Converter(port) => port.send(now_ns, frames),
+        }
+    }
+
+    fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
+        let mut sockets = ArrayVec::<_, MAX_BUSES>::new();
+        for Outgoing { port, frames, taken } in outgoing.iter_mut().take(MAX_BUSES) {
+            match port {
+                Self::SocketCan(port) => sockets.push(Outgoing { port: port.as_mut(), frames, taken }),
+                Self::Slcan(port) => **taken = port.send(now_ns, frames),
+                Self::Converter(port) => **taken = port.send(now_ns, frames),
+            }
+        }
+        if !sockets.is_empty() {
+            SocketCanPort::send_together(now_ns, &mut sockets);
         }
     }
 

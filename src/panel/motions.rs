@@ -2,13 +2,14 @@
 //!
 //! Each group has one motion of a page at most. A thread looks at it every 10 ms: it renews a velocity or a torque, turns a reciprocating
 //! axis around, and brings the group to rest when the page is not there any more or a held key is not renewed. The stream and the profile
-//! modes have an end of their own in the real-time thread: what this thread does not renew there comes to rest as well.
+//! modes have an end of their own in the real-time thread: what this thread does not renew there comes to rest as well. All times are those of
+//! the controller, whose clock may be a virtual one.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use takt_rt::{AxisPoint, OperationMode, Phase, RequestId, RequestTarget, StopCategory};
+use takt_rt::{AxisPoint, Nanoseconds, OperationMode, Phase, RequestId, RequestTarget, StopCategory};
 
 use super::command::{
     Command, CommandRefusal, Lasts, Quantity, begin_move, change_mode, not_refused, positions_with,
@@ -16,12 +17,11 @@ use super::command::{
 };
 use super::pages::PageNumber;
 use crate::command::{MotionError, MotionId, MoveOptions, RunningController, WaitError};
-use crate::remote::now_ns;
 
 /// A held key that is not renewed for so long is released.
 pub const HELD_FOR: Duration = Duration::from_millis(250);
 /// How often motions are looked at.
-const LOOK: Duration = Duration::from_millis(10);
+pub const LOOK: Duration = Duration::from_millis(10);
 /// How long a motion that follows another one waits for its end.
 const AT_REST_WITHIN: Duration = Duration::from_secs(1);
 /// The real-time thread stops a drive in a profile mode whose value is not renewed for so long.
@@ -42,7 +42,7 @@ enum Kind {
     /// To and fro.
     Reciprocate { axis: usize, ends: [Vec<f64>; 2], options: MoveOptions, next: usize, motion: MotionId },
     /// A velocity or a torque.
-    Drive { axis: usize, value: f64, until: Option<Instant>, by: Route },
+    Drive { axis: usize, value: f64, until: Option<Nanoseconds>, by: Route },
 }
 
 /// How a velocity or a torque reaches the drive.
@@ -215,15 +215,20 @@ impl Motions {
         }
     }
 
+    /// So long from now, on the clock of the controller.
+    fn until(&self, lasts: Duration) -> Nanoseconds {
+        self.controller.now_ns().saturating_add(lasts.as_nanos() as u64)
+    }
+
     /// A motion cannot begin while the one before it comes to rest, which takes a moment.
     fn await_end_of_stop(&self, target: RequestTarget) {
-        let begun = Instant::now();
+        let until_ns = self.until(AT_REST_WITHIN);
         loop {
             let state = self.controller.state();
             let mut phases = state.groups().iter().enumerate().filter(|(group, _)| is_meant(target, *group));
             let is_stopping = phases.any(|(_, group)| group.phase == Phase::Stopping);
             if !is_stopping
-                || begun.elapsed() >= AT_REST_WITHIN
+                || self.controller.now_ns() >= until_ns
                 || self.controller.cycle_after(state.slot, LOOK) == Err(WaitError::Ended)
             {
                 return;
@@ -247,9 +252,9 @@ impl Motions {
 
     /// Stops what is repeated, and waits until the real-time thread has taken that: a motion that follows begins after it.
     fn rest(&self, target: RequestTarget) -> Result<(), CommandRefusal> {
-        let (before, begun) = (self.controller.newest_stop(target), Instant::now());
+        let (before, until_ns) = (self.controller.newest_stop(target), self.until(AT_REST_WITHIN));
         self.controller.request_stop(target, StopCategory::Two)?;
-        while self.controller.newest_stop(target) == before && begun.elapsed() < AT_REST_WITHIN {
+        while self.controller.newest_stop(target) == before && self.controller.now_ns() < until_ns {
             if self.controller.cycle_after(self.controller.state().slot, LOOK) == Err(WaitError::Ended) {
                 break;
             }
@@ -318,7 +323,7 @@ impl Motions {
         let target = target_of_axis(axis, self.controller.machine())?;
         let newest_stop = self.controller.newest_stop(target);
         let by = self.route(axis, target, quantity, value)?;
-        let until = (lasts == Lasts::Held).then(|| Instant::now() + HELD_FOR);
+        let until = (lasts == Lasts::Held).then(|| self.until(HELD_FOR));
         let kind = Kind::Drive { axis, value, until, by };
         self.keep(Motion { page, target, newest_stop, kind }, stops)
     }
@@ -390,7 +395,7 @@ impl Motions {
         let (own, until) = driven.ok_or(CommandRefusal::NothingToRenew)?;
         *own = value;
         if let Some(until) = until {
-            *until = Instant::now() + HELD_FOR;
+            *until = self.until(HELD_FOR);
         }
         Ok(())
     }
@@ -402,26 +407,38 @@ impl Motions {
     /// Leads the motions until [`Motions::end`], or until the controller ends. Of a page that is not there it ends them.
     pub fn run(&self, may_move: impl Fn(PageNumber) -> bool, tell: impl Fn(Problem)) {
         loop {
-            {
-                let mut kept = locked(&self.kept);
-                while kept.motions.is_empty() && !kept.has_ended {
-                    kept = self.changed.wait(kept).unwrap_or_else(PoisonError::into_inner);
-                }
-                if kept.has_ended || self.controller.has_ended() {
-                    return;
-                }
-                let now = Instant::now();
-                kept.motions.retain_mut(|motion| {
-                    let step =
-                        if may_move(motion.page) { motion.step(&*self.controller, now) } else { Step::Rest };
-                    self.is_kept(motion, step, &tell)
-                });
-                let moving = kept.motions.iter().filter(|motion| !motion.is_profile());
-                let moving = moving.map(|motion| (motion.page, motion.target)).collect();
-                *locked(&self.moving) = moving;
+            let mut kept = locked(&self.kept);
+            while kept.motions.is_empty() && !kept.has_ended {
+                kept = self.changed.wait(kept).unwrap_or_else(PoisonError::into_inner);
             }
+            if kept.has_ended || self.controller.has_ended() {
+                return;
+            }
+            self.step(kept, &may_move, &tell);
             std::thread::sleep(LOOK);
         }
+    }
+
+    /// Goes on with the motions once, where no thread does: to be called every [`LOOK`].
+    pub fn look(&self, tell: impl Fn(Problem)) {
+        if !self.controller.has_ended() {
+            self.step(locked(&self.kept), &|_| true, &tell);
+        }
+    }
+
+    fn step(
+        &self,
+        mut kept: MutexGuard<'_, Kept>,
+        may_move: &impl Fn(PageNumber) -> bool,
+        tell: &impl Fn(Problem),
+    ) {
+        kept.motions.retain_mut(|motion| {
+            let step = if may_move(motion.page) { motion.step(&*self.controller) } else { Step::Rest };
+            self.is_kept(motion, step, tell)
+        });
+        let moving = kept.motions.iter().filter(|motion| !motion.is_profile());
+        let moving = moving.map(|motion| (motion.page, motion.target)).collect();
+        *locked(&self.moving) = moving;
     }
 
     fn is_kept(&self, motion: &Motion, step: Step, tell: &impl Fn(Problem)) -> bool {
@@ -466,7 +483,7 @@ impl Motion {
         Some(zero.map_err(CommandRefusal::from))
     }
 
-    fn step(&mut self, controller: &dyn RunningController, now: Instant) -> Step {
+    fn step(&mut self, controller: &dyn RunningController) -> Step {
         if controller.newest_stop(self.target) != self.newest_stop {
             // Of another process' stop one hears late: what was renewed since then must end as well.
             return if self.repeated_axis().is_some() { Step::Rest } else { Step::Over };
@@ -487,7 +504,7 @@ impl Motion {
                 },
                 Some(Err(_)) => Step::Over,
             },
-            Kind::Drive { until: Some(until), .. } if now >= *until => Step::Rest,
+            Kind::Drive { until: Some(until), .. } if controller.now_ns() >= *until => Step::Rest,
             Kind::Drive { axis, value, by, .. } => by.step(controller, self.target, *axis, *value),
         };
         // A stop that came in between must not be followed by a new value.
@@ -549,7 +566,7 @@ impl Route {
                         Quantity::Torque => AxisPoint::Torque(value),
                     };
                 }
-                controller.push_point(target, now_ns(), points)?;
+                controller.push_point(target, controller.now_ns(), points)?;
             }
         }
         Ok(())

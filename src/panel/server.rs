@@ -16,14 +16,14 @@ use serde_json::json;
 use takt_rt::StopCategory;
 use tokio::sync::oneshot;
 
-use super::TakeLease;
 use super::access::Access;
 use super::command::{Command, CommandRefusal, target_of};
 use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, locked, message, page_key};
+use super::listening::TakeLease;
 use super::motions::{Motions, Problem};
 use super::page::{self, File};
 use super::pages::{Asked, PageNumber, PageRefusal};
-use super::view::{EventView, MachineView, Viewer};
+use super::view::{EventView, MachineView, Viewer, time_ms};
 use crate::command::{RunningController, WaitError};
 
 /// Commands that may wait for the controller.
@@ -66,7 +66,7 @@ impl Visited for Server {
             let pages = self.gate.pages();
             (pages.commander(), pages.count())
         };
-        message("state", &locked(&self.viewer).view(&*self.controller, commander, count))
+        message("state", &locked(&self.viewer).view(&*self.controller, commander, count, time_ms()))
     }
 
     fn end(&self) {
@@ -118,7 +118,9 @@ impl Server {
             match source.wait(LOOK) {
                 Ok(event) => {
                     let machine = self.controller.machine();
-                    self.gate.tell(None, |number| message("event", &EventView::of(number, &event, machine)));
+                    self.gate.tell(None, |number| {
+                        message("event", &EventView::of(number, &event, machine, time_ms()))
+                    });
                 }
                 Err(WaitError::NotInTime) => {}
                 Err(WaitError::Ended) => return,
@@ -126,7 +128,7 @@ impl Server {
             let now_missed = source.missed();
             if now_missed > missed {
                 let count = now_missed - missed;
-                self.gate.tell(None, |number| message("event", &EventView::missed(number, count)));
+                self.gate.tell(None, |number| message("event", &EventView::missed(number, count, time_ms())));
                 missed = now_missed;
             }
         }

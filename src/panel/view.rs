@@ -204,12 +204,13 @@ impl BusLoad {
 }
 
 impl Viewer {
-    /// The view of a state.
+    /// The view of a state, at this time of day.
     pub fn view(
         &mut self,
         controller: &dyn RunningController,
         commander: Option<PageNumber>,
         pages: usize,
+        time_ms: u64,
     ) -> StateView {
         let (state, machine) = (controller.state(), controller.machine());
         self.number += 1;
@@ -219,7 +220,7 @@ impl Viewer {
         StateView {
             number: self.number,
             slot: state.slot,
-            time_ms: time_ms(),
+            time_ms,
             missed_slots: state.missed_slots,
             timing: timing(state.timing),
             dropped: state.dropped,
@@ -339,8 +340,8 @@ pub struct EventView {
 }
 
 impl EventView {
-    /// Of an event.
-    pub fn of(number: u64, event: &Event, machine: &Machine) -> Self {
+    /// Of an event, at this time of day.
+    pub fn of(number: u64, event: &Event, machine: &Machine, time_ms: u64) -> Self {
         let level = match event.kind {
             EventKind::Stop(stop) if !stop.is_requested() => "fault",
             EventKind::Emergency { code, .. } if code != 0 => "fault",
@@ -348,7 +349,7 @@ impl EventView {
             EventKind::Timing { level } if level != TimingLevel::Normal => "warning",
             _ => "info",
         };
-        Self { number, time_ms: time_ms(), level, words: words::event(event, machine) }
+        Self { number, time_ms, level, words: words::event(event, machine) }
     }
 
     /// What the panel itself has to say.
@@ -357,14 +358,14 @@ impl EventView {
     }
 
     /// Of events that came faster than they were read.
-    pub fn missed(number: u64, count: u64) -> Self {
+    pub fn missed(number: u64, count: u64, time_ms: u64) -> Self {
         let words = format!("{count} events were missed: they came too fast");
-        Self { number, time_ms: time_ms(), level: "warning", words }
+        Self { number, time_ms, level: "warning", words }
     }
 }
 
 /// The time of day, in ms since 1970.
-fn time_ms() -> u64 {
+pub fn time_ms() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_millis() as u64)
 }
 

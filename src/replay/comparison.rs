@@ -1,7 +1,5 @@
 //! A replay beside the recording that it was made from.
 
-use std::path::PathBuf;
-
 use takt_rt::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, StopReason};
 
 use super::{Replay, ReplayError};
@@ -59,13 +57,13 @@ pub struct AxisDifference {
     pub jerk: (f64, f64),
 }
 
-/// Replays a journal under a configuration, and compares it with the files of its recording, as far as that has the same axes. Each cycle is also
+/// Replays a journal under a configuration, and compares it with the files of its recording, one after the other, as far as they have the same axes. Each cycle is also
 /// handed to `each`.
 ///
 /// # Errors
 /// The journal cannot be replayed, or the recording not be read.
 pub fn compare(
-    files: &[PathBuf],
+    files: impl IntoIterator<Item = Result<Recorded, RecordedError>>,
     config: &Config,
     journal: Journal,
     mut each: impl FnMut(&CycleRecord, &[Event]),
@@ -111,7 +109,7 @@ pub fn compare(
         }
     };
     for file in files {
-        Recorded::open(file)?.each_cycle(&mut compare_cycle)?;
+        file?.each_cycle(&mut compare_cycle)?;
     }
     while step(&mut comparison).is_some() {}
     Ok(comparison)

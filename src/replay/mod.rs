@@ -5,6 +5,8 @@
 //! configuration shows is right as long as the drives would have followed the new set-points as they followed the old ones.
 
 mod comparison;
+mod complete_journal;
+mod report;
 mod settings;
 
 use takt_rt::{CycleRecord, Event, Flow, Grid};
@@ -15,6 +17,8 @@ use crate::controller::assemble::{self, AssembleError};
 use crate::journal::{Journal, ReplayClock, ReplayHost, ReplayPort};
 
 pub use comparison::{AxisDifference, Comparison, FirstDifference, compare};
+pub use complete_journal::complete_journal;
+pub use report::ComparisonReport;
 pub use settings::{Setting, SettingError, apply};
 
 /// The run again, cycle by cycle.

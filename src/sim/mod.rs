@@ -77,12 +77,15 @@ mod pdo_engine;
 pub mod plant;
 mod port;
 mod profile_motions;
+#[cfg(target_os = "linux")]
 pub(crate) mod pseudo_terminal;
 pub(crate) mod random;
 mod sdo_reply;
 mod sdo_server;
 #[cfg(feature = "cli")]
 pub(crate) mod serial_device;
+#[cfg(target_os = "linux")]
+pub(crate) mod serial_host;
 pub(crate) mod serial_line;
 mod servo;
 mod silent_drive;

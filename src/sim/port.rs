@@ -125,6 +125,12 @@ impl SimulatedBus {
         Ok(())
     }
 
+    /// The controller of the master's interface goes off the bus, or is on it again: meanwhile nothing is sent or received.
+    pub fn take_off_bus(&mut self, is_off: bool) {
+        self.medium.disconnect(MASTER, is_off);
+        self.health.state = if is_off { BusState::BusOff } else { BusState::ErrorActive };
+    }
+
     /// Cuts a drive's supply and restores it at once.
     pub fn power_cycle(&mut self, node: u8) -> Result<(), UnknownNode> {
         let station = self.station(node)?;
@@ -196,6 +202,9 @@ impl SimulatedBus {
         }
         if *sender == MASTER {
             self.health.tx_frames += 1;
+            return;
+        }
+        if !self.medium.is_connected(MASTER) {
             return;
         }
         self.health.rx_frames += 1;

@@ -1,20 +1,12 @@
 //! A serial line with simulated devices: in the time of whoever asks it, or behind a pseudo-terminal in real time, for any tool to talk
 //! to.
 
-use std::io::{self, ErrorKind, Read, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
-
 use takt_rt::Nanoseconds;
 
 use super::defect::Defect;
 use super::drive::{Drive, DriveFault, Observation};
 use super::mailbox::{Mailbox, QueueOrder};
 use super::port::{InjectDefectError, UnknownNode};
-use super::pseudo_terminal::PseudoTerminal;
-
-/// How long the devices wait for the master: what they say is late by so much at most.
-const TICK_NS: Nanoseconds = 1_000_000;
 
 /// A serial line with its devices. Time never runs backwards between calls.
 pub trait DevicesOnLine: Send {
@@ -138,32 +130,4 @@ pub struct LineDisturbance {
     pub is_cut: bool,
     /// What comes from the drives arrives later by this, as behind an adapter that holds bytes back.
     pub late_ns: Nanoseconds,
-}
-
-/// Lets the devices of a line live until `is_over`.
-///
-/// # Errors
-/// The pseudo-terminal does not work any more.
-pub fn host(
-    line: &mut dyn DevicesOnLine,
-    terminal: &mut PseudoTerminal,
-    is_over: &AtomicBool,
-) -> io::Result<()> {
-    let began = Instant::now();
-    let mut bytes = [0; 512];
-    while !is_over.load(Ordering::Relaxed) {
-        terminal.wait(TICK_NS);
-        let now_ns = u64::try_from(began.elapsed().as_nanos()).unwrap_or(u64::MAX);
-        match terminal.read(&mut bytes) {
-            Ok(count) => line.send(now_ns, &bytes[..count]),
-            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {}
-            Err(error) => return Err(error),
-        }
-        match terminal.write_all(&line.receive(now_ns)) {
-            // Nobody reads: a line without a listener loses its bytes.
-            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-            outcome => outcome?,
-        }
-    }
-    Ok(())
 }

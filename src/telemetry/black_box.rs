@@ -16,7 +16,8 @@ use takt_rt::{
 };
 
 use super::announce;
-use super::destination::RecordingDestination;
+use super::destination::{OpenError, Opened, RecordingDestination};
+use super::files_in_memory::FilesInMemory;
 use super::history::{Entry, History, OnBus};
 use super::machine::Machine;
 use super::recording::Recording;
@@ -147,10 +148,27 @@ struct OpenFile {
     latest_ns: Nanoseconds,
 }
 
+/// Where the files are.
+enum Place {
+    Directory(PathBuf),
+    Memory(FilesInMemory),
+}
+
+impl Place {
+    fn open(&self, stem: &str) -> Result<Opened, OpenError> {
+        match self {
+            Self::Directory(directory) => {
+                RecordingDestination::Directory(directory.clone()).open(stem, "mcap")
+            }
+            Self::Memory(files) => files.open(stem).open(stem, "mcap"),
+        }
+    }
+}
+
 /// The black box.
 pub struct BlackBox {
     history: History,
-    directory: PathBuf,
+    place: Place,
     is_compressed: bool,
     wall_clock: WallClock,
     started_ns: Nanoseconds,
@@ -173,9 +191,38 @@ impl BlackBox {
         wall_clock: WallClock,
         started_ns: Nanoseconds,
     ) -> Self {
+        Self::new_in(
+            Place::Directory(options.directory),
+            options.span_ns,
+            is_compressed,
+            machine,
+            wall_clock,
+            started_ns,
+        )
+    }
+
+    /// The same, with its files in memory.
+    #[cfg(feature = "browser")]
+    pub fn in_memory(
+        span_ns: Nanoseconds,
+        files: FilesInMemory,
+        machine: &Machine,
+        wall_clock: WallClock,
+    ) -> Self {
+        Self::new_in(Place::Memory(files), span_ns, false, machine, wall_clock, 0)
+    }
+
+    fn new_in(
+        place: Place,
+        span_ns: Nanoseconds,
+        is_compressed: bool,
+        machine: &Machine,
+        wall_clock: WallClock,
+        started_ns: Nanoseconds,
+    ) -> Self {
         Self {
-            history: History::new(options.span_ns, machine.cycle_ns, machine.axes.len(), machine.buses.len()),
-            directory: options.directory,
+            history: History::new(span_ns, machine.cycle_ns, machine.axes.len(), machine.buses.len()),
+            place,
             is_compressed,
             wall_clock,
             started_ns,
@@ -252,7 +299,7 @@ impl BlackBox {
         }
         let stem =
             format!("{}-{}-black-box-{}", machine.name, self.wall_clock.file_stamp(at_ns), incident.key());
-        let opened = match RecordingDestination::Directory(self.directory.clone()).open(&stem, "mcap") {
+        let opened = match self.place.open(&stem) {
             Ok(opened) => opened,
             Err(error) => return self.fail(format!("no black box: cannot write {error}")),
         };

@@ -181,6 +181,13 @@ impl Logger {
         Self { each_cycle, ..self }
     }
 
+    /// Also keeps this black box.
+    #[cfg(feature = "browser")]
+    #[must_use]
+    pub(crate) fn with_black_box(self, black_box: BlackBox) -> Self {
+        Self { black_box: Some(black_box), ..self }
+    }
+
     /// Also writes the journal of the run into the recording, if there is one, and the files of its configuration.
     #[must_use]
     pub(crate) fn with_journal(mut self, journal: Option<RunJournal>, sources: &ConfigSources) -> Self {

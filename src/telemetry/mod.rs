@@ -14,7 +14,10 @@ mod black_box;
 mod bus_load;
 mod candump;
 mod cdr;
+#[cfg_attr(not(target_os = "linux"), path = "compression_elsewhere.rs")]
+mod compression;
 mod destination;
+mod files_in_memory;
 mod history;
 mod journal_keeper;
 mod listener;
@@ -23,6 +26,7 @@ mod loop_timing;
 mod machine;
 mod messages;
 mod own_errors;
+#[cfg(target_os = "linux")]
 mod realtime;
 mod recorded;
 mod recording;
@@ -34,14 +38,19 @@ mod replay_recording;
 mod report;
 mod severity;
 mod statistics;
+#[cfg(target_os = "linux")]
 pub(crate) mod thread;
 mod wall_clock;
 pub(crate) mod words;
 
 pub use crate::channels::LogSide;
+#[cfg(feature = "browser")]
+pub(crate) use black_box::BlackBox;
 pub use black_box::{BlackBoxOptions, Incident};
 pub use cdr::{CdrDecoder, CdrEncoder};
 pub use destination::RecordingDestination;
+#[cfg(feature = "browser")]
+pub(crate) use files_in_memory::FilesInMemory;
 pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub(crate) use loop_timing::{LOOP_TIMING_WORDS, ShownTiming, newest_timing, shown_timing};
@@ -52,8 +61,10 @@ pub use recorded::{
     Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, RecordedFrame, RecordedFrames,
     RecordedLoad, WalkError,
 };
-#[cfg(feature = "cli")]
-pub(crate) use recorded::{RecordedJournal, journal as recorded_journal};
+#[cfg(feature = "browser")]
+pub(crate) use recorded::{
+    RecordedJournal, journal as recorded_journal, journal_in_memory as recorded_journal_in_memory,
+};
 pub use recording_report::{
     AxisCycle, AxisCycles, AxisSummary, BusChange, BusLoadSummary, GroupSummary, RecordingReport,
     ReportedEvent,
@@ -69,6 +80,7 @@ pub use report::{
 #[cfg(feature = "cli")]
 pub(crate) use severity::Severity;
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
+#[cfg(target_os = "linux")]
 pub(crate) use thread::LoggerThread;
 pub use wall_clock::WallClock;
 pub use words::{event as event_words, phase as phase_words};

@@ -11,10 +11,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
-use mcap::{Compression, McapError, McapResult, WriteOptions};
+use mcap::{McapError, McapResult};
 use takt_rt::{CycleRecord, CycleTiming, Event, NANOSECONDS_PER_SECOND, Nanoseconds, Phase};
 
 use super::cdr::CdrEncoder;
+use super::compression;
 use super::destination::Opened;
 use super::history::OnBus;
 use super::machine::{BusDescription, Machine};
@@ -126,12 +127,9 @@ impl Recording {
     ) -> McapResult<Self> {
         let written = Arc::new(AtomicU64::new(0));
         let counted = Counted { to: opened.writer, written: Arc::clone(&written) };
-        let mut writer = WriteOptions::new()
+        let mut writer = compression::of_recordings(is_compressed)
             .profile("ros2")
             .library(concat!("takt ", env!("CARGO_PKG_VERSION")))
-            .compression(is_compressed.then_some(Compression::Zstd))
-            // No threads beside that of the logger.
-            .compression_threads(0)
             // `end_chunk` decides.
             .chunk_size(None)
             .disable_seeking(true)

@@ -7,7 +7,8 @@ use crate::cli::interruption;
 use crate::cli::usage_error::UsageError;
 use crate::family;
 use crate::sim::pseudo_terminal::PseudoTerminal;
-use crate::sim::serial_line::{self, DevicesOnLine};
+use crate::sim::serial_host;
+use crate::sim::serial_line::DevicesOnLine;
 
 use super::adapters::AdapterLink;
 
@@ -48,7 +49,7 @@ pub fn host(drives: &LineDrives, links: &[AdapterLink]) -> Exit {
     let addresses: Vec<String> = addresses.iter().map(u8::to_string).collect();
     say!("{path}: {family}, addresses {}; Ctrl-C ends them", addresses.join(", "));
     say!("takt drive --bus serial:{path} --family {family} --node {} info", addresses[0]);
-    match serial_line::host(line.as_mut(), &mut terminal, &is_stopped) {
+    match serial_host::host(line.as_mut(), &mut terminal, &is_stopped) {
         Ok(()) => Exit::Done,
         Err(error) => {
             say!("takt: {path}: {error}");

@@ -17,6 +17,8 @@ pub mod program;
 pub mod realtime;
 pub mod simulation;
 pub mod telemetry;
+#[cfg(target_os = "linux")]
+mod this_machine;
 
 use super::error::ConfigError;
 use super::model::{Config, StreamDelay};
@@ -47,25 +49,6 @@ impl Config {
         axis::validate(self, &whole);
         group::validate(self, &whole);
         program::validate(self, &whole);
-        if problems.is_empty() {
-            Ok(())
-        } else {
-            Err(ConfigError::of_fields(&self.name, problems.into_vec()))
-        }
-    }
-}
-
-impl Config {
-    /// As [`Config::validate`], and that the CPU of the real-time thread is one of this machine. A configuration may well be
-    /// checked on another machine than the one that it is for, but not run there.
-    ///
-    /// # Errors
-    /// Every problem, with the field that it concerns.
-    pub fn validate_on_this_machine(&self) -> Result<(), ConfigError> {
-        self.validate()?;
-        let problems = Problems::in_fields();
-        let fields = Fields { prefix: "realtime.".to_owned(), of: String::new(), problems: &problems };
-        realtime::cpu_is_present(&self.realtime, &fields);
         if problems.is_empty() {
             Ok(())
         } else {

@@ -3,15 +3,15 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use takt_rt::linux::MonotonicClock;
-use takt_rt::{Clock, Nanoseconds};
+use takt_rt::{Clock, CycleRecord, Nanoseconds};
 
 use super::life::Life;
 use crate::channels::LogSide;
 use crate::controller::outcome::{Interrupt, Outcome};
+use crate::controller::port::Port;
 use crate::controller::virtual_time::VirtualRun;
-use crate::sim::SimulatedBus;
-use crate::telemetry::EachCycle;
+use crate::monotonic_clock::MonotonicClock;
+use crate::telemetry::{EachCycle, Logger};
 
 /// The time of a controller, as its handles see it.
 pub(super) enum Pace {
@@ -39,14 +39,21 @@ pub(super) struct VirtualPace {
 }
 
 struct Parts {
-    run: VirtualRun<SimulatedBus>,
-    log: LogSide,
-    each_cycle: Option<EachCycle>,
+    run: VirtualRun<Port>,
+    log: VirtualLog,
+}
+
+/// Who takes the records of a run in virtual time.
+pub(super) enum VirtualLog {
+    /// The caller. Observers have their own way to the events.
+    EachCycle(LogSide, Option<EachCycle>),
+    /// A logger, as in real time, but in the thread that runs the cycles.
+    Logger(Box<Logger>),
 }
 
 impl VirtualPace {
-    pub(super) fn new(run: VirtualRun<SimulatedBus>, log: LogSide, each_cycle: Option<EachCycle>) -> Self {
-        Self { parts: Mutex::new(Parts { run, log, each_cycle }), now_ns: AtomicU64::new(0) }
+    pub(super) fn new(run: VirtualRun<Port>, log: VirtualLog) -> Self {
+        Self { parts: Mutex::new(Parts { run, log }), now_ns: AtomicU64::new(0) }
     }
 
     /// Runs this many cycles, or fewer up to the end of the run. Returns how many.
@@ -69,6 +76,12 @@ impl VirtualPace {
         self.lock().run.interrupt(Interrupt::Controlled);
     }
 
+    /// Hands the ports out.
+    #[cfg(feature = "browser")]
+    pub(super) fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> T {
+        with(self.lock().run.ports())
+    }
+
     /// How the run has ended; `None` while it goes on.
     pub(super) fn outcome(&self) -> Option<Outcome> {
         self.lock().run.supervisor().outcome().cloned()
@@ -84,17 +97,20 @@ impl Parts {
     /// One cycle. Returns `false` once the run has ended.
     fn step(&mut self) -> bool {
         let goes_on = self.run.step();
-        while self
-            .log
-            .next_record(|record| {
-                if let Some(each_cycle) = &mut self.each_cycle {
-                    each_cycle(record);
-                }
-            })
-            .is_some()
-        {}
-        // Observers have their own way to the events.
-        while self.log.take_event().is_some() {}
+        match &mut self.log {
+            VirtualLog::EachCycle(log, each_cycle) => {
+                let mut take = |record: &CycleRecord| {
+                    if let Some(each_cycle) = each_cycle {
+                        each_cycle(record);
+                    }
+                };
+                while log.next_record(&mut take).is_some() {}
+                while log.take_event().is_some() {}
+            }
+            VirtualLog::Logger(logger) => {
+                logger.drain();
+            }
+        }
         goes_on
     }
 }

@@ -5,23 +5,23 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use takt_rt::StopCategory;
-use takt_rt::linux::ThreadReport;
 
 use super::in_loop::Callbacks;
 use super::life::Life;
-use super::pace::{Pace, VirtualPace};
+use super::pace::{Pace, VirtualLog, VirtualPace};
 use super::start_failure::StartFailure;
 use super::trajectory::Trajectories;
 use super::{Handle, Shared};
-use crate::channels::MotionEnd;
+use crate::channels::{LogSide, MotionEnd};
 use crate::config::Config;
-use crate::controller::assemble;
+use crate::controller::assemble::{self, AssembleError};
 use crate::controller::outcome::Outcome;
-use crate::controller::session::SessionError;
+use crate::controller::port::Port;
 use crate::controller::supervisor::AfterBringUp;
 use crate::controller::virtual_time::VirtualRun;
+use crate::link::trace::Trace;
 use crate::sim::SimulatedBus;
-use crate::telemetry::{EachCycle, Machine, shown_timing};
+use crate::telemetry::{EachCycle, Logger, Machine, shown_timing};
 
 /// A controller of simulated drives in virtual time, with the commands of a [`Controller`](super::Controller).
 ///
@@ -53,7 +53,7 @@ impl VirtualController {
     /// # Errors
     /// See [`StartFailure`].
     pub fn start(config: &Config, each_cycle: Option<EachCycle>) -> Result<Self, StartFailure> {
-        Self::begin(config, each_cycle, AfterBringUp::Enable)
+        Self::begin(config, AfterBringUp::Enable, each_cycle)
     }
 
     /// As [`VirtualController::start`], but leaves the drives disabled, as [`Controller::start_disabled`](super::Controller::start_disabled)
@@ -62,24 +62,46 @@ impl VirtualController {
     /// # Errors
     /// See [`StartFailure`].
     pub fn start_disabled(config: &Config, each_cycle: Option<EachCycle>) -> Result<Self, StartFailure> {
-        Self::begin(config, each_cycle, AfterBringUp::StayDisabled)
+        Self::begin(config, AfterBringUp::StayDisabled, each_cycle)
+    }
+
+    /// As [`VirtualController::start`], with a logger that gets the frames of the buses as well.
+    #[cfg(feature = "browser")]
+    pub(crate) fn start_logged(
+        config: &Config,
+        logger: impl FnOnce(LogSide, Vec<Trace>) -> Logger,
+    ) -> Result<Self, StartFailure> {
+        config.validate().map_err(AssembleError::from)?;
+        let traced = (0..).zip(&config.buses).map(|(bus, of)| simulated(config, bus).traced(&of.name));
+        let (ports, traces) = traced.unzip();
+        let log = |log| VirtualLog::Logger(Box::new(logger(log, traces)));
+        Self::begin_on(config, AfterBringUp::Enable, ports, log)
     }
 
     fn begin(
         config: &Config,
-        each_cycle: Option<EachCycle>,
         after_bring_up: AfterBringUp,
+        each_cycle: Option<EachCycle>,
     ) -> Result<Self, StartFailure> {
-        config.validate().map_err(|error| SessionError::Assemble(error.into()))?;
-        let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
-        let begun = VirtualRun::serving(config, ports, after_bring_up);
-        let (mut run, log) = begun.map_err(SessionError::Assemble)?;
+        config.validate().map_err(AssembleError::from)?;
+        let ports = (0..config.buses.len()).map(|bus| simulated(config, bus)).collect();
+        Self::begin_on(config, after_bring_up, ports, |log| VirtualLog::EachCycle(log, each_cycle))
+    }
+
+    fn begin_on(
+        config: &Config,
+        after_bring_up: AfterBringUp,
+        ports: Vec<Port>,
+        log: impl FnOnce(LogSide) -> VirtualLog,
+    ) -> Result<Self, StartFailure> {
+        let (mut run, records) = VirtualRun::serving(config, ports, after_bring_up)?;
         let host = run.host();
         let shared = Shared {
             axes: config.axes.clone(),
             groups: config.groups.clone(),
             machine: Machine::of(config),
-            realtime: ThreadReport::of_ordinary_thread(),
+            #[cfg(target_os = "linux")]
+            realtime: takt_rt::linux::ThreadReport::of_ordinary_thread(),
             // Nothing is ever counted: no time passes within a virtual cycle.
             timing: shown_timing().1,
             clients: host.clients(),
@@ -90,7 +112,7 @@ impl VirtualController {
             callbacks: Callbacks::new(host.callbacks(), &assemble::slot_plan(config)),
             messages: Arc::default(),
             life: Arc::<Life>::default(),
-            pace: Pace::Virtual(Box::new(VirtualPace::new(run, log, each_cycle))),
+            pace: Pace::Virtual(Box::new(VirtualPace::new(run, log(records)))),
         };
         let controller = Self { handle: Handle(Arc::new(shared)) };
         match controller.wait_until_brought_up(after_bring_up) {
@@ -100,6 +122,12 @@ impl VirtualController {
                 Err(StartFailure::NotEnabledVirtually { words })
             }
         }
+    }
+
+    /// Hands the ports out, to break something.
+    #[cfg(feature = "browser")]
+    pub(crate) fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> Option<T> {
+        self.handle.virtual_pace().map(|pace| pace.with_ports(with))
     }
 
     /// Lets this many cycles pass, or fewer up to the end of the run. Returns how many.
@@ -137,6 +165,11 @@ impl VirtualController {
         while pace.step(1, &shared.life) > 0 {}
         pace.outcome().unwrap_or(Outcome::ThreadDied)
     }
+}
+
+/// The port of a bus of a configuration that has been checked.
+fn simulated(config: &Config, bus: usize) -> Port {
+    Port::Simulated(Box::new(SimulatedBus::new(config, bus)))
 }
 
 impl Deref for VirtualController {

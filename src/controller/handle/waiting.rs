@@ -6,12 +6,12 @@
 
 use std::time::Duration;
 
-use takt_rt::linux::MonotonicClock;
 use takt_rt::{AxisSnapshot, Clock, Nanoseconds, Phase, Snapshot};
 
 use super::{ENABLE_TIMEOUT, Handle};
 use crate::command::WaitError;
 use crate::controller::supervisor::AfterBringUp;
+use crate::monotonic_clock::MonotonicClock;
 
 /// How much later than the last one the next state is looked for, beyond the period. It covers the usual jitter of a cycle.
 const MARGIN_NS: Nanoseconds = 20_000;

@@ -4,8 +4,11 @@
 //! - `simulated`: a simulated line. It has no thread: it goes on when the life cycle is polled, in real and in virtual time.
 //! - `port`: what the cycle sees of a line, which carries no frame of its own: its state and its counters.
 
+#[cfg(target_os = "linux")]
+mod opening;
 mod port;
 mod simulated;
+#[cfg_attr(not(target_os = "linux"), path = "no_thread.rs")]
 mod thread;
 
 use std::sync::Arc;
@@ -13,11 +16,9 @@ use std::sync::Arc;
 use takt_rt::{OffCycleReport, Snapshot};
 
 use crate::channels::HostSide;
-use crate::config::{Config, Interface};
+use crate::config::Config;
 use crate::family::{self, OffCycleLine, OffCycleTarget};
 use crate::faults::{FaultInjector, LineFaults};
-use crate::link::serial_line::SerialSettings;
-use crate::link::{OpenError, SerialLineError};
 pub use port::LinePort;
 use port::LineStatus;
 pub use simulated::SharedLine;
@@ -56,41 +57,6 @@ impl Lines {
             Line::new(config, bus, end)
         });
         Self { lines: lines.collect() }
-    }
-
-    /// Opens every line that is one of this machine, and starts its thread. The others are simulated. Faults are injected into both.
-    ///
-    /// # Errors
-    /// A line cannot be opened, or has no thread.
-    pub fn open(config: &Config, injector: Option<&FaultInjector>) -> Result<Self, OpenError> {
-        let mut lines = vec![];
-        for (bus, settings) in config.buses.iter().enumerate() {
-            let faults = faults_of(injector, bus);
-            let Interface::Serial(device) = &settings.interface else {
-                let end = |line, _: &Arc<LineStatus>| {
-                    Some(LineEnd::Simulated(SimulatedEnd::new(line, config, bus, faults)?))
-                };
-                lines.extend(Line::new(config, bus, end));
-                continue;
-            };
-            let mut refused = None;
-            let open = |line, status: &Arc<LineStatus>| {
-                let serial = SerialSettings::new(settings.bit_rate);
-                match ThreadEnd::start(&device.device, serial, line, Arc::clone(status), faults) {
-                    Ok(end) => Some(LineEnd::Thread(end)),
-                    Err(error) => {
-                        refused = Some(error);
-                        None
-                    }
-                }
-            };
-            let line = Line::new(config, bus, open);
-            if let Some(error) = refused {
-                return Err(OpenError::Line { bus: settings.name.clone(), error });
-            }
-            lines.extend(line);
-        }
-        Ok(Self { lines })
     }
 
     /// The port of a line for the cycle; `None` if the bus is none.
@@ -165,9 +131,4 @@ fn target(axis: usize, group: usize, snapshot: &Snapshot) -> OffCycleTarget {
     let Some(shown) = snapshot.axes.get(axis) else { return OffCycleTarget::default() };
     let phase = snapshot.groups().get(group).map(|group| group.phase).unwrap_or_default();
     OffCycleTarget::of(shown, phase, snapshot.at_ns)
-}
-
-/// A line that is not open any more, for people.
-fn lost(error: &SerialLineError) -> String {
-    format!("{error}; it is opened again as soon as it is there")
 }

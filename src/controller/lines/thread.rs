@@ -10,7 +10,6 @@ use takt_rt::linux::MonotonicClock;
 use takt_rt::{Clock, Nanoseconds, OffCycleReport};
 use tracing::{info, warn};
 
-use super::lost;
 use super::port::LineStatus;
 use crate::family::{OffCycleLine, OffCycleTarget, OffCycleWish};
 use crate::faults::LineFaults;
@@ -182,4 +181,9 @@ impl LineMaster {
         self.status.set_taken_away(self.faults.is_gone());
         Ok(())
     }
+}
+
+/// A line that is not open any more, for people.
+fn lost(error: &SerialLineError) -> String {
+    format!("{error}; it is opened again as soon as it is there")
 }

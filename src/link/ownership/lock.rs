@@ -5,7 +5,6 @@
 //! users. Like the interface itself, the name belongs to one network namespace. A second process that connects learns
 //! from the kernel which process holds the lock. It may ask that process to stop in control and to release the lock.
 
-use std::fmt;
 use std::io::{self, ErrorKind, Read, Write};
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
@@ -14,6 +13,8 @@ use std::time::{Duration, Instant};
 
 use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
 use nix::unistd::geteuid;
+
+use crate::link::process::Process;
 
 /// The request to the holder, and its answers.
 const REQUEST: &[u8] = b"release\n";
@@ -43,24 +44,6 @@ impl Role {
         match self {
             Self::Master => "master",
             Self::Simulator => "simulator",
-        }
-    }
-}
-
-/// A process at the other end of a lock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Process {
-    /// Its process ID; 0 for a process in a container, which cannot be seen from here.
-    pub pid: i32,
-    /// The user it belongs to.
-    pub user: u32,
-}
-
-impl fmt::Display for Process {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.pid {
-            0 => write!(f, "a process in a container (user {})", self.user),
-            pid => write!(f, "process {pid} (user {})", self.user),
         }
     }
 }

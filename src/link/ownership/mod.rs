@@ -17,8 +17,9 @@ use super::open::OpenError;
 use super::real_interface::RealInterface;
 use super::socketcan::SocketCanOptions;
 
+pub use super::process::Process;
 pub use listening::{CommandedDrive, HeardMaster, Listening, MasterActivity, MasterTraffic, Verdict};
-pub use lock::{InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError};
+pub use lock::{InterfaceLock, LockError, ReleaseError, Role, TakeOverError};
 
 /// The pause between two polls of the buses. At most about forty frames pass a bus of 1 Mbit/s in it.
 const POLL_NS: Nanoseconds = 2_000_000;

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsString;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 
 use super::records::{self, Record};
@@ -54,13 +54,33 @@ pub fn journal(path: &Path) -> Result<RecordedJournal, RecordedError> {
     Ok(found)
 }
 
+/// Reads the journal of a recording in memory, which must be a whole one.
+///
+/// # Errors
+/// See [`RecordedError`].
+pub fn journal_in_memory(name: &Path, bytes: &[u8]) -> Result<RecordedJournal, RecordedError> {
+    let mut found = RecordedJournal::default();
+    let part = add(name, bytes, &mut found)?;
+    found.begins_in = part.filter(|(_, number)| *number > 1).map(|(first, _)| PathBuf::from(first));
+    Ok(found)
+}
+
 /// Adds what one file has. Returns the name of the first file of several, and the number of this one.
 fn add_file(path: &Path, found: &mut RecordedJournal) -> Result<Option<(OsString, u32)>, RecordedError> {
-    let unreadable = |error| RecordedError::Unreadable { path: path.to_owned(), error };
-    let file = File::open(path).map_err(|error| unreadable(error.into()))?;
+    let file = File::open(path)
+        .map_err(|error| RecordedError::Unreadable { path: path.to_owned(), error: error.into() })?;
+    add(path, BufReader::new(file), found)
+}
+
+/// As [`add_file`].
+fn add(
+    path: &Path,
+    file: impl Read,
+    found: &mut RecordedJournal,
+) -> Result<Option<(OsString, u32)>, RecordedError> {
     let mut part = None;
     let mut channels = HashSet::new();
-    walk::walk(BufReader::new(file), |opcode, body| match records::parse(opcode, body) {
+    walk::walk(file, |opcode, body| match records::parse(opcode, body) {
         Some(Ok(Record::Channel { id, metadata, .. })) => {
             if let Some(version) = metadata.get("journal") {
                 found.is_of_other_version |= version != recording::JOURNAL_VERSION;
@@ -79,7 +99,7 @@ fn add_file(path: &Path, found: &mut RecordedJournal) -> Result<Option<(OsString
         Some(Ok(Record::Metadata { name, entries })) => found.metadata(&name, entries),
         _ => {}
     })
-    .map_err(unreadable)?;
+    .map_err(|error| RecordedError::Unreadable { path: path.to_owned(), error })?;
     Ok(part)
 }
 

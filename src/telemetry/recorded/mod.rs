@@ -2,16 +2,17 @@
 
 mod cause;
 mod frames;
-#[cfg(feature = "cli")]
+#[cfg(feature = "browser")]
 mod journal;
 mod records;
 mod walk;
 
 use std::collections::{BTreeMap, HashMap};
 use std::fs::{self, File};
-use std::io::{self, BufReader};
+use std::io::{self, BufReader, Cursor, Read};
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use takt_rt::{
     AxisRecord, BusHealth, CycleRecord, CycleTiming, EventKind, GroupRecord, MAX_BUSES, MAX_GROUPS,
@@ -33,8 +34,8 @@ use records::Record;
 
 pub use cause::Cause;
 pub use frames::{RecordedFrame, RecordedFrames, frames};
-#[cfg(feature = "cli")]
-pub use journal::{RecordedJournal, journal};
+#[cfg(feature = "browser")]
+pub use journal::{RecordedJournal, journal, journal_in_memory};
 pub use walk::WalkError;
 
 /// Why a file cannot be read.
@@ -154,6 +155,16 @@ pub struct Recorded {
     pub wall_clock: Option<WallClock>,
     /// Defects of the file.
     pub warnings: Vec<String>,
+    source: Source,
+}
+
+/// Where the bytes of a recording are.
+#[derive(Clone, Debug)]
+enum Source {
+    /// In the file of its path.
+    File,
+    /// In memory, as a browser has them.
+    Memory(Arc<[u8]>),
 }
 
 impl Recorded {
@@ -162,7 +173,16 @@ impl Recorded {
     /// # Errors
     /// See [`RecordedError`]. A file that is cut off or damaged in parts is read as far as it goes, with a warning.
     pub fn open(path: &Path) -> Result<Self, RecordedError> {
-        Self::open_span(path, None)
+        Self::open_span(path, None, Source::File)
+    }
+
+    /// Reads the bytes of a file with this name.
+    ///
+    /// # Errors
+    /// See [`RecordedError`].
+    #[cfg(feature = "browser")]
+    pub(crate) fn in_memory(name: &Path, bytes: Arc<[u8]>) -> Result<Self, RecordedError> {
+        Self::open_span(name, None, Source::Memory(bytes))
     }
 
     /// Reads a part of a file: what lies so many seconds after its first cycle.
@@ -170,10 +190,10 @@ impl Recorded {
     /// # Errors
     /// See [`RecordedError`].
     pub fn open_between(path: &Path, span_s: Range<f64>) -> Result<Self, RecordedError> {
-        Self::open_span(path, Some(span_s))
+        Self::open_span(path, Some(span_s), Source::File)
     }
 
-    fn open_span(path: &Path, span_s: Option<Range<f64>>) -> Result<Self, RecordedError> {
+    fn open_span(path: &Path, span_s: Option<Range<f64>>, source: Source) -> Result<Self, RecordedError> {
         let mut recorded = Self {
             path: path.to_owned(),
             version: String::new(),
@@ -196,6 +216,7 @@ impl Recorded {
             slots: None,
             wall_clock: None,
             warnings: Vec::new(),
+            source,
         };
         if fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
             let error = io::Error::other(
@@ -322,9 +343,15 @@ impl Recorded {
     fn read(&mut self, mut take: impl FnMut(&mut Self, Item<'_>)) -> Result<Decoder, RecordedError> {
         let path = self.path.clone();
         let unreadable = |error| RecordedError::Unreadable { path: path.clone(), error };
-        let file = File::open(&path).map_err(|error| unreadable(error.into()))?;
+        let file: Box<dyn Read> = match &self.source {
+            Source::File => {
+                let file = File::open(&path).map_err(|error| unreadable(error.into()))?;
+                Box::new(BufReader::new(file))
+            }
+            Source::Memory(bytes) => Box::new(Cursor::new(Arc::clone(bytes))),
+        };
         let mut decoder = Decoder::default();
-        let condition = walk::walk(BufReader::new(file), |opcode, body| {
+        let condition = walk::walk(file, |opcode, body| {
             decoder.record(opcode, body, &mut |item| take(self, item));
         })
         .map_err(unreadable)?;

@@ -7,11 +7,10 @@ use mcap::MAGIC;
 use mcap::records::op;
 
 use crate::printable::printable;
+use crate::telemetry::compression;
 
 /// No record of takt is longer, nor what comes out of a compressed chunk. A longer one means that the file is damaged.
 const LONGEST_RECORD: u64 = 1 << 28;
-/// The memory that a compressed chunk may ask for, as a power of two: more than any that takt writes.
-const LONGEST_WINDOW_LOG: u32 = 24;
 /// The name of the compression that takt writes.
 const ZSTD: &[u8] = b"zstd";
 
@@ -123,10 +122,9 @@ fn walk_chunk(
 /// Decompresses as much as there is. Returns whether that is all.
 fn decompress(chunk: &Chunk<'_>, into: &mut Vec<u8>) -> bool {
     into.clear();
-    let Ok(mut decoder) = zstd::stream::read::Decoder::with_buffer(chunk.records) else { return false };
-    let is_bounded = decoder.window_log_max(LONGEST_WINDOW_LOG).is_ok();
+    let Some(decoder) = compression::decoder(chunk.records) else { return false };
     // What came before an error is kept: the chunk may have been cut off.
-    is_bounded && decoder.take(chunk.length.min(LONGEST_RECORD)).read_to_end(into).is_ok()
+    decoder.take(chunk.length.min(LONGEST_RECORD)).read_to_end(into).is_ok()
 }
 
 struct Chunk<'a> {

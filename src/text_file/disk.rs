@@ -1,66 +1,21 @@
-//! Files that people write: configurations, scenarios, device descriptions.
+//! Text files on the disk.
 
-use std::cell::RefCell;
 use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use nix::sys::statfs::{PROC_SUPER_MAGIC, fstatfs};
 
 /// No file of this kind is longer; a disk image given by mistake is, and would fill the memory.
 const LONGEST_MIB: u64 = 64;
 
-thread_local! {
-    /// The files that this thread has read, where somebody notes them.
-    static NOTED: RefCell<Option<Vec<TextFile>>> = const { RefCell::new(None) };
-    /// Files that stand in for those of the disk.
-    static GIVEN: RefCell<Option<Vec<TextFile>>> = const { RefCell::new(None) };
-}
-
-/// A file by the name under which it was read.
-pub type TextFile = (PathBuf, Vec<u8>);
-
-/// What `body` returns, and the files that it has read in this thread.
-pub fn noting<T>(body: impl FnOnce() -> T) -> (T, Vec<TextFile>) {
-    let before = NOTED.replace(Some(Vec::new()));
-    let returned = body();
-    (returned, NOTED.replace(before).unwrap_or_default())
-}
-
-/// What `body` returns if these files are all that there are.
-pub fn instead_of_the_disk<T>(files: Vec<TextFile>, body: impl FnOnce() -> T) -> T {
-    let before = GIVEN.replace(Some(files));
-    let returned = body();
-    GIVEN.set(before);
-    returned
-}
-
-/// Reads a whole file.
-///
-/// # Errors
-/// See [`read_from_disk`]; or there is no such file among those that stand in for the disk.
-pub fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let given = GIVEN.with_borrow(|files| {
-        let files = files.as_ref()?;
-        let found = files.iter().find(|(name, _)| name == path).map(|(_, bytes)| bytes.clone());
-        Some(found.ok_or_else(|| io::Error::other("the recording does not have this file")))
-    });
-    let bytes = given.unwrap_or_else(|| read_from_disk(path))?;
-    NOTED.with_borrow_mut(|noted| {
-        if let Some(noted) = noted {
-            noted.push((path.to_owned(), bytes.clone()));
-        }
-    });
-    Ok(bytes)
-}
-
 /// Reads a whole file.
 ///
 /// # Errors
 /// It cannot be read, is no regular file, or is longer than 64 MiB. Whoever reads a FIFO, a device or a file of the kernel
 /// may wait for ever.
-fn read_from_disk(path: &Path) -> io::Result<Vec<u8>> {
+pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     // Opening a device may do something, so this is known before.
     only_regular(std::fs::metadata(path)?.file_type())?;
     let file = OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(path)?;

@@ -1,0 +1,171 @@
+// What WebAssembly does is what this machine does, bit for bit; and the simulated arm moves, breaks and tells why.
+//
+//   node check.mjs FOLDER-OF-THE-MODULE FOLDER-OF-RECORDINGS TAKT      (bindings/wasm/tests/run calls it)
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { readFileSync, readdirSync, writeFileSync } from "node:fs";
+import path from "node:path";
+import { pathToFileURL } from "node:url";
+
+const [moduleFolder, recordings, takt] = process.argv.slice(2).map((name) => path.resolve(name));
+const { Takt } = await import(pathToFileURL(path.join(moduleFolder, "takt.mjs")));
+const module = new WebAssembly.Module(readFileSync(path.join(moduleFolder, "takt.wasm")));
+
+function check(sentence, body) {
+  const began = performance.now();
+  body();
+  console.log(`${sentence} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
+}
+
+const recorded = readdirSync(recordings).filter((name) => name.endsWith(".mcap")).sort();
+assert.equal(recorded.length, 5, `recorded: ${recorded}`);
+
+for (const name of recorded) {
+  check(`the replay of ${name} is that of the recording, bit for bit`, () => {
+    const report = new Takt(module).replay(name, readFileSync(path.join(recordings, name)));
+    assert.ok(report.identical && report.compared > 500 && report.differing === 0 && report.missing === 0, JSON.stringify(report, null, 1));
+  });
+}
+
+check("a changed value gives the same other motion as on this machine, to the last digit", () => {
+  const file = path.join(recordings, "first.mcap");
+  const setting = "axes.joint.limits.velocity=20 deg/s";
+  const here = JSON.parse(execFileSync(takt, ["replay", file, "--set", setting, "--json"]));
+  const report = new Takt(module).replay("first.mcap", readFileSync(file), [setting]);
+  assert.ok(!report.identical && report.differing > 100);
+  // The command adds what it is of.
+  for (const [key, value] of Object.entries(report)) assert.deepEqual(value, here[key], key);
+});
+
+check("what cannot be replayed is refused in words", () => {
+  assert.throws(() => new Takt(module).replay("x.mcap", new Uint8Array([1, 2, 3])), /not an MCAP file/);
+  const file = readFileSync(path.join(recordings, "first.mcap"));
+  assert.throws(() => new Takt(module).replay("first.mcap", file, ["axes.nobody.limits.velocity=1"]), /nobody/);
+});
+
+// An arm as the page has it: the newest state, and all events.
+class Arm {
+  events = [];
+  problems = [];
+  #takt = new Takt(module);
+
+  constructor(config) {
+    this.#takt.start("arm.toml", [["arm.toml", readFileSync(config, "utf8")]], 1_700_000_000_000);
+    this.machine = JSON.parse(this.#takt.machine());
+    this.pass(1);
+  }
+
+  get takt() {
+    return this.#takt;
+  }
+
+  pass(ms) {
+    for (const message of this.#takt.advance(ms).split("\n\n").filter(Boolean)) {
+      const [, name, data] = /^event: (\w+)\ndata: (.*)$/.exec(message);
+      if (name === "state") this.state = JSON.parse(data);
+      if (name === "event") this.events.push(JSON.parse(data).words);
+      if (name === "problem") this.problems.push(JSON.parse(data).words);
+    }
+    return this;
+  }
+
+  get phase() {
+    return this.state.groups[0].phase;
+  }
+}
+
+const six = "configs/arm6-erob.toml";
+const move = (axis, to) => ({ do: "move", axis, to, relative: false, velocity: 1, acceleration: 1 });
+
+check("the simulated arm moves where it is told to, and jogs while it is told to", () => {
+  const arm = new Arm(six);
+  assert.equal(arm.machine.axes.length, 6);
+  assert.equal(arm.phase, "holding");
+  arm.takt.command(move(1, 0.3));
+  arm.pass(2000);
+  assert.ok(Math.abs(arm.state.axes[1].position - 0.3) < 1e-3, `${arm.state.axes[1].position}`);
+  assert.throws(() => arm.takt.command(move(1, 99)), (refusal) => refusal.error === "refused" && /joint2/.test(refusal.words));
+  arm.takt.command({ do: "drive", axis: 0, quantity: "velocity", value: 0.5, while: "held" });
+  for (let renewals = 0; renewals < 10; renewals += 1) {
+    arm.takt.command({ do: "renew", axis: 0, value: 0.5 });
+    arm.pass(100);
+  }
+  assert.equal(arm.phase, "streaming");
+  const { position } = arm.state.axes[0];
+  assert.ok(position > 0.2, `${position}`);
+  // A key that is not renewed has been let go.
+  arm.pass(1500);
+  assert.equal(arm.phase, "holding");
+  assert.ok(arm.state.axes[0].position < position + 0.4);
+  arm.takt.command({ do: "disable", group: null });
+  arm.pass(1000);
+  assert.equal(arm.phase, "disabled");
+  arm.takt.command({ do: "enable", group: null });
+  arm.pass(3000);
+  assert.equal(arm.phase, "holding");
+  arm.takt.command(move(1, -0.3));
+  arm.pass(100);
+  arm.takt.stop(2);
+  arm.pass(1000);
+  assert.equal(arm.phase, "holding");
+});
+
+for (const [what, rule, isState] of [
+  ["silent", /feedback|heartbeat/, true],
+  ["blocked", /following/, true],
+  ["over_voltage", /drive_fault/, false],
+  ["power_cut", /drive|boot|feedback/, false],
+  ["torque_off", /drive/, false],
+  ["bus_off", /bus/, true],
+]) {
+  check(`${what}: the arm stops, the black box says why, and it moves again when that is mended`, () => {
+    const arm = new Arm(six);
+    arm.takt.command(move(1, 0.8));
+    arm.pass(300);
+    arm.takt.break(what, 1);
+    arm.pass(3000);
+    const { stop } = arm.state.groups[0];
+    assert.ok(stop?.is_fault && rule.test(stop.rule), JSON.stringify(stop));
+    const [name] = arm.takt.blackBoxes();
+    assert.match(name, /black-box/);
+    const report = arm.takt.report(0);
+    const file = path.join(recordings, name);
+    writeFileSync(file, arm.takt.blackBox(0));
+    assert.equal(execFileSync(takt, ["report", file], { encoding: "utf8", env: { ...process.env, COLUMNS: "100" } }).split("\n")[2], report.split("\n")[2]);
+    if (isState) arm.takt.break(what, 1, false);
+    arm.pass(1000);
+    arm.takt.command({ do: "clear_faults", group: null });
+    arm.pass(2000);
+    if (arm.phase === "disabled") {
+      arm.takt.command({ do: "enable", group: null });
+      arm.pass(6000);
+    }
+    // Drives that have lost their supply are brought up by a new run alone.
+    if (["power_cut"].includes(what)) return;
+    assert.equal(arm.phase, "holding", JSON.stringify([arm.state.groups, arm.events.slice(-5)]));
+    arm.takt.command(move(1, -0.2));
+    arm.pass(3000);
+    assert.ok(Math.abs(arm.state.axes[1].position + 0.2) < 1e-3, `${arm.state.axes[1].position}`);
+  });
+}
+
+check("two arms that are told the same do the same, bit for bit", () => {
+  const run = () => {
+    const arm = new Arm(six);
+    const states = [];
+    arm.takt.command(move(2, 0.4));
+    for (let looks = 0; looks < 50; looks += 1) states.push(JSON.stringify(arm.pass(40).state));
+    return states;
+  };
+  assert.deepEqual(run(), run());
+});
+
+check("an arm of six axes passes its time faster than the clock on the wall", () => {
+  const arm = new Arm(six);
+  const began = performance.now();
+  arm.pass(5000);
+  const factor = 5000 / (performance.now() - began);
+  console.log(`   ${factor.toFixed(1)} times as fast`);
+  assert.ok(factor > 1);
+});
