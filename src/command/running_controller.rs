@@ -32,6 +32,11 @@ pub trait RunningController: Send + Sync {
     /// The state after the newest complete cycle that is known here.
     fn state(&self) -> Snapshot;
 
+    /// Shows that state to `look`, without a copy of it where that is possible: a state has twelve kilobytes.
+    fn look_at_state(&self, look: &mut dyn FnMut(&Snapshot)) {
+        look(&self.state());
+    }
+
     /// The present time on the clock of the controller, which states, events and stamps are on: `CLOCK_MONOTONIC`, or virtual time.
     fn now_ns(&self) -> Nanoseconds;
 
@@ -260,19 +265,24 @@ pub trait RunningController: Send + Sync {
 
     /// The fault that has stopped a target and has not been reset: the first, of several groups.
     fn fault_in(&self, target: RequestTarget) -> Option<Stopped> {
-        let state = self.state();
-        let faults = groups_in(&state, target).iter().filter_map(|group| group.stop);
-        let first = faults.filter(|stop| !stop.is_requested()).min_by_key(|stop| stop.slot);
+        let mut first = None;
+        self.look_at_state(&mut |state| {
+            let faults = groups_in(state, target).iter().filter_map(|group| group.stop);
+            first = faults.filter(|stop| !stop.is_requested()).min_by_key(|stop| stop.slot);
+        });
         first.map(|stop| Stopped::new(stop, self.machine()))
     }
 
     /// What the stream of a target is doing: of several groups, that of the first one that follows its points.
     fn stream_report(&self, target: RequestTarget) -> StreamReport {
-        let state = self.state();
-        let groups = groups_in(&state, target);
-        let followed = |group: &&GroupSnapshot| group.stream.state != StreamState::Idle;
-        let shown = groups.iter().find(followed).or(groups.first());
-        shown.map_or_else(StreamReport::default, |group| group.stream)
+        let mut report = StreamReport::default();
+        self.look_at_state(&mut |state| {
+            let groups = groups_in(state, target);
+            let followed = |group: &&GroupSnapshot| group.stream.state != StreamState::Idle;
+            let shown = groups.iter().find(followed).or(groups.first());
+            report = shown.map_or(report, |group| group.stream);
+        });
+        report
     }
 
     /// Waits until every group of a target is in a phase.

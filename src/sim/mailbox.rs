@@ -41,11 +41,13 @@ impl Mailbox {
         if self.frames.len() >= self.capacity || frame.is_fd() && !self.takes_fd {
             return false;
         }
-        let at = match self.order {
-            QueueOrder::FirstInFirstOut => self.frames.len(),
-            QueueOrder::Priority => self.frames.partition_point(|other| priority(other) <= priority(&frame)),
-        };
-        self.frames.insert(at, frame);
+        match self.order {
+            QueueOrder::FirstInFirstOut => self.frames.push_back(frame),
+            QueueOrder::Priority => {
+                let own = priority(&frame);
+                self.frames.insert(self.frames.partition_point(|other| priority(other) <= own), frame);
+            }
+        }
         true
     }
 
@@ -90,8 +92,8 @@ impl Mailbox {
 
 /// The arbitration key: the smaller one wins. Identifier first, then data before remote (the RTR bit of data is
 /// dominant).
-pub(super) fn priority(frame: &Frame) -> (u64, bool) {
-    (frame.id().arbitration_key(), frame.kind() == FrameKind::Remote)
+pub(super) fn priority(frame: &Frame) -> u64 {
+    frame.id().arbitration_key() << 1 | u64::from(frame.kind() == FrameKind::Remote)
 }
 
 #[cfg(test)]

@@ -115,12 +115,8 @@ impl Medium {
 
     /// Does what is due at `now_ns`: returns the frame that has just arrived, or starts the next frame on a free wire.
     pub fn step(&mut self, now_ns: Nanoseconds) -> Option<FrameOnWire> {
-        if let Some(transmission) = self.on_wire {
-            if transmission.arrives_ns > now_ns {
-                return None;
-            }
-            self.on_wire = None;
-            return Some(transmission);
+        if self.on_wire.is_some() {
+            return self.on_wire.take_if(|transmission| transmission.arrives_ns <= now_ns);
         }
         if self.free_ns <= now_ns {
             self.arbitrate(now_ns);

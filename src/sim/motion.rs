@@ -56,6 +56,7 @@ pub struct Measured {
 
 impl Demand {
     /// The torque of the loops after this demand: N·m (N), in the direction of the drive.
+    #[inline]
     pub fn torque(self, servo: &mut Servo, measured: Measured, duration_s: f64) -> f64 {
         let Measured { count, per_mille, position: actual, velocity } = measured;
         match self {

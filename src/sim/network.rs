@@ -145,9 +145,8 @@ impl Network {
 
     /// The time of the next action.
     pub fn due_ns(&self) -> Nanoseconds {
-        let watched = self.watched.iter().map(|watched| watched.deadline_ns).min().unwrap_or(NEVER);
-        let timers = self.boot_ns.min(self.heartbeat_ns).min(self.sync_ns);
-        timers.min(watched).min(self.guard_deadline_ns)
+        let timers = self.boot_ns.min(self.heartbeat_ns).min(self.sync_ns).min(self.guard_deadline_ns);
+        self.watched.iter().fold(timers, |due_ns, watched| due_ns.min(watched.deadline_ns))
     }
 
     /// Boots when it is time. Returns whether the boot-up message is to be sent.

@@ -203,6 +203,10 @@ pub struct PdoEngine {
     inbound: Vec<Inbound>,
     outbound: Vec<Outbound>,
     features: PdoFeatures,
+    /// The time of the next action: of the first sampled TPDO, or of the first event timer that runs out.
+    due_ns: Nanoseconds,
+    /// Whether an event can send a TPDO.
+    has_events: bool,
 }
 
 /// What a device does with its PDOs.
@@ -236,7 +240,8 @@ impl PdoEngine {
             free_ns: 0,
             is_sent: false,
         });
-        let mut engine = Self { inbound: inbound.collect(), outbound: outbound.collect(), features };
+        let (inbound, outbound) = (inbound.collect(), outbound.collect());
+        let mut engine = Self { inbound, outbound, features, due_ns: NEVER, has_events: false };
         engine.compile(dictionary);
         engine
     }
@@ -255,6 +260,14 @@ impl PdoEngine {
         for outbound in &mut self.outbound {
             outbound.pdo.compile(dictionary, self.features.is_measured);
         }
+        self.has_events = self.outbound.iter().any(|outbound| outbound.pdo.is_event_driven());
+    }
+
+    /// Notes the time of the next action, after one of those times has changed.
+    fn schedule(&mut self) {
+        let sampled = self.outbound.iter().map(|outbound| outbound.due_ns);
+        let deadlines = self.inbound.iter().map(|inbound| inbound.deadline_ns);
+        self.due_ns = sampled.chain(deadlines).fold(NEVER, Nanoseconds::min);
     }
 
     /// Receives a frame in NMT operational. A synchronous RPDO waits for SYNC, the others act at once.
@@ -272,15 +285,21 @@ impl PdoEngine {
         if frame.payload().len() < inbound.pdo.bytes {
             return RpdoReception::TooShort;
         }
-        if self.features.watches_rpdos && inbound.pdo.event_ns > 0 {
+        let is_watched = self.features.watches_rpdos && inbound.pdo.event_ns > 0;
+        if is_watched {
             inbound.deadline_ns = now_ns + inbound.pdo.event_ns;
         }
-        if inbound.pdo.is_synchronous() {
+        let reception = if inbound.pdo.is_synchronous() {
             inbound.latched = Some(frame.first_word());
-            return RpdoReception::Latched(number);
+            RpdoReception::Latched(number)
+        } else {
+            inbound.unpack(frame.first_word(), dictionary, write);
+            RpdoReception::Applied(number)
+        };
+        if is_watched {
+            self.schedule();
         }
-        inbound.unpack(frame.first_word(), dictionary, write);
-        RpdoReception::Applied(number)
+        reception
     }
 
     /// SYNC, first part: applies the latched data.
@@ -347,11 +366,12 @@ impl PdoEngine {
                 outbound.due_ns = now_ns + latency_ns;
             }
         }
+        self.schedule();
     }
 
     /// Whether an event can send a TPDO.
     pub fn has_events(&self) -> bool {
-        self.outbound.iter().any(|outbound| outbound.pdo.is_event_driven())
+        self.has_events
     }
 
     /// Checks the event-driven TPDOs (types 254 and 255). Events: the first time, the event timer, and a change of a
@@ -374,6 +394,7 @@ impl PdoEngine {
                 outbound.due_ns = now_ns;
             }
         }
+        self.schedule();
     }
 
     /// An event of the device: samples a TPDO, which is sent `latency_ns` later, or when its inhibit time is over.
@@ -387,6 +408,7 @@ impl PdoEngine {
         let outbound = &mut self.outbound[number];
         outbound.sampled = outbound.pdo.pack(dictionary);
         outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(outbound.free_ns));
+        self.schedule();
     }
 
     /// How many SYNCs a synchronous TPDO waits for; `None` for another one.
@@ -402,29 +424,36 @@ impl PdoEngine {
 
     /// Whether the event timer of an RPDO has just run out.
     pub fn has_lost_rpdo(&mut self, now_ns: Nanoseconds) -> bool {
+        if now_ns < self.due_ns {
+            return false;
+        }
         let mut has_lost = false;
         for inbound in self.inbound.iter_mut().filter(|inbound| inbound.deadline_ns <= now_ns) {
             inbound.deadline_ns = NEVER;
             has_lost = true;
         }
+        self.schedule();
         has_lost
     }
 
     /// The time of the next action.
     pub fn due_ns(&self) -> Nanoseconds {
-        let sampled = self.outbound.iter().map(|outbound| outbound.due_ns);
-        let deadlines = self.inbound.iter().map(|inbound| inbound.deadline_ns);
-        sampled.chain(deadlines).min().unwrap_or(NEVER)
+        self.due_ns
     }
 
     /// A TPDO that is due.
     pub fn next(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
+        if now_ns < self.due_ns {
+            return None;
+        }
         let outbound = self.outbound.iter_mut().find(|outbound| outbound.due_ns <= now_ns)?;
         outbound.due_ns = NEVER;
         outbound.is_sent = true;
         outbound.last_ns = now_ns;
         outbound.free_ns = now_ns + outbound.pdo.inhibit_ns;
-        outbound.pdo.frame(outbound.sampled)
+        let frame = outbound.pdo.frame(outbound.sampled);
+        self.schedule();
+        frame
     }
 
     /// Answers a remote request for a TPDO: with the values of the last SYNC (type 252), or the current ones.
@@ -438,5 +467,6 @@ impl PdoEngine {
     pub fn stop(&mut self) {
         self.inbound.iter_mut().for_each(Inbound::reset);
         self.outbound.iter_mut().for_each(Outbound::reset);
+        self.schedule();
     }
 }

@@ -123,6 +123,7 @@ impl Joint {
     /// Coulomb friction is exact: a step in which the velocity would change its sign is split at standstill, and the
     /// joint stays there while the friction can hold it. So it neither creeps nor chatters. Viscous friction is
     /// integrated implicitly, which is stable for any coefficient.
+    #[inline]
     pub fn step(&mut self, duration_s: f64, motor_torque: f64, is_braked: bool) {
         let brake = if is_braked { self.parameters.brake_torque } else { 0.0 };
         let friction = self.coulomb_friction() + brake;
@@ -181,6 +182,7 @@ pub struct Encoder {
 
 impl Encoder {
     /// The count at a position, wrapped to the 32 bits of the position objects.
+    #[inline]
     pub fn counts(&self, position: f64) -> i32 {
         ((position * self.counts_per_unit + self.zero_counts).round_ties_even() as i64) as i32
     }

@@ -27,6 +27,8 @@ const MASTER: usize = 0;
 pub struct SimulatedBus {
     medium: Medium,
     drives: Vec<Box<dyn Drive>>,
+    /// When each drive acts next.
+    wakes_ns: Vec<Nanoseconds>,
     received: VecDeque<Received>,
     health: BusHealth,
     longest_gap_ns: Nanoseconds,
@@ -68,6 +70,7 @@ impl SimulatedBus {
     ) -> Self {
         Self {
             medium: Medium::with_master(rates, TRANSMIT_QUEUE, drives.len() + 1, DRIVE_MAILBOX),
+            wakes_ns: drives.iter().map(|drive| drive.wake_ns()).collect(),
             drives,
             received: VecDeque::with_capacity(RECEIVE_QUEUE),
             health: BusHealth { state: BusState::ErrorActive, ..BusHealth::default() },
@@ -94,6 +97,7 @@ impl SimulatedBus {
     pub fn inject_fault(&mut self, node: u8, fault: DriveFault) -> Result<(), UnknownNode> {
         let station = self.station(node)?;
         self.drives[station - 1].inject_fault(fault);
+        self.schedule(station);
         Ok(())
     }
 
@@ -108,7 +112,9 @@ impl SimulatedBus {
         is_present: bool,
     ) -> Result<(), InjectDefectError> {
         let station = self.station(node)?;
-        Ok(self.drives[station - 1].inject_defect(self.now_ns, defect, is_present)?)
+        let injected = self.drives[station - 1].inject_defect(self.now_ns, defect, is_present);
+        self.schedule(station);
+        Ok(injected?)
     }
 
     /// Lets a foreign station send a frame: it takes part in the arbitration, and every station receives it. Returns
@@ -135,6 +141,7 @@ impl SimulatedBus {
     pub fn power_cycle(&mut self, node: u8) -> Result<(), UnknownNode> {
         let station = self.station(node)?;
         self.drives[station - 1].power_cycle(self.now_ns, self.medium.mailbox_mut(station));
+        self.schedule(station);
         Ok(())
     }
 
@@ -142,6 +149,7 @@ impl SimulatedBus {
     pub fn set_load_torque(&mut self, node: u8, torque: f64) -> Result<(), UnknownNode> {
         let station = self.station(node)?;
         self.drives[station - 1].set_load_torque(torque);
+        self.schedule(station);
         Ok(())
     }
 
@@ -154,6 +162,11 @@ impl SimulatedBus {
     fn station(&self, node: u8) -> Result<usize, UnknownNode> {
         let at = self.drives.iter().position(|drive| drive.node() == node);
         at.map(|at| at + 1).ok_or(UnknownNode { node })
+    }
+
+    /// Notes when a drive acts next, after something has happened to it.
+    fn schedule(&mut self, station: usize) {
+        self.wakes_ns[station - 1] = self.drives[station - 1].wake_ns();
     }
 
     /// Advances the simulation to the caller's time.
@@ -176,16 +189,20 @@ impl SimulatedBus {
 
     /// The time of the next event in the simulation.
     fn next_ns(&self) -> Option<Nanoseconds> {
-        let wire = self.medium.next_ns(self.now_ns);
-        let drives = self.drives.iter().map(|drive| drive.wake_ns().max(self.now_ns));
-        drives.chain(wire).min()
+        let drives = self.wakes_ns.iter().copied().reduce(Nanoseconds::min);
+        let drives = drives.map(|wake_ns| wake_ns.max(self.now_ns));
+        match self.medium.next_ns(self.now_ns) {
+            Some(wire) => Some(drives.map_or(wire, |drives| drives.min(wire))),
+            None => drives,
+        }
     }
 
     /// Handles all events of one instant. The drives come first, so that their new frames take part in the arbitration.
     fn step(&mut self, now_ns: Nanoseconds) {
-        for (drive, station) in self.drives.iter_mut().zip(1..) {
-            if drive.wake_ns() <= now_ns {
+        for ((drive, wake_ns), station) in self.drives.iter_mut().zip(&mut self.wakes_ns).zip(1..) {
+            if *wake_ns <= now_ns {
                 drive.advance(now_ns, self.medium.mailbox_mut(station));
+                *wake_ns = drive.wake_ns();
             }
         }
         if let Some(transmission) = self.medium.step(now_ns) {
@@ -195,9 +212,10 @@ impl SimulatedBus {
 
     fn deliver(&mut self, now_ns: Nanoseconds, transmission: &FrameOnWire) {
         let FrameOnWire { frame, sender, .. } = transmission;
-        for (drive, station) in self.drives.iter_mut().zip(1..) {
+        for ((drive, wake_ns), station) in self.drives.iter_mut().zip(&mut self.wakes_ns).zip(1..) {
             if station != *sender && self.medium.is_connected(station) {
                 drive.receive(now_ns, frame, self.medium.mailbox_mut(station));
+                *wake_ns = drive.wake_ns();
             }
         }
         if *sender == MASTER {

@@ -52,6 +52,7 @@ impl Servo {
     }
 
     /// Torque for a position error (set-point minus actual), with velocity and torque feed-forward.
+    #[inline]
     pub fn position(
         &mut self,
         error: f64,
@@ -64,6 +65,7 @@ impl Servo {
     }
 
     /// Torque for a velocity set-point, with torque feed-forward.
+    #[inline]
     pub fn velocity(&mut self, demand: f64, velocity: f64, torque_forward: f64, duration_s: f64) -> f64 {
         let error = demand.clamp(-self.velocity_limit, self.velocity_limit) - velocity;
         let preset = self.inertia * VELOCITY_RATE;

@@ -45,8 +45,9 @@ impl WireLength {
     fn classic(frame: &Frame) -> Self {
         let (head, head_bits) = classic_head(frame);
         let mut crc = Crc15::default();
-        // The register starts at zero, so leading zero bits change nothing and any alignment is right.
-        for byte in head.to_be_bytes() {
+        // The register starts at zero, so leading zero bits change nothing and any alignment is right. A head has up to 39 bits.
+        let [_, _, _, head_bytes @ ..] = head.to_be_bytes();
+        for byte in head_bytes {
             crc.push(byte);
         }
         for &byte in frame.payload() {
@@ -188,18 +189,18 @@ const fn after_byte(mut run: u8, byte: u8) -> u8 {
 impl Stuffing {
     /// Takes the low `count` bits of `bits`, the highest of them first.
     fn push(&mut self, bits: u128, count: u32) {
-        let mut left = count;
-        while !left.is_multiple_of(8) {
-            left -= 1;
-            (self.run, self.is_just_stuffed) = after_bit(self.run, (bits >> left) as u8 & 1);
+        let mut rest = bits.checked_shl(u128::BITS - count).unwrap_or(0);
+        for _ in 0..count % 8 {
+            (self.run, self.is_just_stuffed) = after_bit(self.run, (rest >> (u128::BITS - 1)) as u8);
             self.stuffed += u32::from(self.is_just_stuffed);
+            rest <<= 1;
         }
-        while left > 0 {
-            left -= 8;
-            let after = STUFFING_TABLE[usize::from(self.run)][usize::from((bits >> left) as u8)];
+        for _ in 0..count / 8 {
+            let after = STUFFING_TABLE[usize::from(self.run)][(rest >> (u128::BITS - 8)) as usize];
             self.run = after & 0xF;
             self.is_just_stuffed = after & 0x10 != 0;
             self.stuffed += u32::from(after >> 5);
+            rest <<= 8;
         }
     }
 }

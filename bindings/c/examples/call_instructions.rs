@@ -80,10 +80,10 @@ fn in_rust(work: &str, repetitions: u64) -> bool {
         "simulate-6" => assert_eq!(arm.step(repetitions), repetitions),
         "simulate-6-by-one" => (0..repetitions).for_each(|_| assert_eq!(arm.step(1), 1)),
         "simulate-6-moving" => {
-            let there: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set + 0.4).collect();
-            assert!(
-                arm.move_with(&there, MoveOptions { velocity_scale: 0.01, ..MoveOptions::default() }).is_ok()
-            );
+            let there: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set + 0.05).collect();
+            // It takes longer than is counted.
+            let options = MoveOptions { minimum_duration_s: 60.0, ..MoveOptions::default() };
+            assert!(arm.move_with(&there, options).is_ok());
             assert_eq!(arm.step(repetitions), repetitions);
         }
         _ => return false,

@@ -223,8 +223,12 @@ unsafe impl Growing for takt_state {
 pub unsafe extern "C" fn takt_read_state(handle: takt_handle, state: *mut takt_state) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        // SAFETY: the caller promises it.
-        unsafe { put_state(&scope, &scope.controller.state(), state) }
+        let mut put = Ok(());
+        scope.controller.look_at_state(&mut |shown| {
+            // SAFETY: the caller promises it.
+            put = unsafe { put_state(&scope, shown, state) };
+        });
+        put
     })
 }
 

@@ -2,15 +2,33 @@
 //! hundred bytes, and no dependence on the version of numpy.
 
 use pyo3::exceptions::PyValueError;
+use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyByteArray, PyBytes};
+use pyo3::types::{PyByteArray, PyBytes, PyTuple};
 
-static NUMPY: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
+/// The functions and types of numpy that are called, found once.
+struct Numpy {
+    ascontiguousarray: Py<PyAny>,
+    frombuffer: Py<PyAny>,
+    number: Py<PyAny>,
+    truth: Py<PyAny>,
+}
 
-fn numpy(py: Python<'_>) -> PyResult<&Bound<'_, PyModule>> {
-    let module = NUMPY.get_or_try_init(py, || py.import("numpy").map(Bound::unbind))?;
-    Ok(module.bind(py))
+static NUMPY: PyOnceLock<Numpy> = PyOnceLock::new();
+
+fn numpy(py: Python<'_>) -> PyResult<&Numpy> {
+    NUMPY.get_or_try_init(py, || {
+        let module = py.import("numpy")?;
+        let function = |name| Ok::<_, PyErr>(module.getattr(name)?.unbind());
+        let kind = |name| Ok::<_, PyErr>(module.call_method1("dtype", (name,))?.unbind());
+        Ok(Numpy {
+            ascontiguousarray: function("ascontiguousarray")?,
+            frombuffer: function("frombuffer")?,
+            number: kind("f8")?,
+            truth: kind("?")?,
+        })
+    })
 }
 
 /// Numbers in rows of equal length.
@@ -30,9 +48,12 @@ impl Table {
 
 /// Anything that numpy takes for an array of numbers, with its shape.
 fn numbers(value: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
-    let array = numpy(value.py())?.call_method1("ascontiguousarray", (value, "f8"))?;
-    let shape: Vec<usize> = array.getattr("shape")?.extract()?;
-    let bytes = array.call_method0("tobytes")?;
+    let py = value.py();
+    let numpy = numpy(py)?;
+    let array = numpy.ascontiguousarray.bind(py).call1((value, &numpy.number))?;
+    let shape = array.getattr(intern!(py, "shape"))?;
+    let shape = shape.cast::<PyTuple>()?.iter().map(|length| length.extract()).collect::<PyResult<_>>()?;
+    let bytes = array.call_method0(intern!(py, "tobytes"))?;
     let bytes = bytes.cast::<PyBytes>()?.as_bytes();
     let (numbers, _) = bytes.as_chunks::<8>();
     Ok((shape, numbers.iter().map(|number| f64::from_ne_bytes(*number)).collect()))
@@ -71,33 +92,39 @@ pub fn table(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Table> {
 }
 
 /// An array of numbers of its own.
-pub fn array<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+pub fn array<'py>(
+    py: Python<'py>,
+    values: impl ExactSizeIterator<Item = f64>,
+) -> PyResult<Bound<'py, PyAny>> {
     // Only a byte array gives an array that may be written to.
-    let bytes = PyByteArray::new_with(py, size_of_val(values), |bytes| {
+    let bytes = PyByteArray::new_with(py, values.len() * size_of::<f64>(), |bytes| {
         for (place, value) in bytes.as_chunks_mut::<8>().0.iter_mut().zip(values) {
             *place = value.to_ne_bytes();
         }
         Ok(())
     })?;
-    from_buffer(py, bytes, "f8")
+    from_buffer(py, bytes, &numpy(py)?.number)
 }
 
 /// An array of so many rows of equal length.
 pub fn array_of_rows<'py>(py: Python<'py>, values: &[f64], columns: usize) -> PyResult<Bound<'py, PyAny>> {
     let rows = values.len().checked_div(columns).unwrap_or(0);
-    array(py, values)?.call_method1("reshape", (rows, columns))
+    array(py, values.iter().copied())?.call_method1("reshape", (rows, columns))
 }
 
 /// An array of truth values.
-pub fn array_of_bools<'py>(py: Python<'py>, values: &[bool]) -> PyResult<Bound<'py, PyAny>> {
-    let values: Vec<u8> = values.iter().map(|value| u8::from(*value)).collect();
-    from_buffer(py, PyByteArray::new(py, &values), "?")
+pub fn array_of_bools<'py>(
+    py: Python<'py>,
+    values: impl Iterator<Item = bool>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let values: Vec<u8> = values.map(u8::from).collect();
+    from_buffer(py, PyByteArray::new(py, &values), &numpy(py)?.truth)
 }
 
 fn from_buffer<'py>(
     py: Python<'py>,
     bytes: Bound<'py, PyByteArray>,
-    kind: &str,
+    kind: &Py<PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    numpy(py)?.call_method1("frombuffer", (bytes, kind))
+    numpy(py)?.frombuffer.bind(py).call1((bytes, kind))
 }

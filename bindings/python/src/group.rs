@@ -1,5 +1,6 @@
 //! What an arm, or a group of its axes, can be told, and the axes themselves.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use pyo3::prelude::*;
@@ -48,14 +49,14 @@ pub struct Group {
     target: RequestTarget,
     name: String,
     /// The numbers of the axes.
-    axes: Vec<usize>,
+    axes: Arc<[usize]>,
 }
 
 impl Group {
     /// All axes of a controller.
     pub fn all(link: Link, controller: &dyn RunningController) -> Self {
         let target = RequestTarget::All;
-        let (name, axes) = (controller.machine().name.clone(), controller.axes_of(target));
+        let (name, axes) = (controller.machine().name.clone(), controller.axes_of(target).into());
         Self { link, target, name, axes }
     }
 
@@ -63,7 +64,7 @@ impl Group {
     pub fn named(&self, py: Python<'_>, name: &str) -> PyResult<Self> {
         let controller = self.link.controller(py)?;
         let target = controller.group_named(name).map_err(|error| self.command_error(py, &error))?;
-        let axes = controller.axes_of(target);
+        let axes = controller.axes_of(target).into();
         Ok(Self { link: self.link.clone(), target, name: name.to_owned(), axes })
     }
 
@@ -166,7 +167,7 @@ impl Group {
     /// The state after the newest complete cycle.
     #[getter]
     fn state(&self, py: Python<'_>) -> PyResult<State> {
-        Ok(State::of(self.link.controller(py)?, &self.axes, self.target))
+        Ok(State::of(&self.link, self.link.controller(py)?, &self.axes, self.target))
     }
 
     /// Moves every axis to its target, where all come to rest at the same time.
@@ -251,7 +252,7 @@ impl Group {
     /// Begins to follow a stream of points, until the stream is closed.
     fn follow(&self, py: Python<'_>) -> PyResult<Stream> {
         self.command(py, |arm, whose| arm.begin_streaming(whose))?;
-        Ok(Stream::new(self.link.clone(), self.target, self.axes.clone()))
+        Ok(Stream::new(self.link.clone(), self.target, Arc::clone(&self.axes)))
     }
 
     /// Waits for a motion: the same as its own `wait`.

@@ -47,6 +47,8 @@ mod _takt {
     #[pymodule_export]
     use crate::group::{Axis, Group};
     #[pymodule_export]
+    use crate::link::after_fork;
+    #[pymodule_export]
     use crate::motion::Motion;
     #[pymodule_export]
     use crate::owner::close_all;

@@ -2,7 +2,7 @@
 
 use std::process;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use pyo3::exceptions::PyValueError;
@@ -11,6 +11,16 @@ use takt::{Client, Handle, RunningController};
 
 use crate::error::raise;
 
+/// How many forks are between the process that has loaded the package and this one. Python says of each, since to ask the operating system
+/// for the number of the process in every call takes longer than most of the calls.
+static FORKS: AtomicU64 = AtomicU64::new(0);
+
+/// This process is a fork. Python calls it in the child of each.
+#[pyfunction(name = "_after_fork")]
+pub fn after_fork() {
+    FORKS.fetch_add(1, Ordering::Relaxed);
+}
+
 /// A controller, and the process that may use it.
 #[derive(Clone)]
 pub struct Link {
@@ -18,6 +28,8 @@ pub struct Link {
     /// The same, if this program owns it.
     own: Option<Handle>,
     process: u32,
+    /// The forks before this process.
+    forks: u64,
     is_closed: Arc<AtomicBool>,
 }
 
@@ -33,7 +45,8 @@ impl Link {
     }
 
     fn to(controller: Arc<dyn RunningController>) -> Self {
-        Self { controller, own: None, process: process::id(), is_closed: Arc::default() }
+        let forks = FORKS.load(Ordering::Relaxed);
+        Self { controller, own: None, process: process::id(), forks, is_closed: Arc::default() }
     }
 
     /// The controller, in the process that has it or has connected to it. A fork has a copy of the memory, and none of the threads.
@@ -80,12 +93,18 @@ impl Link {
 
     /// Whether the controller is in this process, or this process has connected to it.
     pub fn is_of_this_process(&self) -> bool {
-        process::id() == self.process
+        FORKS.load(Ordering::Relaxed) == self.forks
     }
 
     /// The names of all axes.
     pub fn axis_names(&self) -> Vec<&str> {
         self.controller.machine().axes.iter().map(|axis| axis.name.as_str()).collect()
+    }
+
+    /// The name of the group with this number. Where all axes are one group, it has the name of the machine.
+    pub fn group_name(&self, number: usize) -> &str {
+        let machine = self.controller.machine();
+        machine.groups.get(number).unwrap_or(&machine.name)
     }
 
     /// The names of the axes with these numbers.

@@ -196,7 +196,7 @@ impl Recording {
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let times = py.detach(|| lock(&self.tape.columns).times.clone());
-        array(py, &times)
+        array(py, times.into_iter())
     }
 
     /// Where the joints were.

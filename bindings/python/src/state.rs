@@ -1,21 +1,27 @@
 //! The state of an arm, or of a group of its axes, after a cycle.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use pyo3::prelude::*;
 use takt::config::mode_word;
 use takt::rt::RequestTarget;
 use takt::telemetry::phase_words;
-use takt::{AxisSnapshot, OperationMode, RunningController};
+use takt::{AxisSnapshot, OperationMode, Phase, RunningController};
 
 use crate::array::{array, array_of_bools};
-use crate::link::seconds;
+use crate::link::{Link, seconds};
 
-/// The state after a cycle. Each array has a value for each axis; nan where a drive has not reported it.
+/// The state after a cycle. Each array has a value for each axis; nan where a drive has not reported it. Whoever steps a simulation reads
+/// one in each cycle: names and arrays are made when they are asked for.
 #[pyclass(module = "takt", frozen)]
 pub struct State {
-    names: Vec<String>,
+    link: Link,
+    /// The numbers of the axes.
+    numbers: Arc<[usize]>,
     axes: Vec<AxisSnapshot>,
-    /// The group and the phase of each.
-    phases: Vec<(String, &'static str)>,
+    /// The numbers of the groups, and the phase of each.
+    phases: Vec<(usize, Phase)>,
     fault: Option<String>,
     slot: u64,
     at_ns: u64,
@@ -25,29 +31,44 @@ pub struct State {
 
 impl State {
     /// The state of the axes with these numbers, which are those of the target.
-    pub fn of(controller: &dyn RunningController, axes: &[usize], target: RequestTarget) -> Self {
-        let (snapshot, machine) = (controller.state(), controller.machine());
-        let names =
-            if machine.groups.is_empty() { vec![&machine.name] } else { machine.groups.iter().collect() };
-        let groups = names.into_iter().zip(snapshot.groups()).enumerate();
-        let is_meant = |number: usize| match target {
-            RequestTarget::All => true,
-            RequestTarget::Group(group) => usize::from(group) == number,
+    pub fn of(
+        link: &Link,
+        controller: &dyn RunningController,
+        numbers: &Arc<[usize]>,
+        target: RequestTarget,
+    ) -> Self {
+        let mut state = Self {
+            link: link.clone(),
+            numbers: Arc::clone(numbers),
+            axes: Vec::with_capacity(numbers.len()),
+            phases: vec![],
+            fault: None,
+            slot: 0,
+            at_ns: 0,
+            now_ns: 0,
+            missed_slots: 0,
         };
-        let meant: Vec<_> = groups.filter(|(number, _)| is_meant(*number)).map(|(_, group)| group).collect();
-        let is_faulty = meant.iter().any(|(_, group)| group.stop.is_some_and(|stop| !stop.is_requested()));
-        let of = |axis: &usize| Some((machine.axes.get(*axis)?.name.clone(), *snapshot.axes().get(*axis)?));
-        let (names, axes) = axes.iter().filter_map(of).unzip();
-        Self {
-            names,
-            axes,
-            phases: meant.into_iter().map(|(name, group)| (name.clone(), phase_words(group.phase))).collect(),
-            fault: is_faulty.then(|| controller.fault_in(target)).flatten().map(|fault| fault.to_string()),
-            slot: snapshot.slot,
-            at_ns: snapshot.at_ns,
-            now_ns: controller.now_ns(),
-            missed_slots: snapshot.missed_slots,
+        let mut is_faulty = false;
+        controller.look_at_state(&mut |snapshot| {
+            state.axes.extend(numbers.iter().filter_map(|number| snapshot.axes().get(*number)));
+            let is_meant = |number: usize| match target {
+                RequestTarget::All => true,
+                RequestTarget::Group(group) => usize::from(group) == number,
+            };
+            for (number, group) in
+                snapshot.groups().iter().enumerate().filter(|(number, _)| is_meant(*number))
+            {
+                state.phases.push((number, group.phase));
+                is_faulty |= group.stop.is_some_and(|stop| !stop.is_requested());
+            }
+            (state.slot, state.at_ns) = (snapshot.slot, snapshot.at_ns);
+            state.missed_slots = snapshot.missed_slots;
+        });
+        state.now_ns = controller.now_ns();
+        if is_faulty {
+            state.fault = controller.fault_in(target).map(|fault| fault.to_string());
         }
+        state
     }
 
     fn numbers<'py>(
@@ -55,7 +76,7 @@ impl State {
         py: Python<'py>,
         of: impl Fn(&AxisSnapshot) -> f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        array(py, &self.axes.iter().map(of).collect::<Vec<f64>>())
+        array(py, self.axes.iter().map(of))
     }
 
     /// What a drive reports; a drive that has reported nothing has no position of 0.
@@ -67,9 +88,8 @@ impl State {
         self.numbers(py, |axis| of(axis).filter(|_| axis.is_heard).unwrap_or(f64::NAN))
     }
 
-    fn ages(&self) -> Vec<f64> {
-        let age = |axis: &AxisSnapshot| axis.feedback_age_ns(self.now_ns).map_or(f64::INFINITY, seconds);
-        self.axes.iter().map(age).collect()
+    fn age_of(&self, axis: &AxisSnapshot) -> f64 {
+        axis.feedback_age_ns(self.now_ns).map_or(f64::INFINITY, seconds)
     }
 }
 
@@ -150,25 +170,25 @@ impl State {
     /// How old what each drive reports is, in seconds; infinite before its first report.
     #[getter]
     fn age<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        array(py, &self.ages())
+        self.numbers(py, |axis| self.age_of(axis))
     }
 
     /// Whether what a drive reports is not from its last cycle.
     #[getter]
     fn is_stale<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        array_of_bools(py, &self.axes.iter().map(AxisSnapshot::is_stale).collect::<Vec<bool>>())
+        array_of_bools(py, self.axes.iter().map(AxisSnapshot::is_stale))
     }
 
     /// What the axes are doing: "holding", "moving", …; where groups do different things, what the first does.
     #[getter]
     fn phase(&self) -> &'static str {
-        self.phases.first().map_or("passive", |(_, phase)| phase)
+        self.phases.first().map_or("passive", |(_, phase)| phase_words(*phase))
     }
 
     /// What each group is doing.
     #[getter]
-    fn phases(&self) -> std::collections::BTreeMap<String, &'static str> {
-        self.phases.iter().cloned().collect()
+    fn phases(&self) -> BTreeMap<&str, &'static str> {
+        self.phases.iter().map(|(group, phase)| (self.link.group_name(*group), phase_words(*phase))).collect()
     }
 
     /// The fault that has stopped the axes, in words; None while there is none.
@@ -200,11 +220,13 @@ impl State {
 
     fn __repr__(&self) -> String {
         let mut text = format!("<state of slot {}: {}", self.slot, self.phase());
-        for ((name, axis), age) in self.names.iter().zip(&self.axes).zip(self.ages()) {
+        for (name, axis) in self.link.names_of(&self.numbers).into_iter().zip(&self.axes) {
             text.push_str(&match (axis.is_heard, axis.is_stale()) {
                 (false, _) => format!(", {name} unknown"),
                 (true, false) => format!(", {name} {:+.4}", axis.position),
-                (true, true) => format!(", {name} {:+.4} ({:.0} ms old)", axis.position, age * 1e3),
+                (true, true) => {
+                    format!(", {name} {:+.4} ({:.0} ms old)", axis.position, self.age_of(axis) * 1e3)
+                }
             });
         }
         if let Some(fault) = &self.fault {

@@ -1,5 +1,6 @@
 //! A stream: points of any rate, stamped with the time that they are meant for.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use pyo3::prelude::*;
@@ -26,7 +27,7 @@ const STANDSTILL_S: f64 = 30.0;
 pub struct Stream {
     link: Link,
     target: RequestTarget,
-    axes: Vec<usize>,
+    axes: Arc<[usize]>,
 }
 
 /// The parts of a point, or of points, each a row for each point.
@@ -114,7 +115,7 @@ impl Parts {
 }
 
 impl Stream {
-    pub const fn new(link: Link, target: RequestTarget, axes: Vec<usize>) -> Self {
+    pub const fn new(link: Link, target: RequestTarget, axes: Arc<[usize]>) -> Self {
         Self { link, target, axes }
     }
 

@@ -25,7 +25,8 @@ impl Handle {
     /// How a motion has ended; `None` while it is under way. Does not wait.
     pub fn result_of(&self, motion: MotionId) -> Option<Result<(), MotionError>> {
         let has_ended = self.has_ended();
-        self.result_in(&self.state(), motion).or_else(|| has_ended.then_some(Err(MotionError::Ended)))
+        let result = self.0.observer.look(|state| self.result_in(state, motion));
+        result.or_else(|| has_ended.then_some(Err(MotionError::Ended)))
     }
 
     /// How a motion has ended, by a state.

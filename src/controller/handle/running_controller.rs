@@ -46,6 +46,10 @@ impl RunningController for Handle {
         Self::state(self)
     }
 
+    fn look_at_state(&self, look: &mut dyn FnMut(&Snapshot)) {
+        self.0.observer.look(look);
+    }
+
     fn now_ns(&self) -> Nanoseconds {
         Self::now_ns(self)
     }

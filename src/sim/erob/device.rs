@@ -37,6 +37,8 @@ pub struct ErobDevice {
     controlword: u16,
     reset_since_ns: Option<Nanoseconds>,
     stop: Option<Stop>,
+    /// A state and a controlword that leaves the drive in it.
+    settled: Option<(DriveState, u16)>,
     has_warning: bool,
 }
 
@@ -48,6 +50,7 @@ impl ErobDevice {
             controlword: 0,
             reset_since_ns: None,
             stop: None,
+            settled: None,
             has_warning,
         }
     }
@@ -97,6 +100,10 @@ impl ErobDevice {
         if self.state == DriveState::FaultReactionActive {
             return Change::None;
         }
+        // Almost every step finds the word of the step before.
+        if self.settled == Some((self.state, word)) {
+            return Change::None;
+        }
         self.evaluate_command(Command::decode(word), dictionary)
     }
 
@@ -135,6 +142,9 @@ impl ErobDevice {
             // The drive has no object 605A; it acts like its default 2: disable after the quick stop ramp.
             let deceleration = dictionary.real(at::QUICK_STOP_DECELERATION);
             self.stop = Some(Stop { deceleration, then: DriveState::SwitchOnDisabled });
+        }
+        if next == self.state {
+            self.settled = Some((next, self.controlword));
         }
         self.state = next;
         if next == DriveState::OperationEnabled && !had_torque { Change::Enabled } else { Change::None }

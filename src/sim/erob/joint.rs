@@ -53,6 +53,10 @@ pub struct ErobJoint {
     motion: ErobMotion,
     servo: Servo,
     joint: Joint,
+    /// The motion that the encoder measures, since the last step of the loops.
+    actual: Actual,
+    /// One count, without its sign: rad (m). One per mille of the rated torque: N·m (N).
+    units: (f64, f64),
     torque: f64,
     /// Offset added to the encoder's counts, because the turn count was lost.
     counts_offset: i32,
@@ -97,6 +101,8 @@ impl ErobJoint {
             motion: ErobMotion::new(counts_per_second),
             servo: Servo::new(parameters.joint.inertia, parameters.peak_torque, velocity_limit),
             joint: Joint::new(parameters.joint, parameters.initial_position),
+            actual: Actual { position: 0.0, velocity: 0.0 },
+            units: (1.0 / parameters.encoder.counts_per_unit.abs(), parameters.rated_torque / 1000.0),
             torque: 0.0,
             counts_offset: 0,
             has_battery_fault: false,
@@ -111,6 +117,7 @@ impl ErobJoint {
         if !parameters.has_battery {
             module.lose_turns();
         }
+        module.read_encoder();
         module
     }
 
@@ -126,9 +133,10 @@ impl ErobJoint {
         self.parameters.encoder.counts(self.joint.position()).wrapping_add(self.counts_offset)
     }
 
-    fn actual(&self) -> Actual {
+    /// Measures the motion, after the joint has moved or its counts have another offset.
+    fn read_encoder(&mut self) {
         let velocity = self.parameters.encoder.counts_per_second(self.joint.velocity());
-        Actual { position: self.counts().into(), velocity }
+        self.actual = Actual { position: self.counts().into(), velocity };
     }
 
     /// The current mode of operation, as in 6061.
@@ -143,8 +151,7 @@ impl ErobJoint {
         match self.device.evaluate(now_ns, &self.canopen.dictionary, !self.has_battery_fault) {
             Change::Enabled => {
                 self.servo.reset();
-                let (mode, actual) = (self.mode(), self.actual());
-                self.motion.engage(mode, actual, &self.canopen.dictionary);
+                self.motion.engage(self.mode(), self.actual, &self.canopen.dictionary);
             }
             Change::FaultReset => {
                 self.canopen.dictionary.set(at::ERROR_CODE, 0);
@@ -153,7 +160,7 @@ impl ErobJoint {
             Change::None => {}
         }
         if !had_stop && self.device.stop().is_some() {
-            self.motion.begin_stop(self.actual());
+            self.motion.begin_stop(self.actual);
         }
         if self.device.state() == DriveState::OperationEnabled {
             self.motion.evaluate(self.device.controlword(), previous, &self.canopen.dictionary);
@@ -194,7 +201,7 @@ impl ErobJoint {
         self.canopen.errors.raise(error, &mut self.canopen.dictionary);
         self.device.fault(error.cuts_power(), &self.canopen.dictionary);
         if self.device.stop().is_some() {
-            self.motion.begin_stop(self.actual());
+            self.motion.begin_stop(self.actual);
         } else {
             self.torque = 0.0;
         }
@@ -211,6 +218,7 @@ impl ErobJoint {
         let turn = self.parameters.counts_per_turn.max(1.0) as i64;
         let single = i64::from(self.counts()).rem_euclid(turn);
         self.counts_offset = self.counts_offset.wrapping_add((single - i64::from(self.counts())) as i32);
+        self.read_encoder();
     }
 }
 
@@ -290,6 +298,7 @@ impl Drive for ErobJoint {
             Defect::EncoderJump { distance } if is_present => {
                 let counts = (distance * self.parameters.encoder.counts_per_unit).round() as i64 as i32;
                 self.counts_offset = self.counts_offset.wrapping_add(counts);
+                self.read_encoder();
             }
             Defect::Alarm { code } if is_present => self.fail(DeviceError::Alarm(code)),
             Defect::Emergency { code } if is_present => {

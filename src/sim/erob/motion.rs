@@ -105,6 +105,7 @@ impl ErobMotion {
 
     /// Advances by `duration_s` and returns the set-point. A position is that of the beginning of the step, when the
     /// actual position was measured.
+    #[inline]
     pub fn step(
         &mut self,
         word: u16,

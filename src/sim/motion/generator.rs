@@ -106,6 +106,7 @@ impl Generator {
     }
 
     /// One step of the interpolation. Returns whether it needs more than `velocity_limit`.
+    #[inline]
     pub fn step_interpolation(&mut self, velocity_limit: f64, duration_s: f64) -> bool {
         let most = velocity_limit * duration_s;
         // Without a new target, the last one is reached and held.

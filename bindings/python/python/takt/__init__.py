@@ -10,6 +10,7 @@ Angles are in rad, lengths in m, times in seconds, torques in N·m (forces in N)
 """
 
 import atexit as _atexit
+import os as _os
 
 from . import _takt
 from ._takt import Arm, Axis, Event, Events, Group, Motion, Recording, Server, Simulation, State, Stream, connect, simulate
@@ -70,3 +71,5 @@ __all__ = [
 
 # A program that ends without closing its arms leaves them at rest, too.
 _atexit.register(_takt._close_all)
+# A fork has none of the threads of a controller, and must leave it alone.
+_os.register_at_fork(after_in_child=_takt._after_fork)

@@ -18,6 +18,7 @@ __all__ = [
     "Axis",
     "Group",
     "Motion",
+    "_after_fork",
     "_close_all",
     "Recording",
     "Server",
@@ -470,4 +471,5 @@ class Recording:
     def __enter__(self) -> Self: ...
     def __exit__(self, *exception: object) -> None: ...
 
+def _after_fork() -> None: ...
 def _close_all() -> None: ...

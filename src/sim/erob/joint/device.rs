@@ -56,15 +56,14 @@ impl CanopenDevice for ErobJoint {
     }
 
     fn measure(&mut self) {
-        let actual = self.actual();
+        let actual = self.actual;
         let per_mille = 1000.0 * self.torque / self.parameters.rated_torque;
         let motor = (self.joint.position() * self.parameters.encoder.counts_per_unit * MOTOR_ENCODER_RATIO)
             .round_ties_even();
         let difference = self.motion.position() - actual.position;
-        let counts = self.counts();
         let statusword = self.statusword();
         let dictionary = &mut self.canopen.dictionary;
-        dictionary.set(at::POSITION, counts.into());
+        dictionary.set(at::POSITION, actual.position as i64);
         dictionary.set_real(at::VELOCITY, actual.velocity);
         dictionary.set_real(at::TORQUE, per_mille);
         dictionary.set_real(at::CURRENT, per_mille);

@@ -30,7 +30,8 @@ impl ControlLoops for ErobJoint {
             let is_braked = self.is_braked();
             self.joint.step(duration_s, self.torque * self.direction(), is_braked);
         }
-        let actual = self.actual();
+        self.read_encoder();
+        let actual = self.actual;
         if is_driven {
             self.check_following_error(actual);
         } else {
@@ -45,7 +46,7 @@ impl ControlLoops for ErobJoint {
 impl ErobJoint {
     /// One step of set-point, loops and torque.
     fn drive(&mut self, duration_s: f64) {
-        let actual = self.actual();
+        let actual = self.actual;
         let demand = match self.device.stop() {
             Some(stop) => {
                 let (demand, is_at_rest) = self.motion.step_stop(stop.deceleration, duration_s);
@@ -56,9 +57,10 @@ impl ErobJoint {
             }
             None => self.motion.step(self.device.controlword(), actual, &self.canopen.dictionary, duration_s),
         };
+        let (count, per_mille) = self.units;
         let measured = Measured {
-            count: 1.0 / self.parameters.encoder.counts_per_unit.abs(),
-            per_mille: self.parameters.rated_torque / 1000.0,
+            count,
+            per_mille,
             position: actual.position,
             velocity: self.joint.velocity() * self.direction(),
         };

@@ -9,6 +9,7 @@ use crate::sim::object_dictionary::SimulatedDictionary;
 
 impl ErobMotion {
     /// Statusword bits 10 to 13 of an enabled drive, after a step of `duration_s`.
+    #[inline]
     pub fn status_bits(
         &mut self,
         actual: Actual,
