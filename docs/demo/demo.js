@@ -17,7 +17,7 @@ const WORDS = {
   over_voltage: ["Over-voltage", "过压"],
   torque_off: ["Safe torque off", "安全转矩关断"],
   power_cut: ["Cut its power", "瞬间断电"],
-  mend: ["Press again to mend it; then clear the fault and enable.", "再按一次恢复；然后清除故障并使能。"],
+  mend: ["Press again to mend it; then clear the fault and enable. A drive that has lost its power or the bus needs a new start.", "再按一次恢复；然后清除故障并使能。断电或断线的驱动器需要重新开始。"],
   again: ["Start anew", "重新开始"],
   box: ["Black box", "黑匣子"],
   no_box: ["Empty: it is written at every fault.", "空：每次故障时写入。"],
@@ -67,7 +67,8 @@ class Demo {
         element("div", {}, this.#text("h3", "replay"), this.#text("p", "replay_lead", "soft"), element("div", { class: "buttons" }, recording), element("label", {}, this.#text("span", "setting", "soft"), setting), this.#result),
       ),
     );
-    document.getElementById("language").addEventListener("click", () => this.#translate());
+    // The page itself changes the language after this.
+    document.getElementById("language").addEventListener("click", () => setTimeout(() => this.#translate()));
     this.#translate();
     this.#show();
     setInterval(() => this.#showBoxes(), 300);

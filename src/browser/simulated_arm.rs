@@ -258,7 +258,8 @@ mod tests {
 
     fn arm() -> SimulatedArm {
         let text = include_str!("../../configs/arm6-erob.toml");
-        let files = json!({ "main": "arm.toml", "files": [["arm.toml", text]], "time_ms": 1_700_000_000_000_u64 });
+        let files =
+            json!({ "main": "arm.toml", "files": [["arm.toml", text]], "time_ms": 1_700_000_000_000_u64 });
         SimulatedArm::start(&files.to_string()).unwrap()
     }
 

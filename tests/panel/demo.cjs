@@ -35,7 +35,8 @@ async function main() {
   for (const [name, options] of SHAPES) {
     const { tab, problems } = await open(browser, options);
     await tab.locator("#chosen").selectOption("1");
-    const jog = tab.locator(".jog button").last();
+    await tab.locator("#tab-jog").click();
+    const jog = tab.locator("#jog-plus");
     await jog.scrollIntoViewIfNeeded();
     const box = await jog.boundingBox();
     await tab.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
