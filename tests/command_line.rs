@@ -491,8 +491,6 @@ fn shells_and_manual_pages_know_every_subcommand() {
     let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let names: Vec<&str> = commands
         .take_while(|line| !line.is_empty())
-        // A long description goes on in lines that begin further right.
-        .filter(|line| !line.starts_with("   "))
         .filter_map(|line| line.split_whitespace().next())
         .filter(|name| *name != "help")
         .collect();

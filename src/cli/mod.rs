@@ -52,7 +52,8 @@ pub fn main() -> ExitCode {
 
 /// Hard-real-time joint-motion controller for CAN drives.
 #[derive(Parser, Debug)]
-#[command(version, arg_required_else_help = true)]
+// 0: as wide as the text, for other programs.
+#[command(version, arg_required_else_help = true, term_width = columns::columns().map_or(0, usize::from))]
 struct CommandLine {
     /// Tell on standard error what happens, from this level on
     #[arg(long, global = true, value_name = "LEVEL", value_enum, env = "TAKT_LOG", hide_env_values = true)]
