@@ -675,10 +675,13 @@ fn a_panel_of_another_process_commands_by_its_client() {
     let mut page = shown.commander();
     // Another program commands, until the page takes over from it by name.
     let other = takt::connect(&name).unwrap();
+    // Before the page asks for it: whoever commands without a pause keeps the lease.
+    other.take_lease().unwrap();
     let is_other = AtomicBool::new(true);
     thread::scope(|scope| {
         scope.spawn(|| {
-            while is_other.load(Ordering::Relaxed) {
+            let begun = Instant::now();
+            while is_other.load(Ordering::Relaxed) && begun.elapsed() < 2 * LONG {
                 let _ = other.reset_faults();
                 thread::sleep(Duration::from_millis(20));
             }
