@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use takt_rt::{AxisPoint, MAX_GROUPS, OperationMode, PositionPoint, RequestTarget, StopCategory};
+use takt_rt::{
+    AxisPoint, Frame, FrameKind, Id, MAX_GROUPS, OperationMode, PositionPoint, RequestTarget, StopCategory,
+};
 
 /// A packet does not say what a packet can say. Its sender is no client of takt, or its memory is damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,6 +50,24 @@ impl Put {
             let mut whole = [0; size_of::<u64>()];
             whole.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
             self.word(u64::from_ne_bytes(whole));
+        }
+        self
+    }
+
+    /// A frame.
+    pub fn frame(&mut self, frame: &Frame) -> &mut Self {
+        let kind = match frame.kind() {
+            FrameKind::Data => 0,
+            FrameKind::Remote => 1,
+            FrameKind::Fd => 2,
+            FrameKind::FdBitRateSwitch => 3,
+        };
+        self.word(kind | u64::from(frame.id().is_extended()) << 2 | (frame.length() as u64) << 3);
+        self.word(frame.id().value().into());
+        for bytes in frame.payload().chunks(size_of::<u64>()) {
+            let mut word = [0; size_of::<u64>()];
+            word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
+            self.word(u64::from_le_bytes(word));
         }
         self
     }
@@ -130,6 +150,29 @@ impl Take<'_> {
         self.0 = rest;
         let text: Vec<u8> = text.iter().flat_map(|word| word.to_ne_bytes()).take(bytes).collect();
         String::from_utf8(text).map_err(|_| Malformed)
+    }
+
+    /// A frame.
+    pub fn frame(&mut self) -> Result<Frame, Malformed> {
+        let (head, number) = (self.word()?, u32::try_from(self.word()?).map_err(|_| Malformed)?);
+        let length =
+            usize::try_from(head >> 3).ok().filter(|length| *length <= Frame::MAX_BYTES).ok_or(Malformed)?;
+        let id =
+            if head & 4 == 0 { Id::base(number) } else { Id::extended(number) }.map_err(|_| Malformed)?;
+        let kind = head & 3;
+        if kind == 1 {
+            return Frame::remote(id, length as u8).map_err(|_| Malformed);
+        }
+        let mut payload = [0; Frame::MAX_BYTES];
+        let payload = payload.get_mut(..length).ok_or(Malformed)?;
+        for bytes in payload.chunks_mut(size_of::<u64>()) {
+            bytes.iter_mut().zip(self.word()?.to_le_bytes()).for_each(|(to, from)| *to = from);
+        }
+        match kind {
+            0 => Frame::data(id, payload),
+            fd => Frame::fd(id, payload, fd == 3),
+        }
+        .map_err(|_| Malformed)
     }
 
     /// All axes, or a group. Whether there is such a group, the controller knows.

@@ -36,6 +36,7 @@ fn usual() -> BusScan {
         only_listens: false,
         may_take_torque: false,
         has_fd: false,
+        of_controller: None,
     }
 }
 
@@ -511,5 +512,34 @@ fn the_configuration_of_what_was_found_is_whole_but_for_what_only_the_owner_know
     assert!(
         text.contains("eds = \"node-12.eds\"  # YOURS") && error.contains("node-12.eds"),
         "{error}\n{text}"
+    );
+}
+
+#[test]
+fn the_drives_of_a_controller_that_sends_the_questions_are_not_asked_and_that_it_is_active_is_no_news() {
+    let sync = Frame::of(Id::base(0x080).unwrap(), []);
+    let reply_to_the_controller =
+        Frame::of(Id::base(0x581).unwrap(), [0x4B, 0x41, 0x60, 0, 0x37, 0x12, 0, 0]);
+    let change = |now_ns, batch: &mut ReceiveBatch| {
+        for frame in [sync, reply_to_the_controller] {
+            let _ = batch.try_push(Received { frame, at_ns: now_ns });
+        }
+    };
+    let mut port = Through { bus: mixed(), change, health: None };
+    let what = BusScan { of_controller: Some(vec![1, 12]), ..usual() };
+    let outcome = scan(&what, &mut port);
+    let asks = |node: u32| move |frame: &&Frame| [0x600 + node, 0x640 + node].contains(&frame.id().value());
+    for (node, is_asked) in [(1, false), (12, false), (7, true), (20, true)] {
+        assert_eq!(outcome.sent.iter().any(|frame| asks(node)(&frame)), is_asked, "node {node}");
+    }
+    assert!(outcome.node(7).drive.is_some(), "{:#?}", outcome.found);
+    let heard = Answered::Heard("CANopen");
+    assert_eq!(outcome.node(1).answered, heard, "{:#?}", outcome.found);
+    let is_double = |device: &FoundDevice| device.remarks.iter().any(|remark| remark.contains("two devices"));
+    assert!(!outcome.found.devices.iter().any(is_double), "{:#?}", outcome.found);
+    assert!(
+        !outcome.found.remarks.iter().any(|remark| remark.contains("master")),
+        "{:?}",
+        outcome.found.remarks
     );
 }

@@ -6,6 +6,7 @@
 //! clients  ── requests, stops, trajectories, points of a stream, from any number of threads ──▶ RtSide
 //! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
 //! clients  ◀── trajectories that are done with ── RtSide
+//! clients  ── questions to devices that are none of the configuration's ──▶ HostSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
@@ -23,6 +24,7 @@ mod lending;
 mod motion_words;
 mod observed_events;
 mod primitives;
+mod questions;
 mod records;
 mod request_numbers;
 mod ring;
@@ -62,6 +64,7 @@ pub(crate) use latest::{
 };
 pub use observed_events::EventReader;
 pub(crate) use observed_events::EventWriter;
+pub use questions::{QUESTIONS_AT_MOST, Questions};
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
 pub use stream::{GroupStream, Streamer, chunk};
@@ -151,6 +154,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         observed: observed_out,
         streamer,
         service: service_in,
+        questions: Questions::default(),
         received: received_out,
         off_cycle_reports: report_in,
         observer: Observer { snapshot: snapshot_out },
@@ -312,6 +316,7 @@ pub struct HostSide {
     observed: EventReader,
     streamer: Streamer,
     service: Vec<Producer<Frame>>,
+    questions: Questions,
     received: Consumer<(usize, Received)>,
     off_cycle_reports: Producer<(u8, OffCycleReport)>,
     observer: Observer,
@@ -416,6 +421,11 @@ impl HostSide {
     /// The writing ends of the points of streams, for any thread.
     pub fn streamer(&self) -> Streamer {
         self.streamer.clone()
+    }
+
+    /// The questions of clients, for any thread.
+    pub fn questions(&self) -> Questions {
+        self.questions.clone()
     }
 
     /// Queues a service frame. It is sent after the set-points of a later cycle.

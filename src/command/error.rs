@@ -6,6 +6,7 @@ use std::time::Duration;
 use takt_rt::{RequestError, StopReason};
 
 use super::point_check::PointRefusal;
+use super::question::QuestionError;
 use crate::telemetry::{Machine, words};
 use crate::trajectory::{RateError, TrajectoryError, axis_name};
 
@@ -148,6 +149,9 @@ pub enum CommandError {
     /// A stop has discarded the request before the real-time thread took it.
     #[error("a stop has discarded the request before it began")]
     Overtaken,
+    /// A question to a device on a bus is not sent.
+    #[error(transparent)]
+    Question(#[from] QuestionError),
     /// This client of another process may not command now.
     #[error(transparent)]
     Lease(#[from] LeaseError),

@@ -6,6 +6,7 @@ mod error;
 mod lease_holder;
 pub mod motion;
 mod point_check;
+mod question;
 mod running_controller;
 
 pub use axis_properties::AxisProperties;
@@ -14,5 +15,6 @@ pub use error::{CommandError, LeaseError, MotionError, Refused, Stopped, StreamE
 pub use lease_holder::LeaseHolder;
 pub use motion::{MotionId, MoveOptions, TrajectoryProgress};
 pub use point_check::{PointRefusal, check_point};
+pub use question::QuestionError;
 pub(crate) use running_controller::groups_in;
 pub use running_controller::{EventSource, RunningController};

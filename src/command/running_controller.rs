@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use takt_rt::{
-    Answer, AxisPoint, Event, GroupSnapshot, Nanoseconds, OperationMode, Phase, RequestId, RequestTarget,
-    Snapshot, StopCategory, StreamReport, StreamState,
+    Answer, AxisPoint, Event, Frame, GroupSnapshot, Nanoseconds, OperationMode, Phase, RequestId,
+    RequestTarget, Snapshot, StopCategory, StreamReport, StreamState,
 };
 
 use super::axis_properties::AxisProperties;
@@ -112,6 +112,12 @@ pub trait RunningController: Send + Sync {
     /// # Errors
     /// See [`Handle::move_through`](crate::Handle::move_through); nothing has changed then.
     fn begin_through(&self, target: RequestTarget, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError>;
+
+    /// Sends a frame that only reads to a device which is none of the configuration's. It needs no lease.
+    ///
+    /// # Errors
+    /// See [`Handle::ask_device`](crate::Handle::ask_device); nothing is sent then.
+    fn ask_device(&self, bus: usize, question: Frame) -> Result<(), CommandError>;
 
     /// Changes the speed along a trajectory under way.
     ///

@@ -11,6 +11,8 @@ use crate::family::identifiers;
 use crate::link::ownership::{BusClaim, ClaimError, CommandedDrive, IfOwned, MasterTraffic, Ownership};
 use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions};
 
+/// The node IDs of CANopen.
+const NODES: u8 = 127;
 /// The most set-point frames of an axis in a cycle: a drive has four receive PDOs.
 const COMMANDS_PER_AXIS: usize = 4;
 /// The most SYNC and service frames of a bus in a cycle.
@@ -34,10 +36,11 @@ pub(super) fn socket_options(config: &Config, bus: usize) -> SocketCanOptions {
     let broadcast = [function_code::NMT, function_code::SYNC, function_code::TIME];
     let broadcast = broadcast.map(|function| Id::canopen(function, 0));
     let own = Id::canopen(function_code::ERROR_CONTROL, config.master.node);
+    let others = questions().filter(|id| !of_drives.contains(id));
     let settings = config.buses.get(bus);
     let usual = SocketCanOptions::default();
     SocketCanOptions {
-        identifiers: of_drives.into_iter().chain(broadcast).chain([own]).collect(),
+        identifiers: of_drives.iter().copied().chain(broadcast).chain([own]).chain(others).collect(),
         bit_rate: settings.map_or(usual.bit_rate, |bus| bus.bit_rate),
         data_bit_rate: settings.and_then(|bus| bus.data_bit_rate),
         // The frames of all buses: the kernel may charge one socket with frames that others send in the same call, and
@@ -45,6 +48,12 @@ pub(super) fn socket_options(config: &Config, bus: usize) -> SocketCanOptions {
         transmit_frames: config.axes.len() * COMMANDS_PER_AXIS + config.buses.len() * SERVICE_FRAMES,
         ..usual
     }
+}
+
+/// The identifiers of questions to devices that are none of the configuration's: what is sent must come back, or it does not count as
+/// sent. Their replies are for those who ask.
+fn questions() -> impl Iterator<Item = Id> {
+    (1..=NODES).map(|node| Id::canopen(function_code::SDO_REQUEST, node))
 }
 
 impl MasterTraffic {

@@ -18,7 +18,7 @@ use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
 use super::supervisor::{AfterBringUp, Supervisor};
 use super::time_of_day::TimeOfDayKeeper;
 use crate::channels::{
-    self, CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Streamer,
+    self, CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Questions, Streamer,
     TrajectoryGiver, channels, panic_message,
 };
 use crate::config::{Config, ConfigSources};
@@ -144,6 +144,8 @@ pub(super) struct RemoteHandles {
     pub trajectories: TrajectoryGiver,
     /// Gives callbacks.
     pub callbacks: CallbackGiver,
+    /// Asks devices that are none of the configuration's.
+    pub questions: Questions,
     /// The times within a slot.
     pub plan: SlotPlan,
     /// Reads the events.
@@ -171,6 +173,7 @@ impl RemoteHandles {
             clients: host.clients(),
             trajectories: host.trajectories(),
             callbacks: host.callbacks(),
+            questions: host.questions(),
             plan,
             events: host.events(),
             realtime: begun.report,

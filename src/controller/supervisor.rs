@@ -33,6 +33,8 @@ use crate::telemetry::BusReport;
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
 /// The drives of serial lines have this time for the last requests, of which a silent one gets one every 500 ms.
 const LINES_NS: u64 = 1_000_000_000;
+/// From one question of a client to the next: one frame of a bus in a cycle is for all services, and those of the controller go on.
+const QUESTION_SPACING_NS: u64 = 2_000_000;
 /// The drives settle on their last set-point for this time, before they are disabled and the brakes engage.
 const SETTLE_NS: u64 = 300_000_000;
 
@@ -102,6 +104,8 @@ pub struct Supervisor {
     /// Room for the state that is looked at; `None` before the first look, and during each.
     seen: Option<Box<Snapshot>>,
     numbers: RequestNumbers,
+    /// When the next question of a client may be sent.
+    next_question_ns: u64,
     interrupt: Option<Interrupt>,
     outcome: Option<Outcome>,
     /// See [`Supervisor::unreached`].
@@ -145,6 +149,7 @@ impl Supervisor {
             outgoing: VecDeque::new(),
             seen: None,
             numbers: RequestNumbers::default(),
+            next_question_ns: 0,
             interrupt: None,
             outcome: None,
             unreached: Vec::new(),
@@ -236,6 +241,9 @@ impl Supervisor {
         if !matches!(self.stage, Stage::Configure | Stage::Start | Stage::Done) {
             self.off_cycle.poll(now_ns, &snapshot, host);
         }
+        if self.stage == Stage::Run {
+            self.pass_question_on(now_ns, host);
+        }
         while let Some(request) = self.outgoing.front() {
             if host.submit(*request).is_err() {
                 break;
@@ -243,6 +251,18 @@ impl Supervisor {
             self.outgoing.pop_front();
         }
         self.seen = Some(snapshot);
+    }
+
+    /// Sends a question of a client, if the last one was long enough ago.
+    fn pass_question_on(&mut self, now_ns: u64, host: &mut HostSide) {
+        if now_ns < self.next_question_ns {
+            return;
+        }
+        if let Some((bus, question)) = host.questions().take() {
+            // One that finds no room is lost, as on a disturbed bus.
+            let _ = host.send_service(bus, question);
+            self.next_question_ns = now_ns + QUESTION_SPACING_NS;
+        }
     }
 
     fn step(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {

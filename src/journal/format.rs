@@ -6,7 +6,7 @@ use std::collections::{HashMap, VecDeque};
 use takt_rt::{BusState, MAX_BUSES, Nanoseconds, Received, TrajectoryId, Wake};
 
 use super::clock::ClockAnswer;
-use super::host_words::{put_entry, put_frame, take_entry, take_frame};
+use super::host_words::{put_entry, take_entry};
 use crate::channels::{GivenTrajectory, GroupAxes, JournalEntry, NumberedTrajectory};
 use crate::link::trace::{PortAnswer, PortMark, Traced};
 use crate::packet::{Malformed, Put, Take};
@@ -97,7 +97,7 @@ impl Encoder {
                 self.number(bus as u64);
                 self.time(frame.at_ns);
                 let mut words = Put::default();
-                put_frame(&frame.frame, &mut words);
+                words.frame(&frame.frame);
                 words.0.iter().for_each(|word| self.number(*word));
             }
             Traced::Mark(PortMark { at_ns, answer }) => {
@@ -290,7 +290,7 @@ impl Decoder<'_> {
         for _ in 0..payload {
             words.push(self.number()?);
         }
-        take_frame(&mut Take(&words))
+        Take(&words).frame()
     }
 
     /// Words behind their count, each of which has a byte at least.

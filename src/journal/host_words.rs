@@ -3,8 +3,8 @@
 use takt_rt::plan::State;
 use takt_rt::{
     AxisPoint, AxisProcessData, AxisTarget, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun,
-    DriveState, ExecutionStart, Follow, Frame, FrameKind, Id, MAX_AXES, MappedObject, MappedPdo, ModeChange,
-    Move, OffCycleReport, OperationMode, PointRole, ProfileMove, ProfileTarget, Request, RequestEnvelope,
+    DriveState, ExecutionStart, Follow, Id, MAX_AXES, MappedObject, MappedPdo, ModeChange, Move,
+    OffCycleReport, OperationMode, PointRole, ProfileMove, ProfileTarget, Request, RequestEnvelope,
     RequestId, RequestKind, StreamPoint, TrajectoryId, TransmissionType,
 };
 
@@ -53,7 +53,7 @@ pub fn put_entry(entry: &JournalEntry, put: &mut Put) {
         }
         HostInput::ServiceFrame { bus, frame } => {
             put.word(SERVICE_FRAME).word((*bus).into());
-            put_frame(frame, put);
+            put.frame(frame);
         }
     }
 }
@@ -106,49 +106,10 @@ pub fn take_entry(take: &mut Take<'_>) -> Result<JournalEntry, Malformed> {
             }
             HostInput::Called { returned, targets }
         }
-        SERVICE_FRAME => HostInput::ServiceFrame { bus: byte(take)?, frame: take_frame(take)? },
+        SERVICE_FRAME => HostInput::ServiceFrame { bus: byte(take)?, frame: take.frame()? },
         _ => return Err(Malformed),
     };
     Ok(JournalEntry { cycle, input })
-}
-
-/// A frame in words.
-pub fn put_frame(frame: &Frame, put: &mut Put) {
-    let kind = match frame.kind() {
-        FrameKind::Data => 0,
-        FrameKind::Remote => 1,
-        FrameKind::Fd => 2,
-        FrameKind::FdBitRateSwitch => 3,
-    };
-    put.word(kind | u64::from(frame.id().is_extended()) << 2 | (frame.length() as u64) << 3);
-    put.word(frame.id().value().into());
-    for bytes in frame.payload().chunks(size_of::<u64>()) {
-        let mut word = [0; size_of::<u64>()];
-        word.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
-        put.word(u64::from_le_bytes(word));
-    }
-}
-
-/// A frame of words.
-pub fn take_frame(take: &mut Take<'_>) -> Result<Frame, Malformed> {
-    let (head, number) = (take.word()?, u32::try_from(take.word()?).map_err(|_| Malformed)?);
-    let length =
-        usize::try_from(head >> 3).ok().filter(|length| *length <= Frame::MAX_BYTES).ok_or(Malformed)?;
-    let id = if head & 4 == 0 { Id::base(number) } else { Id::extended(number) }.map_err(|_| Malformed)?;
-    let kind = head & 3;
-    if kind == 1 {
-        return Frame::remote(id, length as u8).map_err(|_| Malformed);
-    }
-    let mut payload = [0; Frame::MAX_BYTES];
-    let payload = payload.get_mut(..length).ok_or(Malformed)?;
-    for bytes in payload.chunks_mut(size_of::<u64>()) {
-        bytes.iter_mut().zip(take.word()?.to_le_bytes()).for_each(|(to, from)| *to = from);
-    }
-    match kind {
-        0 => Frame::data(id, payload),
-        fd => Frame::fd(id, payload, fd == 3),
-    }
-    .map_err(|_| Malformed)
 }
 
 fn put_request(envelope: &RequestEnvelope, put: &mut Put) {

@@ -197,11 +197,15 @@ impl Client {
     }
 
     pub(super) fn done(&self, command: Command) -> Result<(), CommandError> {
+        self.asked(command)?;
+        self.await_answered_state();
+        Ok(())
+    }
+
+    /// As [`Client::done`], for what no state shows.
+    pub(super) fn asked(&self, command: Command) -> Result<(), CommandError> {
         match self.ask(command)? {
-            Reply::Done | Reply::Motion(_) => {
-                self.await_answered_state();
-                Ok(())
-            }
+            Reply::Done | Reply::Motion(_) => Ok(()),
             Reply::Refused(error) => Err(error),
             Reply::NotTaken(_) | Reply::Progress(_) => Err(CommandError::Unanswered),
         }

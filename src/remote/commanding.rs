@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use takt_rt::{OperationMode, RequestTarget, StopCategory};
+use takt_rt::{Frame, OperationMode, RequestTarget, StopCategory};
 
 use super::client::Client;
 use super::commands::Command;
@@ -33,6 +33,14 @@ impl Client {
     /// [`CommandError::Ended`].
     pub fn release(&self) -> Result<(), CommandError> {
         self.done(Command::Release)
+    }
+
+    /// See [`Handle::ask_device`](crate::Handle::ask_device). It needs write permission, and no lease.
+    ///
+    /// # Errors
+    /// As there; [`CommandError::Lease`] without write permission.
+    pub fn ask_device(&self, bus: usize, question: Frame) -> Result<(), CommandError> {
+        self.asked(Command::Question { bus, frame: question })
     }
 
     /// See [`Handle::move_to`](crate::Handle::move_to).

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use takt_rt::{AxisPoint, Nanoseconds, OperationMode, RequestId, RequestTarget, StopCategory};
+use takt_rt::{AxisPoint, Frame, Nanoseconds, OperationMode, RequestId, RequestTarget, StopCategory};
 
 use super::socket::PACKET_WORDS;
 use crate::command::{MotionId, MoveOptions};
@@ -125,6 +125,13 @@ pub enum Command {
     Resume(MotionId),
     /// How far it is. It needs no lease.
     Progress(MotionId),
+    /// To ask a device that is none of the configuration's.
+    Question {
+        /// The bus.
+        bus: usize,
+        /// The question.
+        frame: Frame,
+    },
 }
 
 const LEASE: u64 = 1;
@@ -148,6 +155,7 @@ const PAUSE: u64 = 18;
 const RESUME: u64 = 19;
 const MOVE_BY: u64 = 20;
 const PROGRESS: u64 = 21;
+const QUESTION: u64 = 22;
 
 /// The words of a point of a trajectory beside its values: its time and three counts.
 const POINT_HEAD: usize = 4;
@@ -207,7 +215,8 @@ impl Command {
             | Self::Velocity { .. }
             | Self::Torque { .. }
             | Self::ChangeAxisMode { .. }
-            | Self::Points(_) => None,
+            | Self::Points(_)
+            | Self::Question { .. } => None,
             Self::SetSpeed { motion, .. }
             | Self::Pause(motion)
             | Self::Resume(motion)
@@ -291,6 +300,9 @@ impl Command {
             Self::Pause(motion) => put_motion(*motion, put.word(PAUSE)),
             Self::Resume(motion) => put_motion(*motion, put.word(RESUME)),
             Self::Progress(motion) => put_motion(*motion, put.word(PROGRESS)),
+            Self::Question { bus, frame } => {
+                put.word(QUESTION).index(*bus).frame(frame);
+            }
         }
     }
 
@@ -351,6 +363,7 @@ impl Command {
             PAUSE => Self::Pause(take_motion(take)?),
             RESUME => Self::Resume(take_motion(take)?),
             PROGRESS => Self::Progress(take_motion(take)?),
+            QUESTION => Self::Question { bus: take.index()?, frame: take.frame()? },
             _ => return Err(Malformed),
         })
     }

@@ -7,7 +7,8 @@ use takt_rt::{Phase, RejectReason, RequestError, RequestKind};
 
 use super::commands::{put_motion, take_motion};
 use crate::command::{
-    CommandError, LeaseError, MotionId, PointRefusal, Refused, StreamError, TrajectoryProgress, needed,
+    CommandError, LeaseError, MotionId, PointRefusal, QuestionError, Refused, StreamError,
+    TrajectoryProgress, needed,
 };
 use crate::packet::{Malformed, Put, Take};
 use crate::telemetry::Machine;
@@ -147,6 +148,7 @@ fn put_command_error(error: &CommandError, put: &mut Put) {
         CommandError::Ended => {
             put.word(18);
         }
+        CommandError::Question(error) => put_question_error(error, put.word(19)),
     }
 }
 
@@ -184,6 +186,24 @@ fn take_command_error(take: &mut Take<'_>, machine: &Machine) -> Result<CommandE
         16 => CommandError::Lease(take_lease_error(take)?),
         17 => CommandError::NoReply { after: take.duration()? },
         18 => CommandError::Ended,
+        19 => CommandError::Question(take_question_error(take)?),
+        _ => return Err(Malformed),
+    })
+}
+
+fn put_question_error(error: &QuestionError, put: &mut Put) {
+    match error {
+        QuestionError::NoSuchBus { bus, buses } => put.word(1).index(*bus).index(*buses),
+        QuestionError::NotReading { frame } => put.word(2).frame(frame),
+        QuestionError::OwnDrive { frame, axis } => put.word(3).frame(frame).text(axis),
+    };
+}
+
+fn take_question_error(take: &mut Take<'_>) -> Result<QuestionError, Malformed> {
+    Ok(match take.word()? {
+        1 => QuestionError::NoSuchBus { bus: take.index()?, buses: take.index()? },
+        2 => QuestionError::NotReading { frame: take.frame()? },
+        3 => QuestionError::OwnDrive { frame: take.frame()?, axis: take.text()? },
         _ => return Err(Malformed),
     })
 }

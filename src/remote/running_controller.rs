@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use takt_rt::{AxisPoint, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot, StopCategory};
+use takt_rt::{
+    AxisPoint, Frame, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot, StopCategory,
+};
 
 use super::client::Client;
 use super::commands::{Command, chunk_points};
@@ -123,6 +125,10 @@ impl RunningController for Client {
 
     fn torque(&self, axis: usize, torque: f64, valid_for: Duration) -> Result<MotionId, CommandError> {
         Self::torque(self, axis, torque, valid_for)
+    }
+
+    fn ask_device(&self, bus: usize, question: Frame) -> Result<(), CommandError> {
+        Self::ask_device(self, bus, question)
     }
 
     fn begin_mode_change(

@@ -74,8 +74,8 @@ impl Worker {
         match command {
             Command::Lease { is_taken_over: true } => lease.take_over(self.claimant, now_ns()),
             Command::Release => lease.release(self.claimant.connection),
-            // To look is for everybody.
-            Command::Progress(_) => {}
+            // To look is for everybody who may write, and a question only reads.
+            Command::Progress(_) | Command::Question { .. } => {}
             _ => lease.renew(self.claimant, now_ns())?,
         }
         Ok(())
@@ -118,6 +118,7 @@ impl Worker {
             Command::SetSpeed { motion, rate } => done(controller.set_speed(motion, rate)),
             Command::Pause(motion) => done(controller.pause(motion)),
             Command::Resume(motion) => done(controller.resume(motion)),
+            Command::Question { bus, frame } => done(controller.ask_device(bus, frame)),
             Command::Progress(motion) => {
                 controller.trajectory_progress(motion).map_or_else(Reply::Refused, Reply::Progress)
             }

@@ -211,3 +211,44 @@ fn a_stream_of_a_client_that_stops_sending_comes_to_rest_and_goes_on_without_a_s
         Err(StreamError::Full)
     );
 }
+
+#[test]
+fn a_question_that_only_reads_is_sent_without_a_lease_and_any_other_frame_is_refused() {
+    let logs = TempDir::new().unwrap();
+    let mut config = config("arm6-erob.toml");
+    config.telemetry.is_candump_written = true;
+    config.telemetry.directory = logs.path().to_owned();
+    let served = Served::with_config(config, ServeOptions::default());
+    let (client, own) = (served.connect(), served.controller.handle());
+    let sdo = |node, bytes: [u8; 8]| Frame::of(Id::canopen(0x600, node), bytes);
+    let upload = |node| sdo(node, [0x40, 0x18, 0x10, 1, 0, 0, 0, 0]);
+    let own_node = own.axes()[0].node;
+    let probe = Frame::of(Id::base(0x640 + u32::from(own_node)).unwrap(), [0, 1, 0, 4]);
+    for (bus, frame) in [
+        (2, upload(99)),
+        (0, upload(own_node)),
+        (0, probe),
+        (0, sdo(99, [0x23, 0x81, 0x60, 0, 1, 0, 0, 0])),
+        (0, Frame::of(Id::canopen(0, 0), [1, 99])),
+        (0, Frame::of(Id::canopen(0x200, 99), [0; 6])),
+    ] {
+        let refused = own.ask_device(bus, frame);
+        assert!(matches!(refused, Err(CommandError::Question(_))), "{frame:?}: {refused:?}");
+        assert_eq!(client.ask_device(bus, frame), refused);
+    }
+    assert_eq!(client.ask_device(1, upload(99)), Ok(()));
+    assert_eq!(client.ask_device(1, upload(98)), Ok(()));
+    client.advance(50).unwrap();
+    assert!(client.lease().is_none() && client.state().groups()[0].phase == Phase::Holding);
+    served.controller.finish().unwrap();
+    let log = fs::read_dir(logs.path())
+        .unwrap()
+        .flatten()
+        .find(|file| file.path().extension().is_some_and(|kind| kind == "log"));
+    let log = fs::read_to_string(log.unwrap().path()).unwrap();
+    let asked = ["663#4018100100000000", "662#4018100100000000"].map(|frame| log.matches(frame).count());
+    assert_eq!(asked, [1, 1]);
+    for refused in ["663#23", "263#", "000#0163"] {
+        assert_eq!(log.matches(refused).count(), 0, "{refused}");
+    }
+}

@@ -23,7 +23,7 @@ use takt::{
     MotionError, MoveOptions, OperationMode, Phase, RunningController, ServeError, ServeOptions, Server,
     SessionOptions, StopCategory, StreamError, StreamState, TrajectoryPoint, WaitError, connect, serve,
 };
-use takt_rt::RequestTarget;
+use takt_rt::{Frame, Id, RequestTarget};
 use tempfile::TempDir;
 
 const LONG: Duration = Duration::from_secs(30);
@@ -51,8 +51,12 @@ impl Served {
     }
 
     fn with(name: &str, options: ServeOptions) -> Self {
+        Self::with_config(config(name), options)
+    }
+
+    fn with_config(config: Config, options: ServeOptions) -> Self {
         let folder = TempDir::new().unwrap();
-        let controller = Controller::start(config(name), SessionOptions::default()).unwrap();
+        let controller = Controller::start(config, SessionOptions::default()).unwrap();
         let path = path_in(&folder);
         let server = Some(serve(controller.handle(), &path, options).unwrap());
         Self { controller, server, folder }

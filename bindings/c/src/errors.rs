@@ -257,6 +257,7 @@ pub(crate) fn result_of(error: &CommandError) -> takt_result {
         | CommandError::NoSuchGroup { .. }
         | CommandError::SeveralGroups { .. }
         | CommandError::Budget { .. }
+        | CommandError::Question(_)
         | CommandError::Rate(RateError::NotARate { .. }) => takt_result::TAKT_ERROR_ARGUMENT,
         CommandError::Trajectory(
             TrajectoryError::Limit { .. }

@@ -104,6 +104,7 @@ pub fn raise_command(py: Python<'_>, axes: &[&str], error: &CommandError) -> PyE
         | CommandError::NoSuchAxis { .. }
         | CommandError::NoSuchGroup { .. }
         | CommandError::SeveralGroups { .. }
+        | CommandError::Question(_)
         | CommandError::Rate(_) => raise(py, "ArgumentError", &words, &[]),
         CommandError::Refused(refused) => raise_refused(py, refused),
         CommandError::Lease(error) => raise_lease(py, *error),

@@ -7,7 +7,7 @@ use takt_rt::linux::MonotonicClock;
 use super::super::ownership;
 use super::super::usage_error::UsageError;
 use super::output::Watcher;
-use super::{Arguments, Interruption, place};
+use super::{Arguments, Interruption, beside, place};
 use crate::commission::bus_scan;
 use crate::family::scan::{BusScan, PlaceOfScan, Scanned};
 use crate::link::ownership::{BusClaim, ClaimError, IfOwned, MasterTraffic, Ownership, Role};
@@ -41,17 +41,26 @@ pub fn scan(
         only_listens: arguments.listen,
         may_take_torque: arguments.stop_motors,
         has_fd: data_bit_rate.is_some(),
+        of_controller: None,
+    };
+    let listening = || {
+        let opened = open_to_listen(&name, interface, &settings, &options);
+        opened.map_err(|error| ownership::not_heard(&error))
     };
     // A drive has room for the requests of one master.
-    let mut ownership = match arguments.listen {
-        true => None,
-        false => Some(claim(&name, interface, settings)?),
+    let (mut ownership, mut port) = match arguments.listen {
+        true => (None, listening()?),
+        false => match claim(&name, interface, settings) {
+            Ok(ownership) => {
+                let opened = open_interface(&name, interface, &settings, &options);
+                (Some(ownership), opened.map_err(|error| ownership::not_heard(&error))?)
+            }
+            Err(error) => {
+                let owner = owner(arguments, interface, &error)?;
+                return Ok(owner.scan(what, interface, listening()?, interruption, watcher));
+            }
+        },
     };
-    let opened = match arguments.listen {
-        true => open_to_listen(&name, interface, &settings, &options),
-        false => open_interface(&name, interface, &settings, &options),
-    };
-    let mut port = opened.map_err(|error| ownership::not_heard(&error))?;
     let is_told = Cell::new(false);
     let mut is_interrupted = || {
         let is_asked = ownership.as_mut().is_some_and(|owned| owned.poll_release_request().is_some());
@@ -72,24 +81,48 @@ pub fn scan(
     Ok((place(interface, bit_rate, data_bit_rate), found))
 }
 
+/// The controller that has the interface and sends the questions.
+fn owner(
+    arguments: &Arguments,
+    interface: &RealInterface,
+    error: &ClaimError,
+) -> Result<beside::Owner, UsageError> {
+    let is_network = matches!(interface, RealInterface::SocketCan(_));
+    match error {
+        ClaimError::Held { role: Role::Master, .. } if is_network => {}
+        ClaimError::OtherMaster { .. } if is_network => {
+            return Err(
+                format!("{error}, or add --listen, which sends nothing and shows who is heard").into()
+            );
+        }
+        _ => return Err(error.to_string().into()),
+    }
+    let Some(owner) = beside::Owner::of(interface) else {
+        return Err(format!(
+            "{error}. A controller that is served (takt run … --serve NAME) and that you may command asks for a scan; --listen sends nothing \
+             and shows who is heard"
+        )
+        .into());
+    };
+    if arguments.stop_motors {
+        return Err("--stop-motors: a running controller sends no commands of others; stop it first"
+            .to_owned()
+            .into());
+    }
+    owner.verify()?;
+    Ok(owner)
+}
+
 fn claim(
     name: &str,
     interface: &RealInterface,
     settings: InterfaceSettings,
-) -> Result<Ownership, UsageError> {
+) -> Result<Ownership, ClaimError> {
     let claim = BusClaim {
         bus: name.to_owned(),
         interface: interface.clone(),
         settings,
         traffic: MasterTraffic::of_any_node(),
     };
-    Ownership::claim(vec![claim], IfOwned::Refuse).map_err(|error| {
-        let is_network = matches!(interface, RealInterface::SocketCan(_));
-        let is_owned =
-            matches!(error, ClaimError::Held { role: Role::Master, .. } | ClaimError::OtherMaster { .. });
-        match is_network && is_owned {
-            true => format!("{error}, or add --listen, which sends nothing and shows who is heard").into(),
-            false => error.to_string().into(),
-        }
-    })
+    Ownership::claim(vec![claim], IfOwned::Refuse)
 }

@@ -1,5 +1,6 @@
 //! `takt scan`: what is on a bus, and which configuration would drive it.
 
+mod beside;
 mod can;
 mod line;
 mod output;

@@ -168,7 +168,7 @@ fn lines(device: &FoundDevice) -> String {
     let firmware = device.firmware.as_ref().map(|version| format!("firmware {version}"));
     let serial = device.serial.as_ref().map(|serial| format!("serial number {serial}"));
     let answered = Some(format!("answered by {}", device.answered.words()))
-        .filter(|_| !matches!(device.answered, Answered::Heard(_)));
+        .filter(|_| !matches!(device.answered, Answered::Heard(_) | Answered::OfController));
     let made = Some(made).filter(|made| !made.is_empty());
     for part in [made, firmware, serial, answered, drive].into_iter().flatten() {
         lines.push_str(&paragraph(&format!("         {part}"), 11));

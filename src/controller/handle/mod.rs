@@ -32,6 +32,7 @@ mod life;
 mod messages;
 mod motion;
 mod pace;
+mod question;
 mod running_controller;
 mod start_failure;
 mod stream;
@@ -44,7 +45,7 @@ use std::time::Duration;
 
 use takt_rt::Snapshot;
 
-use crate::channels::{ClientRequests, EventReader, Observer, Streamer};
+use crate::channels::{ClientRequests, EventReader, Observer, Questions, Streamer};
 use crate::config::{Axis, Group};
 use crate::telemetry::{LoopTiming, Machine, ShownTiming};
 use in_loop::Callbacks;
@@ -86,6 +87,7 @@ struct Shared {
     streamer: Streamer,
     trajectories: Trajectories,
     callbacks: Callbacks,
+    questions: Questions,
     messages: Arc<Messages>,
     life: Arc<Life>,
     pace: Pace,

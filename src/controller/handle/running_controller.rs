@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use takt_rt::{
-    AxisPoint, Event, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot, StopCategory,
+    AxisPoint, Event, Frame, Nanoseconds, OperationMode, RequestId, RequestTarget, Snapshot, StopCategory,
 };
 
 use super::{Events, GroupHandle, Handle};
@@ -139,6 +139,10 @@ impl RunningController for Handle {
 
     fn torque(&self, axis: usize, torque: f64, valid_for: Duration) -> Result<MotionId, CommandError> {
         Self::torque(self, axis, torque, valid_for)
+    }
+
+    fn ask_device(&self, bus: usize, question: Frame) -> Result<(), CommandError> {
+        Self::ask_device(self, bus, question)
     }
 
     fn begin_mode_change(

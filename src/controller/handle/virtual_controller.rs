@@ -110,6 +110,7 @@ impl VirtualController {
             streamer: host.streamer(),
             trajectories: Trajectories::new(host.trajectories()),
             callbacks: Callbacks::new(host.callbacks(), &assemble::slot_plan(config)),
+            questions: host.questions(),
             messages: Arc::default(),
             life: Arc::<Life>::default(),
             pace: Pace::Virtual(Box::new(VirtualPace::new(run, log(records)))),

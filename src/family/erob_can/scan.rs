@@ -2,11 +2,11 @@
 
 use std::ops::RangeInclusive;
 
-use takt_rt::{Frame, Nanoseconds};
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::FACTS;
 use crate::erob_can::entries::{self, Entry};
-use crate::erob_can::frame::{Reply, Request, replying_node};
+use crate::erob_can::frame::{ReceivedRequest, Reply, Request, reply_id, replying_node};
 use crate::erob_can::module_information::ModuleNumbers;
 use crate::family::scan::{Answered, FoundDevice, OwnProtocol, Reading, ScanSession};
 
@@ -39,6 +39,13 @@ impl OwnProtocol for OwnScan {
     fn replying(&self, frame: &Frame) -> Option<u8> {
         let node = replying_node(frame).filter(|node| self.nodes().contains(node))?;
         Reply::decode(frame.payload()).map(|_| node)
+    }
+
+    /// A read and a command look alike: the table tells them apart.
+    fn reply_to_reading(&self, frame: &Frame) -> Option<Id> {
+        let request = ReceivedRequest::decode(frame).filter(|request| request.value.is_none())?;
+        let entry = entries::find(request.address)?;
+        entry.access.can_read().then(|| reply_id(request.node))
     }
 
     fn shares_sdo_with(&self, node: u8) -> Option<u8> {
@@ -111,13 +118,12 @@ async fn numbers(session: &ScanSession, node: u8) -> Option<ModuleNumbers> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::erob_can::frame;
 
     #[test]
     fn the_question_reads_and_does_not_write() {
         assert_eq!(format!("{:?}", OwnScan.question(2)), "642#00010004");
         assert_eq!(OwnScan.replying(&Reply::Value(5).frame(2)), Some(2));
-        let sdo_response = Frame::of(frame::reply_id(2), [0x43, 0, 0x10, 0, 0x92, 1, 2, 0]);
+        let sdo_response = Frame::of(reply_id(2), [0x43, 0, 0x10, 0, 0x92, 1, 2, 0]);
         assert_eq!(OwnScan.replying(&sdo_response), None, "it is that of the CANopen node 66");
         assert_eq!(OwnScan.shares_sdo_with(2), Some(66));
     }

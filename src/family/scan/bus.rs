@@ -42,6 +42,8 @@ pub struct BusScan {
     pub may_take_torque: bool,
     /// Whether the bus carries CAN FD frames.
     pub has_fd: bool,
+    /// The node IDs of the running controller that sends the questions, if one does: its drives are not asked.
+    pub of_controller: Option<Vec<u8>>,
 }
 
 /// The procedure of a scan. It never fails: interrupted, it ends with what it has found so far.
@@ -81,7 +83,10 @@ impl Scan {
             add_heard(heard, &mut devices);
             mark_duplicates(heard, &mut devices);
             devices.sort_by_key(|device| (device.node.is_none(), device.node));
-            Scanned { devices, remarks: remarks(heard, self.session.now_ns()), is_interrupted }
+            let mut remarks = remarks(heard, self.session.now_ns());
+            // That its own controller is active is no news.
+            remarks.extend(self.scan.of_controller.is_none().then(|| active_master(heard)).flatten());
+            Scanned { devices, remarks, is_interrupted }
         })
     }
 
@@ -116,13 +121,19 @@ impl Scan {
         is_allowed && (self.scan.has_fd || !protocol.question(1).is_fd())
     }
 
+    /// The node IDs that may be asked.
+    fn nodes(&self) -> impl Iterator<Item = u8> + use<> {
+        let left_alone = self.scan.of_controller.clone().unwrap_or_default();
+        self.scan.nodes.clone().filter(move |node| !left_alone.contains(node))
+    }
+
     fn asked_nodes(&self, protocol: &dyn OwnProtocol) -> impl Iterator<Item = u8> + use<> {
         let own = protocol.nodes();
-        self.scan.nodes.clone().filter(move |node| own.contains(node))
+        self.nodes().filter(move |node| own.contains(node))
     }
 
     fn canopen_nodes(&self) -> impl Iterator<Item = u8> + use<> {
-        self.scan.nodes.clone().filter(|node| (1..=HIGHEST_NODE).contains(node))
+        self.nodes().filter(|node| (1..=HIGHEST_NODE).contains(node))
     }
 
     fn asked_one(&mut self) {
@@ -189,7 +200,8 @@ impl Scan {
         let nodes: Vec<u8> = self.session.heard(|heard| {
             heard.nodes().filter(|(_, heard)| heard.has_answered()).map(|(node, _)| node).collect()
         });
-        let is_new = |node: &u8| self.scan.nodes.contains(node) && !known.contains(node);
+        let asked: Vec<u8> = self.canopen_nodes().collect();
+        let is_new = |node: &u8| asked.contains(node) && !known.contains(node);
         for node in nodes.into_iter().filter(is_new) {
             devices.push(match self.session.is_interrupted() {
                 // It has answered, so that it is there.
@@ -247,7 +259,7 @@ fn mark_duplicates(heard: &Heard, devices: &mut [FoundDevice]) {
                 protocol.name() == name
                     && heard.drives_of(place).any(|(drive, heard)| drive == node && heard.answers_twice())
             }),
-            Answered::Heard(_) | Answered::Modbus { .. } | Answered::Lss => false,
+            Answered::Heard(_) | Answered::Modbus { .. } | Answered::Lss | Answered::OfController => false,
         };
         if is_double {
             device.remark(
@@ -255,6 +267,12 @@ fn mark_duplicates(heard: &Heard, devices: &mut [FoundDevice]) {
             );
         }
     }
+}
+
+/// That another master is active, if one is.
+fn active_master(heard: &Heard) -> Option<String> {
+    let frames = heard.master_frames();
+    (frames > 0).then(|| format!("a master is active: {frames} of its frames were heard"))
 }
 
 /// What is odd on the bus as a whole.
@@ -266,9 +284,6 @@ fn remarks(heard: &Heard, duration_ns: Nanoseconds) -> Vec<String> {
             "the bus is flooded: {rate:.0} frames/s were heard, so that answers may be missing; `takt monitor --stats` shows who sends \
              them"
         ));
-    }
-    if heard.master_frames() > 0 {
-        remarks.push(format!("a master is active: {} of its frames were heard", heard.master_frames()));
     }
     let others: Vec<String> = heard.others().map(|(id, frames)| format!("{id:?} ({frames})")).collect();
     if !others.is_empty() {

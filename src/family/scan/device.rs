@@ -20,6 +20,8 @@ pub enum Answered {
     },
     /// It answered a fastscan (CiA 305): it has no node ID.
     Lss,
+    /// It was not asked: it is a drive of the running controller that sends the questions.
+    OfController,
 }
 
 impl Answered {
@@ -31,6 +33,7 @@ impl Answered {
             Self::Own(protocol) => protocol.to_owned(),
             Self::Modbus { bit_rate } => format!("Modbus-RTU at {bit_rate} bit/s"),
             Self::Lss => "LSS fastscan".to_owned(),
+            Self::OfController => "not asked".to_owned(),
         }
     }
 }

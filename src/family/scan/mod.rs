@@ -6,6 +6,7 @@
 //!   │
 //! canopen ── what a CANopen node tells of itself
 //! own_protocol ── how drives with a protocol of their own are asked: the family says it
+//! reading ── which frames only read, and may be sent beside a running controller
 //!   │
 //! session ── frames in and out of the procedure; heard ── what devices send by themselves
 //!   │
@@ -22,6 +23,7 @@ mod device;
 mod heard;
 mod line;
 mod own_protocol;
+mod reading;
 mod session;
 mod starting;
 
@@ -30,6 +32,7 @@ pub use canopen::{NodeIdentity, Recognised};
 pub use device::{Answered, FoundDevice};
 pub use line::{LineScan, scan_line};
 pub use own_protocol::{OwnProtocol, Reading};
+pub use reading::reply_to_reading;
 pub use session::{ScanClient, ScanSession};
 pub use starting::{PlaceOfScan, StartingKeys, starting_configuration};
 

@@ -4,7 +4,7 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::pin::Pin;
 
-use takt_rt::Frame;
+use takt_rt::{Frame, Id};
 
 use super::device::FoundDevice;
 use super::session::ScanSession;
@@ -25,6 +25,11 @@ pub trait OwnProtocol: Sync + fmt::Debug {
 
     /// The node that a frame comes from, if it is a reply in this protocol.
     fn replying(&self, frame: &Frame) -> Option<u8>;
+
+    /// The identifier of the reply to a frame, if it is a request of this protocol that only reads.
+    fn reply_to_reading(&self, _frame: &Frame) -> Option<Id> {
+        None
+    }
 
     /// What the question does to a drive that has torque; `None` where it does nothing. A question that does something is sent only
     /// when the person at the machine has asked for that.

@@ -76,12 +76,12 @@ pub fn starting_configuration(found: &[(PlaceOfScan, Vec<FoundDevice>)]) -> Stri
     text
 }
 
-/// The devices for which there can be an axis, with its keys. Two with the same node ID cannot be told apart: the first of them.
+/// The devices for which there can be an axis, with its keys. Those of a running controller have one there. Two with the same node ID cannot be told apart: the first of them.
 fn driven(devices: &[FoundDevice]) -> Vec<(&FoundDevice, StartingKeys)> {
     let keys = |device: &FoundDevice| family::named(device.drive?)?.starting_keys(device);
     devices
         .iter()
-        .filter(|device| device.node.is_some())
+        .filter(|device| device.node.is_some() && device.answered != Answered::OfController)
         .filter_map(|device| Some((device, keys(device)?)))
         .collect()
 }

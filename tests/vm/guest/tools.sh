@@ -1,4 +1,4 @@
-# The tools of the bus on virtual interfaces: `takt scan` against `takt sim`, `takt monitor` beside a running controller, `takt send` as
+# The tools of the bus on virtual interfaces: `takt scan` against `takt sim` and beside a running controller, `takt monitor` there, `takt send` as
 # candump sees it, and refused on a bus with enabled axes. One line a check. TAKT names the program. Leaves tools.txt.
 . tests/vm/guest/laboratory.sh
 printed=$OUT/tools-printed.txt wire=$OUT/tools-wire.txt
@@ -64,6 +64,19 @@ expect "monitor beside a running controller" 0 'TPDO1|RPDO1' monitor --bus vcan0
 expect "monitor --stats beside a running controller" 0 'SYNC' monitor --bus vcan0 --duration 1 --stats
 expect "send beside a running controller is refused" 2 'has a master already.*--force' send '701#R' --bus vcan0
 expect "send --force beside a running controller" 0 '701#R' send '701#R' --bus vcan0 --force
+if kill -0 $run 2>/dev/null; then passes "the controller runs on"; else fails "the controller has ended"; fi
+kill -INT $run; wait $run
+
+# One of the three servos belongs to a controller that is served: that asks the other two.
+awk '/^\[\[axis\]\]/ { axes++ } /^\[\[program/ { exit } axes < 2' configs/gantry-yz-aim.toml > "$OUT/tools-one.toml"
+"$TAKT" run "$OUT/tools-one.toml" --bus gantry=vcan1 --serve tools --duration 30 > "$OUT/tools-run.txt" 2>&1 & run=$!
+until "$TAKT" top --list | grep -q tools; do kill -0 $run || break; sleep 0.1; done
+candump -L vcan1 > "$wire" & listener=$!
+expect "scan beside a running controller that is served" 0 'node 3|^ +3 ' scan --bus vcan1 --to 16
+expect "scan --json of the same" 0 '"answered": "not asked"' scan --bus vcan1 --to 16 --json
+kill $listener; wait $listener 2>/dev/null
+asked=$(grep -cE ' 60[23]#40' "$wire") own=$(grep -c ' 601#' "$wire")
+if [ "$asked" -gt 0 ] && [ "$own" = 0 ]; then passes "scan: the drive of the controller was not asked"; else fails "scan: $asked questions to others, $own to its drive"; fi
 if kill -0 $run 2>/dev/null; then passes "the controller runs on"; else fails "the controller has ended"; fi
 kill -INT $run; wait $run
 

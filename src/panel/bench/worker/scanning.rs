@@ -48,6 +48,7 @@ impl Worker {
                     only_listens: false,
                     may_take_torque: false,
                     has_fd: bus.has_fd,
+                    of_controller: None,
                 };
                 let decoder = &mut bus.decoder;
                 let mut clock = MonotonicClock::default();
