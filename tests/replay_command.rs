@@ -173,3 +173,31 @@ fn a_recording_that_cannot_be_written_is_an_error_after_the_result() {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
     assert!(text(&output.stderr).contains("cannot write"), "{output:?}");
 }
+
+#[test]
+fn the_black_box_of_a_run_that_was_not_recorded_is_replayed_and_shows_other_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let config = fs::read_to_string(root.join("configs/first.toml")).unwrap();
+    fs::write(folder.path().join("first.toml"), format!("{config}\n[telemetry]\nblack_box = \"300 ms\"\n"))
+        .unwrap();
+    let fault =
+        "[[fault]]\nkind = \"stall\"\naxis = \"joint\"\nwhen = \"moving\"\nat = \"600 ms\"\nfor = \"1 s\"\n";
+    fs::write(folder.path().join("blocked.toml"), fault).unwrap();
+    let output = takt(folder.path(), &["run", "first.toml", "--faults", "blocked.toml"]);
+    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let found = fs::read_dir(folder.path().join("runs")).unwrap();
+    let mut files = found.map(|file| file.unwrap().path());
+    let black_box = files.find(|file| file.to_str().unwrap().contains("black-box")).unwrap();
+    let replay = |settings: &[&str]| {
+        let arguments = [&["replay", black_box.to_str().unwrap(), "--json"], settings].concat();
+        let output = takt(folder.path(), &arguments);
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+    };
+    let same = replay(&[]);
+    assert_eq!(same["identical"], true, "{same:#}");
+    assert!(same["compared"].as_u64().unwrap() >= 300, "{same:#}");
+    let stricter = replay(&["--set", "axes.joint.limits.jerk=20"]);
+    assert!(stricter["cycles"].as_u64().unwrap() >= 300, "{stricter:#}");
+}

@@ -16,6 +16,7 @@ pub enum Answer {
 
 /// What became of the last requests: of the newest one, and of those with the [`Answers::REMEMBERED`] numbers before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Answers {
     /// The newest request that was taken up.
     pub newest: RequestId,

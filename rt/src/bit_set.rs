@@ -7,6 +7,7 @@ const _: () = assert!(MAX_BUSES <= u32::BITS as usize, "each bus has a bit");
 
 /// Some of the buses, or some of the axes, by their numbers (0 to 31).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct BitSet(u32);
 
 impl BitSet {

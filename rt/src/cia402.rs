@@ -3,6 +3,7 @@
 
 /// A state of the drive, as the statusword shows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum DriveState {
     /// The drive initialises itself. Also what is assumed before the first statusword.
@@ -223,6 +224,7 @@ pub mod statusword {
 
 /// Modes of operation (object 6060).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(i8)]
 pub enum OperationMode {
     /// Profile position (PP).

@@ -4,6 +4,7 @@ use crate::cia402::{DriveState, Goal, controlword};
 
 /// How a drive uses controlword (object 6040) and statusword (object 6041). The default is what CiA 402 says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Cia402Codec {
     /// Which states a statusword shows.
     pub states: ShownStates,
@@ -19,6 +20,7 @@ pub struct Cia402Codec {
 
 /// Which states a statusword shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum ShownStates {
     /// Every state of the standard, by the masks of the standard.
     #[default]
@@ -35,6 +37,7 @@ pub enum ShownStates {
 
 /// How a drive takes over a set-point of profile position.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum SetPointTransfer {
     /// Bit 4 of the controlword offers it, and bit 12 of the statusword acknowledges it.
     #[default]
@@ -45,6 +48,7 @@ pub enum SetPointTransfer {
 
 /// The command by which a drive itself brings its joint to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum StopCommand {
     /// Quick stop (bit 2 of the controlword is low), by which the drive then takes its torque away.
     #[default]
@@ -55,6 +59,7 @@ pub enum StopCommand {
 
 /// The ramps of a drive's profile modes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum ProfileRamps {
     /// It speeds up by one (object 6083) and slows down by another (object 6084).
     #[default]
@@ -65,6 +70,7 @@ pub enum ProfileRamps {
 
 /// What a heartbeat with the NMT state "stopped" says.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum StoppedHeartbeat {
     /// The node is stopped: it takes no process data.
     #[default]

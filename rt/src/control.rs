@@ -10,6 +10,7 @@ use crate::units::Scale;
 
 /// How an axis is commanded, with the gains of the loops that are closed here. N·m and rad, or N and m.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum ControlLaw {
     /// Cyclic synchronous position.
     Position,
@@ -98,6 +99,7 @@ pub struct LoopInput {
 
 /// How far a joint is behind the set-point that it should have reached when its feedback was taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct TrackingError {
     /// rad (m)
     pub position: f64,
@@ -107,6 +109,7 @@ pub struct TrackingError {
 
 /// What makes the torque of an axis. rad and N·m, or m and N.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum TorqueDemand {
     /// The loop of the control law, or that of the drive.
     Law {

@@ -85,6 +85,18 @@ impl Cycle {
         Self { grid, plan, next_slot: 0 }
     }
 
+    /// A loop that goes on with a slot of `grid`.
+    #[cfg(feature = "checkpoint")]
+    pub const fn resumed(grid: Grid, plan: SlotPlan, next_slot: u64) -> Self {
+        Self { grid, plan, next_slot }
+    }
+
+    /// The slot that comes next.
+    #[cfg(feature = "checkpoint")]
+    pub const fn next_slot(&self) -> u64 {
+        self.next_slot
+    }
+
     /// One whole cycle.
     pub fn run<const AXES: usize, const BUSES: usize, C, P, H>(
         &mut self,

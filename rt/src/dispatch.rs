@@ -50,6 +50,7 @@ const EMERGENCY: u8 = 7;
 /// The table of one bus. The entry of an identifier is `1 + axis · 8 + pdo`, with PDO 7 for emergencies, 6 for what is not looked
 /// at, and 5 for error control.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Dispatch {
     /// The entry of each 11-bit identifier.
     base: [u16; IDS],
@@ -61,6 +62,7 @@ pub struct Dispatch {
 
 /// One of several drives that reply by the same identifier.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct SharedId {
     id: Id,
     sender: SenderByte,
@@ -75,6 +77,7 @@ impl Default for Dispatch {
 
 /// The identifier is in use already, or cannot be dispatched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct IdTaken {
     /// The identifier.
     pub id: Id,

@@ -7,6 +7,7 @@ use crate::time::Nanoseconds;
 
 /// What made the group stop without anybody asking for it. Lengths are in rad (m for a linear axis) and their derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Fault {
     /// A set-point was not a finite number.
     NotFinite {

@@ -5,6 +5,7 @@ use core::fmt;
 
 /// An 11-bit (base) or 29-bit (extended) identifier.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Id(u32);
 
 const EXTENDED: u32 = 1 << 31;
@@ -101,6 +102,7 @@ impl core::error::Error for FrameError {}
 
 /// The four kinds of frame on a bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum FrameKind {
     /// A classic data frame, 0 to 8 bytes.
@@ -115,6 +117,7 @@ pub enum FrameKind {
 
 /// The three kinds of frame that carry data, with the numbers of [`FrameKind`]: then one becomes the other without an instruction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum FrameFormat {
     /// A classic data frame, 0 to 8 bytes.
@@ -139,6 +142,7 @@ impl FrameFormat {
 
 /// One CAN or CAN FD frame.
 #[derive(Clone, Copy)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Frame {
     id: Id,
     kind: FrameKind,

@@ -1,10 +1,9 @@
 //! The motion of the whole group: one trajectory for every axis, with one time.
 
-use core::ops::Range;
-
 use arrayvec::ArrayVec;
 
 use crate::guard::AxisLimits;
+use crate::places::Places;
 use crate::plan::{self, Limits, PlanError, PlanOptions, Problem, Profile, Return, State, Synchronisation};
 
 /// A joint that must not turn round keeps this share of its velocity, so that no rounding turns it.
@@ -15,6 +14,7 @@ const KEPT_VELOCITY: f64 = 1e-3;
 /// There is room for two of each axis: the next one is planned beside the present one and takes its place only when that of
 /// the whole group is there, without being copied.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ProfileStore<const AXES: usize> {
     first: [Profile; AXES],
     second: [Profile; AXES],
@@ -29,9 +29,10 @@ impl<const AXES: usize> Default for ProfileStore<AXES> {
 
 /// The trajectory that a group is on: the time on the motions of its axes, which are in a [`ProfileStore`].
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct GroupTrajectory {
     /// Where the axes of the group stand in the store, beside each other.
-    places: Range<usize>,
+    places: Places,
     is_second_present: bool,
     duration_s: f64,
     time_s: f64,
@@ -58,7 +59,7 @@ impl<'a> Leg<'a> {
 
 impl GroupTrajectory {
     /// None yet, of a group whose axes stand here among those of the store.
-    pub const fn new(places: Range<usize>) -> Self {
+    pub const fn new(places: Places) -> Self {
         Self { places, is_second_present: false, duration_s: 0.0, time_s: 0.0 }
     }
 
@@ -112,7 +113,7 @@ impl GroupTrajectory {
     /// Where the next trajectory is planned.
     fn free<'a, const AXES: usize>(&self, profiles: &'a mut ProfileStore<AXES>) -> &'a mut [Profile] {
         let free = if self.is_second_present { &mut profiles.first } else { &mut profiles.second };
-        free.get_mut(self.places.clone()).unwrap_or_default()
+        free.get_mut(self.places.range()).unwrap_or_default()
     }
 
     /// The trajectory that was planned last becomes the present one.
@@ -137,7 +138,7 @@ impl GroupTrajectory {
     pub fn states<const AXES: usize>(&self, profiles: &ProfileStore<AXES>) -> impl Iterator<Item = State> {
         let (time_s, since_end_s) = (self.time_s, self.time_s - self.duration_s);
         let present = if self.is_second_present { &profiles.second } else { &profiles.first };
-        present.get(self.places.clone()).unwrap_or_default().iter().map(move |profile| {
+        present.get(self.places.range()).unwrap_or_default().iter().map(move |profile| {
             // By the end of all, so that none is a rounding short of its own.
             let time_s = if since_end_s < 0.0 { time_s } else { profile.duration_s() + since_end_s };
             profile.sample(time_s)
@@ -223,7 +224,8 @@ mod tests {
         for (side, acceleration_scale) in [(-1.0, 0.1), (1.0, 0.1), (-1.0, 0.8), (1.0, 0.8)] {
             let start = State { position: side * 3.01, velocity: -0.1 * side, acceleration: 4.2 * side };
             let leg = Leg { start, target: State::rest(2.9 * side), limits: &LIMITS };
-            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
+            let (mut profiles, mut motion) =
+                (ProfileStore::<2>::default(), GroupTrajectory::new(Places { first: 0, end: 1 }));
             motion.move_to(&mut profiles, [leg].into_iter(), 1.0, acceleration_scale, 0.0).unwrap();
             let mut last = start.position;
             while !motion.is_finished() {
@@ -245,7 +247,8 @@ mod tests {
         for (velocity, acceleration) in [(1.9, 4.0), (-0.1, 8.0)] {
             let start = State { position: -2.5, velocity, acceleration };
             let target = State { position: 2.5, ..State::default() };
-            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
+            let (mut profiles, mut motion) =
+                (ProfileStore::<2>::default(), GroupTrajectory::new(Places { first: 0, end: 1 }));
             motion
                 .move_to(&mut profiles, [Leg { start, target, limits: &LIMITS }].into_iter(), 1.0, 0.1, 0.0)
                 .unwrap();
@@ -263,7 +266,8 @@ mod tests {
         let slow = AxisLimits { deceleration: 1.0, ..LIMITS };
         for jerk in [100.0, f64::INFINITY] {
             let (quick, slow) = (AxisLimits { jerk, ..LIMITS }, AxisLimits { jerk, ..slow });
-            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..2));
+            let (mut profiles, mut motion) =
+                (ProfileStore::<2>::default(), GroupTrajectory::new(Places { first: 0, end: 2 }));
             // 0.5 rad/s at 8 rad/s² take less than 0.06 rad; in the 2 s of the other axis they would take 0.5 rad.
             motion.stop(&mut profiles, [(at(2.9, 0.5), &quick), (at(0.0, 2.0), &slow)].into_iter()).unwrap();
             let mut farthest: f64 = 2.9;
@@ -281,7 +285,8 @@ mod tests {
             let limits = AxisLimits { jerk, ..LIMITS };
             let start = State::default();
             let target = State { position: 0.333, velocity: 1.1, acceleration: 0.0 };
-            let (mut profiles, mut motion) = (ProfileStore::<2>::default(), GroupTrajectory::new(0..1));
+            let (mut profiles, mut motion) =
+                (ProfileStore::<2>::default(), GroupTrajectory::new(Places { first: 0, end: 1 }));
             motion
                 .move_to(&mut profiles, [Leg { start, target, limits: &limits }].into_iter(), 0.7, 0.7, 0.0)
                 .unwrap();

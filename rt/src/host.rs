@@ -103,6 +103,7 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
 
 /// The state of the controller after a cycle, for any number of observers.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Snapshot<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
     /// The slot that it describes.
     pub slot: u64,
@@ -181,6 +182,7 @@ impl<const AXES: usize, const BUSES: usize> Snapshot<AXES, BUSES> {
 
 /// One group after a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct GroupSnapshot {
     /// What it is doing.
     pub phase: Phase,
@@ -196,6 +198,7 @@ pub struct GroupSnapshot {
 
 /// One axis after a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct AxisSnapshot {
     /// Set-point (rad or m).
     pub position_set: f64,

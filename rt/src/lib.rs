@@ -2,7 +2,8 @@
 //!
 //! This crate is `no_std` and does not link an allocator, so that the loop cannot allocate. It formats nothing, takes no lock,
 //! and never panics on data from outside. It is sans-I/O: time and frames are handed in, frames are handed out. The only place
-//! that touches an operating system is `linux`, behind a feature.
+//! that touches an operating system is `linux`, behind a feature. Another feature, `checkpoint`, makes bytes of the state of an engine, for
+//! replays: with an allocator, and never in the real-time thread.
 //!
 //! # The tour
 //! Read the files in this order:
@@ -35,6 +36,8 @@ mod answers;
 mod axis;
 mod bit_fields;
 mod bit_set;
+#[cfg(feature = "checkpoint")]
+mod checkpoint;
 mod cia402;
 mod cia402_codec;
 mod control;
@@ -51,6 +54,7 @@ pub mod linux;
 mod motion_reports;
 mod pdo;
 mod phase;
+mod places;
 pub mod plan;
 mod port;
 mod profile;
@@ -82,6 +86,8 @@ pub use bit_fields::{
     ReplyValue, ReplyValues, RunningMode, SetUpAgain, Setting, StateCodes,
 };
 pub use bit_set::BitSet;
+#[cfg(feature = "checkpoint")]
+pub use checkpoint::CheckpointError;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
 pub use cia402_codec::{
     Cia402Codec, ProfileRamps, SetPointTransfer, ShownStates, StopCommand, StoppedHeartbeat,

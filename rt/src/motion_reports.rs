@@ -6,6 +6,7 @@ use crate::stop::StopReason;
 
 /// What has become of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum MotionState {
     /// It is under way.
     InProgress,
@@ -22,6 +23,7 @@ pub enum MotionState {
 
 /// One motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct MotionReport {
     /// The request that began it.
     pub request: RequestId,
@@ -45,6 +47,7 @@ impl MotionReport {
 
 /// The motions in progress, and of those of each group that have ended the last [`MotionReports::ENDED`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct MotionReports {
     /// The newest first, without gaps.
     pub reports: [Option<MotionReport>; Self::CAPACITY],

@@ -8,6 +8,7 @@ pub const MAX_PDOS: usize = 4;
 
 /// When a command is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum TransmissionType {
     /// In every cycle of its bus.
     EveryCycle,
@@ -31,6 +32,7 @@ pub const MAX_OBJECTS: usize = 8;
 
 /// An object as a mapping parameter names it (CiA 301, 7.5.2.36): index, sub-index and length in bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct MappedObject {
     /// Index in the object dictionary.
     pub index: u16,
@@ -188,6 +190,7 @@ impl FeedbackSlot {
 
 /// A set of the numbers that an axis may report.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(crate) struct FeedbackSlots(u8);
 
 impl FeedbackSlots {
@@ -212,6 +215,7 @@ const IMAGE_SLOTS: usize = 8;
 
 /// The numbers of one direction of an axis, in drive units. Unsigned 32-bit objects keep their bit pattern.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ProcessImage([i32; IMAGE_SLOTS]);
 
 impl ProcessImage {
@@ -238,6 +242,7 @@ impl ProcessImage {
 
 /// One object of a compiled mapping: `bits` bits from bit `shift` of the payload, to or from image slot `slot`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct Field {
     shift: u8,
     slot: u8,
@@ -248,6 +253,7 @@ struct Field {
 
 /// A compiled PDO mapping.
 #[derive(Clone, Debug, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Mapping {
     fields: ArrayVec<Field, MAX_OBJECTS>,
     bytes: u8,

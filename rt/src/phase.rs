@@ -2,6 +2,7 @@
 
 /// What the group was doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum Phase {
     /// No set-points are sent: the drives are being brought up, or are not to be touched.

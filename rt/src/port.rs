@@ -88,6 +88,7 @@ pub trait BusPort {
 
 /// The fault confinement state of a CAN controller (ISO 11898-1), and whether there is an interface at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum BusState {
     /// Works normally.
     #[default]
@@ -102,6 +103,7 @@ pub enum BusState {
 
 /// State and counters of an interface since it was opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct BusHealth {
     /// The fault confinement state.
     pub state: BusState,

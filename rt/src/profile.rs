@@ -5,6 +5,7 @@ use crate::cia402::{controlword, statusword};
 
 /// A target of a profile mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum ProfileTarget {
     /// Profile position: rad (m).
     Position(f64),
@@ -21,6 +22,7 @@ const STALE_CYCLES: u32 = 3;
 /// Where the handshake of profile position stands (CiA 402-2, 8.3.2): bit 4 of the controlword rises, the drive
 /// answers with bit 12 of the statusword, both fall.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 enum Handshake {
     #[default]
     Idle,
@@ -32,6 +34,7 @@ enum Handshake {
 
 /// The target of a drive in a profile mode, in drive units, on its way to the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ProfileCommand {
     target_raw: i32,
     handshake: Handshake,

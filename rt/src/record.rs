@@ -20,6 +20,7 @@ pub const MAX_GROUPS: usize = 8;
 
 /// The times of one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct CycleTiming {
     /// The number of the slot on the grid.
     pub slot: u64,
@@ -40,6 +41,7 @@ pub struct CycleTiming {
 
 /// One axis in one cycle. SI units: rad (m), rad/s, rad/s², N·m (N).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct AxisRecord {
     /// The set-point of this cycle.
     pub position_set: f64,
@@ -77,6 +79,7 @@ pub struct AxisRecord {
 
 /// One group in one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct GroupRecord {
     /// What it was doing.
     pub phase: Phase,
@@ -88,6 +91,7 @@ pub struct GroupRecord {
 
 /// What a cycle says of a stop. The event of its beginning says the rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct RecordedStop {
     /// How hard it is by now.
     pub category: StopCategory,
@@ -104,6 +108,7 @@ impl RecordedStop {
 
 /// One cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct CycleRecord<const AXES: usize = MAX_AXES> {
     /// When.
     pub timing: CycleTiming,
@@ -146,6 +151,7 @@ impl<const AXES: usize> CycleRecord<AXES> {
 
 /// Something that happened, for the logger and for people.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Event {
     /// The slot in which it was seen.
     pub slot: u64,
@@ -159,6 +165,7 @@ pub struct Event {
 
 /// The kinds of events.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum EventKind {
     /// The group went from one phase to another.
     PhaseChanged {

@@ -9,6 +9,7 @@ use crate::rule::Rule;
 
 /// Why a request is rejected. Lengths in rad (m), velocities in rad/s (m/s), torques in N·m (N).
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum RejectReason {
     /// It is not possible in the phase that the group is in.
     Phase,
@@ -347,6 +348,7 @@ impl RejectReason {
 
 /// A request that was rejected. Nothing has changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct RequestError {
     /// What was asked for.
     pub request: RequestKind,

@@ -11,6 +11,7 @@ use crate::time::Nanoseconds;
 
 /// The number of a request, never given twice, whoever asks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct RequestId(pub u64);
 
 /// A request with the number by which whoever asked finds out what came of it.
@@ -132,6 +133,7 @@ impl<const AXES: usize> Request<AXES> {
 
 /// The number under which the host has a trajectory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct TrajectoryId(pub u64);
 
 /// When a trajectory begins.
@@ -176,6 +178,7 @@ pub struct MappedPdo {
 
 /// A coordinated move of every axis, to rest unless a velocity is given.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Move<const AXES: usize = MAX_AXES> {
     /// Where to (rad or m), an axis each.
     pub target: [f64; AXES],
@@ -210,6 +213,7 @@ pub struct ProfileMove {
 
 /// What was asked for, without its parameters: [`Request::kind`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum RequestKind {
     /// SYNC on or off.

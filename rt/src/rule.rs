@@ -6,6 +6,7 @@ use crate::stop_category::StopCategory;
 
 /// What is broken by a fault, without the numbers: the key of a configuration and the number of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum Rule {
     /// The stop was asked for.

@@ -7,6 +7,7 @@ use crate::stop_category::StopCategory;
 
 /// The category of the stop for each rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct StopCategories([StopCategory; Rule::ALL.len()]);
 
 impl Default for StopCategories {
@@ -31,6 +32,7 @@ impl StopCategories {
 
 /// What a stop concerns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Origin {
     /// The group as a whole: what was asked of it, or how it is paced.
     #[default]
@@ -61,6 +63,7 @@ impl Origin {
 
 /// Why the group stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum StopCause {
     /// Somebody asked for it. A fault that comes up before that stop is over takes its place.
     Requested,
@@ -101,6 +104,7 @@ impl StopCause {
 
 /// The one reason of a stop: the first fault, or that it was asked for where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct StopReason {
     /// The category of the stop that it led to.
     pub category: StopCategory,

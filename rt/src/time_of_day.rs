@@ -13,6 +13,7 @@ pub const TIME_ID: Id = Id::canopen(0x100, 0);
 
 /// A time of day (TIME_OF_DAY of CiA 301, 7.1.6.5) in UTC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct TimeOfDay {
     /// Days since 1984-01-01.
     pub days: u16,
@@ -63,6 +64,7 @@ impl TimeOfDay {
 
 /// Sends TIME every so many cycles, once it knows the time of day: the clock of the cycle does not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(crate) struct TimeProducer {
     cycles: u32,
     /// Cycles until the next message.

@@ -27,6 +27,7 @@ pub struct ScaleParameters {
 
 /// Compiled conversion between SI and drive units.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Scale {
     counts_per_unit: f64,
     units_per_count: f64,

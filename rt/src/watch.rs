@@ -2,6 +2,7 @@
 
 /// How often the controller has missed slots lately.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum TimingLevel {
     /// Hardly ever.
@@ -24,6 +25,7 @@ impl TimingLevel {
 /// `leak_slots` slots that were used. The leak counts slots and not time: whoever misses every second slot fills the bucket,
 /// whatever the period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct TimingLadder {
     /// Missed slots in the bucket from which on there is an event.
     pub warning: u32,
@@ -37,6 +39,7 @@ pub struct TimingLadder {
 
 /// The bucket of a [`TimingLadder`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct LeakyBucket {
     filled: u32,
     /// Slots since the last leak.
@@ -112,6 +115,7 @@ pub mod nmt_command {
 /// The NMT state that a node is believed to be in, by its heartbeats and by the NMT commands of other masters. It tells which
 /// services reach the node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum NmtState {
     /// The node takes process data and SDO.
     #[default]
@@ -131,6 +135,7 @@ const UNREACHABLE_CYCLES: u16 = 2;
 
 /// The worst that a node's own error control messages have shown since it is watched.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 enum ErrorControl {
     /// The node is operational, or has said nothing.
     #[default]
@@ -146,6 +151,7 @@ enum ErrorControl {
 
 /// What is known of a node by its error control messages and by the NMT commands of other masters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct NodeMonitor {
     silent_cycles: u32,
     error_control: ErrorControl,
@@ -265,6 +271,7 @@ impl NodeMonitor {
 /// Two nodes with one node ID answer the same SYNC twice. Late feedback makes two in one cycle as well, so only a run of them
 /// counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct DuplicateNodeDetector {
     filled: u16,
 }

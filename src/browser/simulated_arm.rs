@@ -10,7 +10,7 @@ use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds, StopCategory};
 
 use super::breakage::Breakage;
 use crate::config::{Config, ConfigSources};
-use crate::controller::{Events, VirtualController};
+use crate::controller::{Events, VirtualController, assemble};
 use crate::panel::command::{Command, CommandRefusal, target_of};
 use crate::panel::motions::{LOOK, Motions, Problem};
 use crate::panel::view::{EventView, MachineView, Viewer};
@@ -80,7 +80,8 @@ impl SimulatedArm {
         let config = sources.config().map_err(|error| error.to_string())?;
         let wall_clock = WallClock::fixed(time_ms.saturating_mul(1_000_000));
         let black_boxes = FilesInMemory::default();
-        let logger = |log, traces| {
+        let again = assemble::rerun_parts(&config).map_err(|error| error.to_string())?;
+        let logger = |log, traces, journal| {
             let machine = Machine::of(&config);
             let black_box = BlackBox::in_memory(BLACK_BOX_NS, black_boxes.clone(), &machine, wall_clock);
             let options = LoggerOptions {
@@ -93,7 +94,11 @@ impl SimulatedArm {
                 black_box: None,
                 traces,
             };
-            Logger::new(log, options, Box::new(|_| {})).with_black_box(black_box)
+            Logger::new(log, options, Box::new(|_| {})).with_black_box(black_box).with_journal(
+                Some(journal),
+                Some(again),
+                &sources,
+            )
         };
         let controller =
             VirtualController::start_logged(&config, logger).map_err(|error| format!("{error:?}"))?;
@@ -255,6 +260,7 @@ fn malformed(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::browser::replay::replay;
 
     fn arm() -> SimulatedArm {
         let text = include_str!("../../configs/arm6-erob.toml");
@@ -284,6 +290,49 @@ mod tests {
             let report = arm.report(0).unwrap();
             assert!(report.contains(cause), "{what}: {report}");
         }
+    }
+
+    /// A black box of a joint that was blocked long after the beginning of the run, and the cycles before that.
+    fn late_black_box() -> (Vec<u8>, u64) {
+        let mut arm = arm();
+        let mut to = 0.8;
+        for _ in 0..3 {
+            let command = json!({ "do": "move", "axis": 1, "to": to, "relative": false, "velocity": 1, "acceleration": 1 });
+            arm.command(&command.to_string()).unwrap();
+            arm.advance(2000.0);
+            to = -to;
+        }
+        let command =
+            json!({ "do": "move", "axis": 1, "to": to, "relative": false, "velocity": 1, "acceleration": 1 });
+        arm.command(&command.to_string()).unwrap();
+        arm.advance(300.0);
+        arm.break_something(r#"{"what":"blocked","axis":1,"is_broken":true}"#).unwrap();
+        arm.advance(2000.0);
+        (arm.black_box(0).unwrap(), 6000)
+    }
+
+    #[test]
+    fn a_black_box_is_replayed_bit_for_bit_though_its_journal_begins_in_the_middle_of_the_run() {
+        let (bytes, before) = late_black_box();
+        let result: Value = serde_json::from_str(&replay("box.mcap", bytes, &[]).unwrap()).unwrap();
+        let count = |key: &str| result[key].as_u64().unwrap();
+        assert!(result["identical"].as_bool().unwrap(), "{result:#}");
+        assert!(count("compared") > 2000 && count("cycles") < before, "{result:#}");
+        assert_eq!((count("missing"), count("differing")), (0, 0));
+        assert!(result["stops"][0].as_str().unwrap().contains("joint2"), "{result:#}");
+    }
+
+    #[test]
+    fn a_black_box_shows_what_another_limit_would_have_done() {
+        let (bytes, _) = late_black_box();
+        let stricter = ["axes.joint2.following_error.limit=0.01".to_owned()];
+        let result: Value =
+            serde_json::from_str(&replay("box.mcap", bytes.clone(), &stricter).unwrap()).unwrap();
+        assert!(result["differing"].as_u64().unwrap() > 0, "{result:#}");
+        assert!(result["stops"][0].as_str().unwrap().contains("allowed: 0.0100"), "{result:#}");
+        let faster = ["cycle.period=2 ms".to_owned()];
+        let refusal = replay("box.mcap", bytes, &faster).unwrap_err();
+        assert!(refusal.contains("another period"), "{refusal}");
     }
 
     #[test]

@@ -36,9 +36,10 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use takt_rt::{
-    AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CallbackRun, CycleRecord, Event,
-    ExecutionStart, Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport, Received, Request,
-    RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId, TrajectorySample,
+    AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CallbackRun, CheckpointError,
+    CycleRecord, Event, ExecutionStart, Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport,
+    Received, Request, RequestEnvelope, RequestId, RequestTarget, Snapshot, StreamSample, TrajectoryId,
+    TrajectorySample,
 };
 
 use callbacks::CallbackTaker;
@@ -198,6 +199,22 @@ impl RtSide {
         if let Some(journal) = &mut self.journal {
             journal.note(input());
         }
+    }
+
+    /// The state of the stream of each group between two cycles.
+    pub fn stream_checkpoints(&self) -> Vec<Vec<u8>> {
+        self.streams.iter().map(StreamReceiver::checkpoint).collect()
+    }
+
+    /// Goes on with the streams of another controller of the same groups.
+    ///
+    /// # Errors
+    /// They are none of these groups.
+    pub fn resume_streams(&mut self, checkpoints: &[Vec<u8>]) -> Result<(), CheckpointError> {
+        if checkpoints.len() != self.streams.len() {
+            return Err(CheckpointError::OtherMachine);
+        }
+        self.streams.iter_mut().zip(checkpoints).try_for_each(|(stream, state)| stream.resume(state))
     }
 
     /// From now on the calls of callbacks are measured so.

@@ -6,8 +6,8 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use takt_rt::{
-    AxisPoint, LookAhead, LookAheadParameters, MAX_AXES, Nanoseconds, PointRole, StreamPoint, StreamSample,
-    StreamWish,
+    AxisPoint, CheckpointError, LookAhead, LookAheadParameters, MAX_AXES, Nanoseconds, PointRole,
+    StreamPoint, StreamSample, StreamWish,
 };
 
 use super::ChannelError;
@@ -124,6 +124,19 @@ pub struct StreamReceiver {
 }
 
 impl StreamReceiver {
+    /// The state between two cycles, without the points that wait.
+    pub fn checkpoint(&self) -> Vec<u8> {
+        self.look_ahead.checkpoint()
+    }
+
+    /// Goes on from the state of a stream of the same axes.
+    ///
+    /// # Errors
+    /// It is of other axes, or of another version of takt.
+    pub fn resume(&mut self, checkpoint: &[u8]) -> Result<(), CheckpointError> {
+        self.look_ahead.resume(checkpoint)
+    }
+
     /// A stream begins: forgets the one before it.
     pub fn begin(&mut self) {
         self.look_ahead.begin();

@@ -17,6 +17,7 @@ use crate::config::bit_fields::{FieldDevice, ReplyMoment};
 use crate::config::{self, Axis, Compliance, Config, ConfigError, Interface};
 use crate::family;
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
+use crate::journal::RerunParts;
 use crate::schedule;
 
 /// How long the drives may take from the first controlword to operation enabled, where they have been on for long enough.
@@ -74,28 +75,40 @@ pub fn slot_plan(config: &Config) -> SlotPlan {
     SlotPlan { send_phase_ns: schedule::send_phase_ns(config), ..usual }
 }
 
+/// What the engine of a configuration is run again with, from the journal of its run.
+///
+/// # Errors
+/// See [`AssembleError`].
+pub fn rerun_parts(config: &Config) -> Result<RerunParts, AssembleError> {
+    Ok(RerunParts { engine: engine(config)?, plan: slot_plan(config), sizes: ChannelSizes::of(config) })
+}
+
 /// The engine of a configuration. It is a few hundred kilobytes, so it is on the heap, and not on the stack of each caller.
 ///
 /// # Errors
 /// See [`AssembleError`]. A configuration that has passed its checks gives no error.
 pub fn engine(config: &Config) -> Result<Box<Engine>, AssembleError> {
     config.validate()?;
-    let assembled = thread::scope(|scope| {
-        let assembling = || assembled_here(config);
-        let thread = thread::Builder::new().stack_size(ASSEMBLING_STACK_BYTES);
-        thread.spawn_scoped(scope, assembling).ok().map(ScopedJoinHandle::join)
+    on_a_large_stack(|| assembled_here(config))
+}
+
+/// Does work that passes engines on by value, in a thread with room for it.
+pub fn on_a_large_stack<T: Send>(mut work: impl FnMut() -> T + Send) -> T {
+    let done = thread::scope(|scope| {
+        let thread = thread::Builder::new().stack_size(LARGE_STACK_BYTES);
+        thread.spawn_scoped(scope, &mut work).ok().map(ScopedJoinHandle::join)
     });
-    match assembled {
-        Some(Ok(engine)) => engine,
+    match done {
+        Some(Ok(done)) => done,
         Some(Err(panic)) => resume_unwind(panic),
         // Without a thread of its own, the stack of the caller has to do.
-        None => assembled_here(config),
+        None => work(),
     }
 }
 
 /// An engine and its parameters are passed on by value while they are made, which takes more than a megabyte of the stack in a debug
 /// build. The caller's thread may have two in all.
-const ASSEMBLING_STACK_BYTES: usize = 8 << 20;
+const LARGE_STACK_BYTES: usize = 8 << 20;
 
 /// The engine of a configuration that has passed its checks, made on the stack of the caller.
 fn assembled_here(config: &Config) -> Result<Box<Engine>, AssembleError> {

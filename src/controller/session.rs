@@ -210,13 +210,15 @@ fn lead_as_owner(
     let is_recorded = options.recording.is_some() || config.telemetry.is_recorded;
     let (ports, traces) = open_ports(config, &lines, options.fault_injector.as_deref(), is_recorded)?;
     let (mut rt, mut host, log) = channels(&ChannelSizes::of(config));
-    let (clock_answers, journal) = match is_recorded {
+    let has_black_box = config.telemetry.black_box_ns.is_some();
+    let (clock_answers, journal) = match is_recorded || has_black_box {
         true => {
             let (answers, clock) = clock_journal();
             (Some(answers), Some(RunJournal { clock, host: channels::journal(&mut rt, &mut host) }))
         }
         false => (None, None),
     };
+    let again = has_black_box.then(|| assemble::rerun_parts(config)).transpose()?;
     let mut supervisor = match &remote {
         Some(remote) => Supervisor::serving(config, remote.after_bring_up),
         None => Supervisor::new(config, options.duration_ns),
@@ -245,7 +247,7 @@ fn lead_as_owner(
     let logger = Logger::new(log, logger_options, notify)
         .with_each_cycle(options.each_cycle)
         .with_timing(timing_writer)
-        .with_journal(journal, &options.sources);
+        .with_journal(journal, again, &options.sources);
     let logger = LoggerThread::start(logger).map_err(SessionError::Logger)?;
     let parts = LoopParts {
         engine,

@@ -11,13 +11,13 @@ use super::outcome::{Interrupt, Outcome};
 use super::port::Port;
 use super::supervisor::{AfterBringUp, Supervisor};
 use super::time_of_day::TimeOfDayKeeper;
-#[cfg(feature = "internals")]
+#[cfg(any(feature = "browser", feature = "internals"))]
 use crate::channels;
 use crate::channels::{CallbackClock, ChannelSizes, HostSide, LogSide, RtSide, channels};
 use crate::config::Config;
 use crate::faults::FaultInjector;
 use crate::journal::JournaledClock;
-#[cfg(feature = "internals")]
+#[cfg(any(feature = "browser", feature = "internals"))]
 use crate::journal::{RunJournal, clock_journal};
 use crate::sim::SimulatedBus;
 use crate::telemetry::WallClock;
@@ -258,7 +258,7 @@ impl<P: BusPort> VirtualRun<P> {
 
     /// Notes from now on everything that the cycle is told from outside but for what its ports do, which a
     /// [`TracedPort`](crate::link::trace::TracedPort) notes. Call it before the first cycle.
-    #[cfg(feature = "internals")]
+    #[cfg(any(feature = "browser", feature = "internals"))]
     pub(crate) fn journal(&mut self) -> RunJournal {
         let (answers, clock) = clock_journal();
         self.clock = JournaledClock::noted_in(self.clock.clock, Some(answers));

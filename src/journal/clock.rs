@@ -101,10 +101,27 @@ pub struct ReplayClock {
 }
 
 impl ReplayClock {
-    /// A clock that gives these answers.
-    pub fn new(answers: VecDeque<ClockAnswer>) -> Self {
-        let cycles = answers.iter().filter(|answer| **answer == ClockAnswer::CycleEnd).count();
-        Self { answers, now_ns: 0, cycles }
+    /// Adds answers that it is to give.
+    pub fn add(&mut self, answers: impl IntoIterator<Item = ClockAnswer>) {
+        for answer in answers {
+            self.cycles += usize::from(answer == ClockAnswer::CycleEnd);
+            self.answers.push_back(answer);
+        }
+    }
+
+    /// Goes on from this time.
+    pub fn resume(&mut self, now_ns: Nanoseconds) {
+        self.now_ns = now_ns;
+    }
+
+    /// The last time that it has told.
+    pub const fn told_ns(&self) -> Nanoseconds {
+        self.now_ns
+    }
+
+    /// The answers that it has not given yet.
+    pub fn unused(&self) -> impl Iterator<Item = ClockAnswer> + '_ {
+        self.answers.iter().copied()
     }
 
     /// Whether there are answers for another whole cycle.

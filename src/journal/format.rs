@@ -7,7 +7,8 @@ use takt_rt::{BusState, MAX_BUSES, Nanoseconds, Received, TrajectoryId, Wake};
 
 use super::clock::ClockAnswer;
 use super::host_words::{put_entry, take_entry};
-use crate::channels::{GivenTrajectory, GroupAxes, JournalEntry, NumberedTrajectory};
+use super::port::PortState;
+use crate::channels::{GivenTrajectory, GroupAxes, JournalEntry};
 use crate::link::trace::{PortAnswer, PortMark, Traced};
 use crate::packet::{Malformed, Put, Take};
 use crate::trajectory::Trajectory;
@@ -21,9 +22,28 @@ pub enum PortEntry {
     Mark(PortMark),
 }
 
-/// A whole journal.
+/// The state of a run between two cycles, so that its journal need not begin with the first one.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Checkpoint {
+    /// The slot that comes next.
+    pub next_slot: u64,
+    /// The cycle that comes next, counted from 0.
+    pub next_cycle: u64,
+    /// The last time that the clock has told.
+    pub now_ns: Nanoseconds,
+    /// What the ports have shown, in the order of the buses.
+    pub ports: Vec<PortState>,
+    /// The engine: [`takt_rt::Engine::checkpoint`].
+    pub engine: Vec<u8>,
+    /// The stream of each group: [`takt_rt::LookAhead::checkpoint`].
+    pub streams: Vec<Vec<u8>>,
+}
+
+/// A journal, or a part of one.
 #[derive(Debug, Default)]
 pub struct Journal {
+    /// Where it begins; `None`: with the first cycle.
+    pub checkpoint: Option<Checkpoint>,
     /// The start of slot 0; `None` if the run has not got so far.
     pub epoch_ns: Option<Nanoseconds>,
     /// The clock.
@@ -56,6 +76,7 @@ const MARK: u8 = 5;
 const HOST: u8 = 6;
 const TRAJECTORY: u8 = 7;
 const CYCLE_END: u8 = 8;
+const CHECKPOINT: u8 = 9;
 
 /// Makes bytes of a journal. Each block can be read by itself.
 #[derive(Debug, Default)]
@@ -123,10 +144,27 @@ impl Encoder {
         self.words(HOST, &words);
     }
 
+    /// Puts the state of the run.
+    pub fn checkpoint(&mut self, checkpoint: &Checkpoint) {
+        let Checkpoint { next_slot, next_cycle, now_ns, ports, engine, streams } = checkpoint;
+        self.tag(CHECKPOINT);
+        self.number(*next_slot);
+        self.number(*next_cycle);
+        self.time(*now_ns);
+        self.number(ports.len() as u64);
+        for port in ports {
+            self.number(port.state as u64);
+            self.time(port.now_ns);
+        }
+        self.checked_bytes(engine);
+        self.number(streams.len() as u64);
+        streams.iter().for_each(|stream| self.checked_bytes(stream));
+    }
+
     /// Puts a trajectory that the real-time thread has been given.
-    pub fn trajectory(&mut self, (id, group, given): &NumberedTrajectory) {
+    pub fn trajectory(&mut self, id: TrajectoryId, group: u8, given: &GivenTrajectory) {
         let mut words = Put::default();
-        words.word(id.0).word((*group).into()).index(given.axes().places().len());
+        words.word(id.0).word(group.into()).index(given.axes().places().len());
         given.axes().places().iter().for_each(|place| {
             words.index(*place);
         });
@@ -148,6 +186,13 @@ impl Encoder {
 
     fn tag(&mut self, tag: u8) {
         self.bytes.push(tag);
+    }
+
+    /// Bytes behind their count, and their CRC-32.
+    fn checked_bytes(&mut self, bytes: &[u8]) {
+        self.number(bytes.len() as u64);
+        self.bytes.extend_from_slice(bytes);
+        self.number(crc32fast::hash(bytes).into());
     }
 
     /// The difference to the time before, with its sign in the lowest bit.
@@ -187,6 +232,7 @@ impl Journal {
             WOKE => self.clock.push_back(ClockAnswer::Woke(decoder.wake()?)),
             WOKE_TO_SEND => self.clock.push_back(ClockAnswer::WokeToSend(decoder.wake()?)),
             CYCLE_END => self.clock.push_back(ClockAnswer::CycleEnd),
+            CHECKPOINT => self.checkpoint = Some(decoder.checkpoint()?),
             FRAME => {
                 let (bus, at_ns) = (decoder.bus()?, decoder.time()?);
                 let frame = decoder.frame()?;
@@ -198,10 +244,7 @@ impl Journal {
                     (0, 0) => PortAnswer::Received,
                     (1, count) => PortAnswer::Unconfirmed(count),
                     (2, count) => PortAnswer::Taken(count),
-                    (3, 0) => PortAnswer::State(BusState::ErrorActive),
-                    (3, 1) => PortAnswer::State(BusState::ErrorPassive),
-                    (3, 2) => PortAnswer::State(BusState::BusOff),
-                    (3, 3) => PortAnswer::State(BusState::Down),
+                    (3, state) => PortAnswer::State(bus_state(state)?),
                     _ => return Err(Malformed),
                 };
                 self.port(bus).push(PortEntry::Mark(PortMark { at_ns, answer }));
@@ -235,6 +278,11 @@ impl Journal {
         }
         &mut self.ports[bus]
     }
+}
+
+fn bus_state(number: u64) -> Result<BusState, Malformed> {
+    let states = [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
+    states.into_iter().find(|state| *state as u64 == number).ok_or(Malformed)
 }
 
 struct Decoder<'a> {
@@ -277,6 +325,29 @@ impl Decoder<'_> {
         Ok(Wake { now_ns, timer_latency_ns })
     }
 
+    fn checkpoint(&mut self) -> Result<Checkpoint, Malformed> {
+        let (next_slot, next_cycle, now_ns) = (self.number()?, self.number()?, self.time()?);
+        let ports = (0..self.count()?)
+            .map(|_| Ok(PortState { state: bus_state(self.number()?)?, now_ns: self.time()? }))
+            .collect::<Result<_, _>>()?;
+        let engine = self.checked_bytes()?;
+        let streams = (0..self.count()?).map(|_| self.checked_bytes()).collect::<Result<_, _>>()?;
+        Ok(Checkpoint { next_slot, next_cycle, now_ns, ports, engine, streams })
+    }
+
+    /// A count of things that have a byte each at least.
+    fn count(&mut self) -> Result<usize, Malformed> {
+        usize::try_from(self.number()?).ok().filter(|count| *count <= self.bytes.len()).ok_or(Malformed)
+    }
+
+    fn checked_bytes(&mut self) -> Result<Vec<u8>, Malformed> {
+        let count = self.count()?;
+        let (bytes, rest) = self.bytes.split_at_checked(count).ok_or(Malformed)?;
+        self.bytes = rest;
+        let is_whole = self.number()? == u64::from(crc32fast::hash(bytes));
+        is_whole.then(|| bytes.to_vec()).ok_or(Malformed)
+    }
+
     fn bus(&mut self) -> Result<usize, Malformed> {
         usize::try_from(self.number()?).ok().filter(|bus| *bus < MAX_BUSES).ok_or(Malformed)
     }
@@ -295,8 +366,7 @@ impl Decoder<'_> {
 
     /// Words behind their count, each of which has a byte at least.
     fn words(&mut self) -> Result<Vec<u64>, Malformed> {
-        let count = usize::try_from(self.number()?).ok().filter(|count| *count <= self.bytes.len());
-        (0..count.ok_or(Malformed)?).map(|_| self.number()).collect()
+        (0..self.count()?).map(|_| self.number()).collect()
     }
 }
 
@@ -424,7 +494,7 @@ mod tests {
             Trajectory::new(&[point(1.0, [0.5, 0.1]), point(2.5, [-0.5, 0.3])], &conditions).unwrap();
         let given = Arc::new(GivenTrajectory::new(trajectory.clone(), GroupAxes::new(vec![3, 1])));
         let mut encoder = Encoder::default();
-        encoder.trajectory(&(TrajectoryId(9), 1, given));
+        encoder.trajectory(TrajectoryId(9), 1, &given);
         let mut journal = Journal::default();
         journal.add_block(&encoder.take_block().unwrap()).unwrap();
         let (group, read) = &journal.trajectories[&TrajectoryId(9)];

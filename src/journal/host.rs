@@ -3,9 +3,9 @@
 use std::collections::{HashMap, VecDeque};
 
 use takt_rt::{
-    AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CycleRecord, Event,
-    Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport, RequestEnvelope, StreamSample, TrajectoryId,
-    TrajectorySample,
+    AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CheckpointError,
+    CycleRecord, Event, Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport, RequestEnvelope,
+    StreamSample, TrajectoryId, TrajectorySample,
 };
 
 use super::pop_front_if;
@@ -37,23 +37,59 @@ struct Inputs {
 }
 
 impl ReplayHost {
-    /// A host with this journal, for a controller with such channels.
-    pub fn new(
-        sizes: &ChannelSizes,
-        entries: VecDeque<JournalEntry>,
-        trajectories: HashMap<TrajectoryId, (u8, GivenTrajectory)>,
-    ) -> Self {
+    /// A host that has nothing to give yet, for a controller with such channels.
+    pub fn new(sizes: &ChannelSizes) -> Self {
         let (rt, host, _log) = channels(sizes);
         Self {
             rt,
             host,
-            entries,
-            trajectories,
+            entries: VecDeque::new(),
+            trajectories: HashMap::new(),
             now: Inputs::default(),
             cycle: 0,
             record: Box::default(),
             events: Vec::new(),
         }
+    }
+
+    /// Adds what it is to give.
+    pub fn add(
+        &mut self,
+        entries: VecDeque<JournalEntry>,
+        trajectories: HashMap<TrajectoryId, (u8, GivenTrajectory)>,
+    ) {
+        self.entries.extend(entries);
+        self.trajectories.extend(trajectories);
+    }
+
+    /// Goes on with this cycle and these streams.
+    ///
+    /// # Errors
+    /// The streams are none of this controller's.
+    pub fn resume(&mut self, cycle: u64, streams: &[Vec<u8>]) -> Result<(), CheckpointError> {
+        self.rt.resume_streams(streams)?;
+        self.cycle = cycle;
+        Ok(())
+    }
+
+    /// The cycle that comes next, counted from 0.
+    pub const fn next_cycle(&self) -> u64 {
+        self.cycle
+    }
+
+    /// The state of each stream.
+    pub fn streams(&self) -> Vec<Vec<u8>> {
+        self.rt.stream_checkpoints()
+    }
+
+    /// The entries that it has not given yet.
+    pub fn unused(&self) -> impl Iterator<Item = &JournalEntry> {
+        self.entries.iter()
+    }
+
+    /// The trajectories that may still be asked for.
+    pub fn trajectories(&self) -> impl Iterator<Item = (TrajectoryId, u8, &GivenTrajectory)> {
+        self.trajectories.iter().map(|(id, (group, given))| (*id, *group, given))
     }
 
     /// Lays out what the next cycle takes. What the one before has left is gone.
@@ -100,6 +136,13 @@ impl HostInterface for ReplayHost {
     fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
         let (of_group, given) = self.trajectories.get(&trajectory)?;
         (*of_group == group).then(|| given.sample(at_s))
+    }
+
+    /// Numbers rise: what was given before the oldest that is needed will not be asked for again.
+    fn keep_trajectories(&mut self, group: u8, needed: [Option<TrajectoryId>; 2]) {
+        if let Some(oldest) = needed.into_iter().flatten().min_by_key(|id| id.0) {
+            self.trajectories.retain(|id, (of_group, _)| *of_group != group || id.0 >= oldest.0);
+        }
     }
 
     fn take_callback(&mut self, _group: u8, _callback: CallbackId) -> bool {

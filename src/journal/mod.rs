@@ -18,18 +18,20 @@ mod format;
 mod host;
 mod host_words;
 mod port;
+mod rerun;
 
 pub use clock::{ClockAnswer, ClockJournal, JournaledClock, ReplayClock, clock_journal};
-pub use format::{Encoder, Journal, JournalDefect, PortEntry};
+pub use format::{Checkpoint, Encoder, Journal, JournalDefect, PortEntry};
 pub use host::ReplayHost;
-pub use port::ReplayPort;
+pub use port::{PortState, ReplayPort};
+pub use rerun::{Rerun, RerunParts};
 
 use std::collections::VecDeque;
 
 use crate::channels::JournalReader;
 
 /// The first entry of a queue, if it is wanted.
-fn pop_front_if<T>(queue: &mut VecDeque<T>, is_wanted: impl FnOnce(&T) -> bool) -> Option<T> {
+pub fn pop_front_if<T>(queue: &mut VecDeque<T>, is_wanted: impl FnOnce(&T) -> bool) -> Option<T> {
     queue.front().is_some_and(is_wanted).then(|| queue.pop_front()).flatten()
 }
 
@@ -47,7 +49,9 @@ impl RunJournal {
         while let Some(answer) = self.clock.pop() {
             encoder.clock(answer);
         }
-        self.host.take_trajectories().iter().for_each(|given| encoder.trajectory(given));
+        for (id, group, given) in self.host.take_trajectories() {
+            encoder.trajectory(id, group, &given);
+        }
         while let Some(entry) = self.host.take() {
             encoder.host(&entry);
         }

@@ -6,7 +6,7 @@ use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Re
 
 use super::format::PortEntry;
 use super::pop_front_if;
-use crate::link::trace::PortAnswer;
+use crate::link::trace::{PortAnswer, PortMark};
 
 /// A port that answers as it did, found by the time for which it is asked.
 #[derive(Clone, Debug, Default)]
@@ -18,29 +18,59 @@ pub struct ReplayPort {
     states: VecDeque<(Nanoseconds, BusState)>,
     state: BusState,
     now_ns: Nanoseconds,
+    /// When the frames behind the last mark were handed over.
+    handed_over_ns: Nanoseconds,
     /// What has been sent since the last look.
     pub sent: Vec<Frame>,
 }
 
+/// What a port has shown, when a replay begins in the middle of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct PortState {
+    /// The state of the bus.
+    pub state: BusState,
+    /// The time for which the port was last asked for frames.
+    pub now_ns: Nanoseconds,
+}
+
 impl ReplayPort {
-    /// A port with this journal.
-    pub fn new(entries: &[PortEntry]) -> Self {
-        let mut port = Self::default();
-        let mut handed_over_ns = 0;
-        for entry in entries {
-            match *entry {
-                PortEntry::Received(received) => port.received.push_back((handed_over_ns, received)),
-                PortEntry::Mark(mark) => match mark.answer {
-                    PortAnswer::Received => handed_over_ns = mark.at_ns,
-                    PortAnswer::Unconfirmed(count) => {
-                        port.unconfirmed.push_back((mark.at_ns, count as usize))
-                    }
-                    PortAnswer::Taken(count) => port.taken.push_back((mark.at_ns, count as usize)),
-                    PortAnswer::State(state) => port.states.push_back((mark.at_ns, state)),
-                },
-            }
+    /// Adds the next entry of the journal.
+    pub fn add(&mut self, entry: PortEntry) {
+        match entry {
+            PortEntry::Received(received) => self.received.push_back((self.handed_over_ns, received)),
+            PortEntry::Mark(PortMark { at_ns, answer }) => match answer {
+                PortAnswer::Received => self.handed_over_ns = at_ns,
+                PortAnswer::Unconfirmed(count) => self.unconfirmed.push_back((at_ns, count as usize)),
+                PortAnswer::Taken(count) => self.taken.push_back((at_ns, count as usize)),
+                PortAnswer::State(state) => self.states.push_back((at_ns, state)),
+            },
         }
-        port
+    }
+
+    /// What it has shown so far.
+    pub fn shown(&self) -> PortState {
+        PortState { state: self.state, now_ns: self.now_ns }
+    }
+
+    /// Goes on from what a port has shown.
+    pub fn resume(&mut self, PortState { state, now_ns }: PortState) {
+        (self.state, self.now_ns) = (state, now_ns);
+    }
+
+    /// The entries that it has not used yet, as [`ReplayPort::add`] takes them.
+    pub fn unused(&self) -> Vec<PortEntry> {
+        let mark = |at_ns, answer| PortEntry::Mark(PortMark { at_ns, answer });
+        let mut entries = Vec::new();
+        for &(at_ns, received) in &self.received {
+            entries.extend([mark(at_ns, PortAnswer::Received), PortEntry::Received(received)]);
+        }
+        entries.extend(
+            self.unconfirmed.iter().map(|&(at_ns, count)| mark(at_ns, PortAnswer::Unconfirmed(count as u64))),
+        );
+        entries.extend(self.taken.iter().map(|&(at_ns, count)| mark(at_ns, PortAnswer::Taken(count as u64))));
+        entries.extend(self.states.iter().map(|&(at_ns, state)| mark(at_ns, PortAnswer::State(state))));
+        entries.push(mark(self.handed_over_ns, PortAnswer::Received));
+        entries
     }
 }
 

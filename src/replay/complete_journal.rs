@@ -29,7 +29,7 @@ pub fn complete_journal(path: &str, found: RecordedJournal) -> Result<Journal, S
     }
     match (found.journal, found.lost) {
         (None, _) => Err(format!(
-            "{path}: this has no journal: only recordings of `takt run` have one, not black boxes, and not those of takt 0.1"
+            "{path}: this has no journal: recordings and black boxes of `takt run` have one, and those of a replay have none"
         )),
         (_, Some(lost)) if lost > 0 => Err(format!(
             "{path}: {lost} entries of the journal were lost, because the logger was late: it cannot be replayed"

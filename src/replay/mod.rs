@@ -9,12 +9,11 @@ mod complete_journal;
 mod report;
 mod settings;
 
-use takt_rt::{CycleRecord, Event, Flow, Grid};
+use takt_rt::{CheckpointError, CycleRecord, Event};
 
-use crate::channels::ChannelSizes;
 use crate::config::Config;
 use crate::controller::assemble::{self, AssembleError};
-use crate::journal::{Journal, ReplayClock, ReplayHost, ReplayPort};
+use crate::journal::{Journal, Rerun};
 
 pub use comparison::{AxisDifference, Comparison, FirstDifference, compare};
 pub use complete_journal::complete_journal;
@@ -22,14 +21,7 @@ pub use report::ComparisonReport;
 pub use settings::{Setting, SettingError, apply};
 
 /// The run again, cycle by cycle.
-pub struct Replay {
-    engine: Box<takt_rt::Engine>,
-    cycle: takt_rt::Cycle,
-    clock: ReplayClock,
-    ports: Vec<ReplayPort>,
-    host: ReplayHost,
-    is_over: bool,
-}
+pub struct Replay(Rerun);
 
 /// Why there is nothing to be replayed.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +33,9 @@ pub enum ReplayError {
     /// The run ended before its first cycle.
     #[error("the run ended before its first cycle")]
     NoCycle,
+    /// The journal begins in the middle of a run, with a state that the engine of this configuration cannot take over.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }
 
 impl Replay {
@@ -49,35 +44,25 @@ impl Replay {
     /// # Errors
     /// See [`ReplayError`].
     pub fn new(config: &Config, journal: Journal) -> Result<Self, ReplayError> {
-        let engine = assemble::engine(config)?;
-        let grid = journal.epoch_ns.and_then(|epoch_ns| Grid::new(epoch_ns, config.cycle.period_ns));
-        let mut ports: Vec<ReplayPort> =
-            journal.ports.iter().map(|entries| ReplayPort::new(entries)).collect();
-        ports.resize_with(config.buses.len(), ReplayPort::default);
-        Ok(Self {
-            engine,
-            cycle: takt_rt::Cycle::new(grid.ok_or(ReplayError::NoCycle)?, assemble::slot_plan(config)),
-            clock: ReplayClock::new(journal.clock),
-            ports,
-            host: ReplayHost::new(&ChannelSizes::of(config), journal.host, journal.trajectories),
-            is_over: false,
-        })
+        let mut rerun = Rerun::new(assemble::rerun_parts(config)?);
+        let mut journal = Some(journal);
+        assemble::on_a_large_stack(|| journal.take().map_or(Ok(()), |journal| rerun.add(journal)))?;
+        if rerun.has_begun() { Ok(Self(rerun)) } else { Err(ReplayError::NoCycle) }
     }
 
     /// Runs the next cycle. Returns its record; nothing after the last one.
     pub fn step(&mut self) -> Option<&CycleRecord> {
-        if self.is_over || !self.clock.has_cycle() {
-            return None;
-        }
-        self.host.begin_cycle();
-        let flow = self.cycle.run(&mut self.engine, &mut self.clock, &mut self.ports, &mut self.host);
-        self.clock.end_cycle();
-        self.is_over = flow == Flow::Shutdown;
-        Some(&self.host.record)
+        self.0.step()
     }
 
     /// The events of the last cycle.
     pub fn take_events(&mut self) -> Vec<Event> {
-        std::mem::take(&mut self.host.events)
+        self.0.take_events()
+    }
+
+    /// A block of a journal that goes on from here.
+    #[cfg(feature = "internals")]
+    pub fn checkpoint(&self) -> Option<Vec<u8>> {
+        self.0.checkpoint()
     }
 }

@@ -1,4 +1,4 @@
-//! The black box: the last seconds of cycles, events, frames and bus health. They are always in memory. At every incident
+//! The black box: the last seconds of cycles, events, frames, bus health, and of the journal. They are always in memory. At every incident
 //! they are written to a file of their own, together with the half second that follows.
 //!
 //! One fault often leads to others. An incident within that half second goes into the same file. A run leaves at most
@@ -19,10 +19,13 @@ use super::announce;
 use super::destination::{OpenError, Opened, RecordingDestination};
 use super::files_in_memory::FilesInMemory;
 use super::history::{Entry, History, OnBus};
+use super::journal_history::JournalHistory;
 use super::machine::Machine;
 use super::recording::Recording;
 use super::wall_clock::WallClock;
 use super::words;
+use crate::config::ConfigSources;
+use crate::journal::RerunParts;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
 /// The most files that a run leaves.
@@ -146,6 +149,18 @@ struct OpenFile {
     recording: Recording,
     until_ns: Nanoseconds,
     latest_ns: Nanoseconds,
+    stage: Stage,
+}
+
+/// How far a file is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// Everything is written.
+    Open,
+    /// Its last cycle is written. The journal of that cycle is still on its way.
+    LastCycleWritten,
+    /// The next block of the journal is the last one that the file needs.
+    AwaitsLastBlock,
 }
 
 /// Where the files are.
@@ -168,6 +183,9 @@ impl Place {
 /// The black box.
 pub struct BlackBox {
     history: History,
+    journal: Option<JournalHistory>,
+    /// Entries of the journal that were lost. The file says so, and cannot be replayed.
+    journal_lost: u64,
     place: Place,
     is_compressed: bool,
     wall_clock: WallClock,
@@ -222,6 +240,8 @@ impl BlackBox {
     ) -> Self {
         Self {
             history: History::new(span_ns, machine.cycle_ns, machine.axes.len(), machine.buses.len()),
+            journal: None,
+            journal_lost: 0,
             place,
             is_compressed,
             wall_clock,
@@ -236,12 +256,43 @@ impl BlackBox {
         }
     }
 
+    /// Also keeps the journal, so that its files can be replayed.
+    pub fn keep_journal(&mut self, parts: RerunParts, sources: &ConfigSources) {
+        self.journal = Some(JournalHistory::new(self.history.span_ns(), parts, sources));
+    }
+
+    /// Adds what the journal has gained since the last call, and how many of its entries were lost until now.
+    pub fn journal(&mut self, block: Option<Vec<u8>>, lost: u64) {
+        let Some(journal) = &mut self.journal else { return };
+        self.journal_lost = lost;
+        if let Some(block) = block {
+            if let Some(open) = &mut self.open
+                && let Err(error) = open.recording.journal(&block)
+            {
+                return self.end_file(&error);
+            }
+            let (_, newest_cycle_ns) = self.history.last_slot().unwrap_or_default();
+            journal.add(newest_cycle_ns, block);
+        }
+        if let Some(open) = &mut self.open {
+            match open.stage {
+                Stage::Open => {}
+                Stage::LastCycleWritten => open.stage = Stage::AwaitsLastBlock,
+                Stage::AwaitsLastBlock => self.close(),
+            }
+        }
+    }
+
     /// Adds a cycle.
     pub fn cycle(&mut self, record: &CycleRecord) {
         self.history.cycle(record);
         let now_ns = record.timing.slot_start_ns;
-        if self.open.as_ref().is_some_and(|open| now_ns > open.until_ns) {
-            self.close();
+        match &mut self.open {
+            Some(open) if open.stage == Stage::Open && now_ns > open.until_ns => match self.journal {
+                Some(_) => open.stage = Stage::LastCycleWritten,
+                None => self.close(),
+            },
+            _ => {}
         }
         self.write(|recording| recording.cycle(record));
     }
@@ -286,6 +337,9 @@ impl BlackBox {
     /// Writes the history to a new file, or adds the incident to the file that is open.
     pub fn incident(&mut self, incident: &Incident, machine: &Machine) {
         let (slot, at_ns) = self.history.last_slot().unwrap_or((0, self.started_ns));
+        if self.open.as_ref().is_some_and(|open| open.stage != Stage::Open) {
+            self.close();
+        }
         if let Some(open) = &mut self.open {
             open.until_ns = (at_ns + AFTER_NS).min(open.latest_ns);
             let metadata = incident.metadata(machine, slot);
@@ -309,7 +363,11 @@ impl BlackBox {
             |mut recording| {
                 recording.add_frames(machine)?;
                 recording.metadata(METADATA, incident.metadata(machine, slot))?;
+                self.journal.as_ref().map_or(Ok(()), |journal| journal.begin(&mut recording))?;
                 write_history(&self.history, &mut recording, machine)?;
+                self.journal.as_ref().map_or(Ok(()), |journal| journal.write(&mut recording))?;
+                // From now on, the history before the incident is in the file.
+                recording.end_chunk()?;
                 Ok(recording)
             },
         );
@@ -320,6 +378,7 @@ impl BlackBox {
                     recording,
                     until_ns: at_ns + AFTER_NS,
                     latest_ns: at_ns + LONGEST_AFTER_NS,
+                    stage: Stage::Open,
                 });
             }
             Err(error) => {
@@ -332,7 +391,8 @@ impl BlackBox {
     pub fn close(&mut self) {
         let Some(OpenFile { recording, .. }) = self.open.take() else { return };
         let label = recording.label.clone();
-        match recording.finish() {
+        let lost = self.journal.as_ref().map(|_| self.journal_lost);
+        match recording.finish_with(lost) {
             Ok(()) => announce::closed("black box", &label),
             Err(error) => {
                 self.fail(format!("the black box is incomplete: cannot write {label}: {}", reason(&error)))
@@ -356,12 +416,16 @@ impl BlackBox {
     }
 
     fn write(&mut self, write: impl FnOnce(&mut Recording) -> McapResult<()>) {
-        let Some(open) = &mut self.open else { return };
+        let Some(open) = self.open.as_mut().filter(|open| open.stage == Stage::Open) else { return };
         if let Err(error) = write(&mut open.recording) {
-            let label = open.recording.label.clone();
-            self.open = None;
-            self.fail(format!("the black box ends here: cannot write {label}: {}", reason(&error)));
+            self.end_file(&error);
         }
+    }
+
+    /// Gives up the file that is open, which cannot be written any more.
+    fn end_file(&mut self, error: &McapError) {
+        let Some(OpenFile { recording, .. }) = self.open.take() else { return };
+        self.fail(format!("the black box ends here: cannot write {}: {}", recording.label, reason(error)));
     }
 
     fn fail(&mut self, message: String) {
@@ -377,9 +441,7 @@ fn write_history(history: &History, recording: &mut Recording, machine: &Machine
         Entry::Event(event) => recording.event(event, &words::event(event, machine)),
         Entry::Frame(frame) => recording.frame(&frame),
         Entry::Health(health) => recording.health(health),
-    })?;
-    // From now on, the history before the incident is in the file.
-    recording.end_chunk()
+    })
 }
 
 /// The reason of an error of the MCAP writer, without its prefix.

@@ -81,6 +81,11 @@ impl History {
         }
     }
 
+    /// The time span that it keeps.
+    pub const fn span_ns(&self) -> Nanoseconds {
+        self.span_ns
+    }
+
     /// Adds a cycle, and removes the entries that are older than the time span.
     pub fn cycle(&mut self, record: &CycleRecord) {
         let oldest_ns = record.timing.slot_start_ns.saturating_sub(self.span_ns);

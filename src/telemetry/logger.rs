@@ -24,7 +24,7 @@ use super::wall_clock::WallClock;
 use super::words;
 use crate::channels::LogSide;
 use crate::config::ConfigSources;
-use crate::journal::RunJournal;
+use crate::journal::{RerunParts, RunJournal};
 use crate::link::trace::{Trace, Traced, TracedHealth};
 use crate::printable::printable_path;
 
@@ -188,17 +188,23 @@ impl Logger {
         Self { black_box: Some(black_box), ..self }
     }
 
-    /// Also writes the journal of the run into the recording, if there is one, and the files of its configuration.
+    /// Also writes the journal of the run, and the files of its configuration, into the recording, if there is one; and into the files of
+    /// the black box, if there is one and `again` runs the engine once more for it.
     #[must_use]
-    pub(crate) fn with_journal(mut self, journal: Option<RunJournal>, sources: &ConfigSources) -> Self {
-        let written = match &mut self.recording {
-            None => return self,
-            Some(recording) => recording.begin_journal(sources),
-        };
-        match written {
-            Ok(()) => self.journal = journal.map(JournalKeeper::new),
-            Err(error) => self.end_recording(&error),
+    pub(crate) fn with_journal(
+        mut self,
+        journal: Option<RunJournal>,
+        again: Option<RerunParts>,
+        sources: &ConfigSources,
+    ) -> Self {
+        let begun = self.recording.as_mut().map(|recording| recording.begin_journal(sources));
+        if let Some(Err(error)) = begun {
+            self.end_recording(&error);
         }
+        if let (Some(black_box), Some(again)) = (&mut self.black_box, again) {
+            black_box.keep_journal(again, sources);
+        }
+        self.journal = journal.map(JournalKeeper::new);
         self
     }
 
@@ -361,11 +367,23 @@ impl Logger {
     }
 
     fn drain_journal(&mut self) {
-        let (Some(journal), Some(recording)) = (&mut self.journal, &mut self.recording) else { return };
-        let Some(block) = journal.drain() else { return };
-        if let Err(error) = recording.journal(&block) {
+        let Some(journal) = &mut self.journal else { return };
+        let block = journal.drain();
+        let written =
+            self.recording.as_mut().zip(block.as_ref()).map(|(recording, block)| recording.journal(block));
+        if let Some(Err(error)) = written {
             self.end_recording(&error);
         }
+        let lost = self.journal_lost().unwrap_or(0);
+        if let Some(black_box) = &mut self.black_box {
+            black_box.journal(block, lost);
+        }
+    }
+
+    /// Entries of the journal that found no room; `None` without a journal.
+    fn journal_lost(&self) -> Option<u64> {
+        let frames = || self.traces.iter().map(Trace::dropped).sum::<u64>();
+        self.journal.as_ref().map(|journal| journal.dropped() + frames())
     }
 
     /// Processes the rest and closes the files.
@@ -374,11 +392,7 @@ impl Logger {
         if let Some(recording) = self.recording.take() {
             let label = recording.label().to_owned();
             self.recorded = (recording.files().to_vec(), recording.removed());
-            let lost = self
-                .journal
-                .as_ref()
-                .map(|journal| journal.dropped() + self.traces.iter().map(Trace::dropped).sum::<u64>());
-            match recording.finish_with(lost) {
+            match recording.finish_with(self.journal_lost()) {
                 Ok(()) => announce::closed("recording", &label),
                 Err(error) => self.report_failure(format!(
                     "the recording is incomplete: cannot write {label}: {}",

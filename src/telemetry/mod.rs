@@ -19,6 +19,7 @@ mod compression;
 mod destination;
 mod files_in_memory;
 mod history;
+mod journal_history;
 mod journal_keeper;
 mod listener;
 mod logger;

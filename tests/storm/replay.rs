@@ -1,5 +1,6 @@
 //! Storms again: the engine on the journal of a storm does what it did, bit for bit.
 
+use takt::internals::journal::Journal;
 use takt::internals::replay::Replay;
 
 use crate::case::Case;
@@ -9,27 +10,43 @@ use crate::run::record;
 /// Storms of each kind.
 const CASES: u64 = 125;
 
-/// Plays storms, replays each of them, and compares every record.
+/// Plays storms, replays each of them, and compares every record. A second replay begins in some cycle with the state of the first.
 fn replay_all(kind: &str, case: impl Fn(u64) -> Case) {
     let first = crate::number("TAKT_STORM_FIRST").unwrap_or(2_000_000);
     for seed in first..first + crate::number("TAKT_STORM_CASES").unwrap_or(CASES) {
         let case = case(seed);
         let (journal, records) = record(&case).unwrap_or_else(|wrong| panic!("seed {seed}, {kind}: {wrong}"));
         let mut replay = Replay::new(&case.config, journal).unwrap();
+        let mut resumed = None;
+        let resumes_in = (seed.wrapping_mul(7919) % records.len().max(1) as u64) as usize;
         for (cycle, recorded) in records.iter().enumerate() {
-            let replayed =
-                replay.step().unwrap_or_else(|| panic!("seed {seed}, {kind}: it ends in cycle {cycle}"));
-            assert!(
-                is_same(recorded, replayed),
-                "seed {seed}, {kind}, cycle {cycle}:\n{recorded:?}\n{replayed:?}"
-            );
+            if cycle == resumes_in {
+                resumed = Some(resume(&case, &replay));
+            }
+            for replay in [Some(&mut replay), resumed.as_mut()].into_iter().flatten() {
+                let replayed =
+                    replay.step().unwrap_or_else(|| panic!("seed {seed}, {kind}: it ends in cycle {cycle}"));
+                assert!(
+                    is_same(recorded, replayed),
+                    "seed {seed}, {kind}, cycle {cycle}, resumed in {resumes_in}:\n{recorded:?}\n{replayed:?}"
+                );
+            }
         }
         assert!(
-            records.len() > 10 && replay.step().is_none(),
+            records.len() > 10
+                && replay.step().is_none()
+                && resumed.is_some_and(|mut replay| replay.step().is_none()),
             "seed {seed}, {kind}: {} cycles",
             records.len()
         );
     }
+}
+
+/// A replay that begins with the state of another one, as that of a black box does.
+fn resume(case: &Case, replay: &Replay) -> Replay {
+    let mut journal = Journal::default();
+    journal.add_block(&replay.checkpoint().unwrap()).unwrap();
+    Replay::new(&case.config, journal).unwrap()
 }
 
 /// Whether they are the same in every bit: their texts say everything, and NaN is NaN. Texts are slow.

@@ -5,6 +5,7 @@ use crate::cia402::controlword;
 
 /// The controlwords that an axis has sent. Cycles are those of its bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct ControlwordSender {
     /// The last controlword without the bits of its mode of operation: bits 0 to 3 and 7.
     last: u16,

@@ -12,6 +12,7 @@ const LENGTH: usize = 64;
 
 /// The last set-points of an axis, of which one so many cycles old is due.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct SetPointDelay {
     line: [State; LENGTH],
     newest: usize,

@@ -7,6 +7,7 @@ const EMERGENCY_GRACE_CYCLES: u8 = 3;
 
 /// What a drive has reported of its state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct DriveReport {
     state: DriveState,
     /// Statuswords in a row that do not show operation enabled, after one that did.

@@ -15,6 +15,7 @@ use crate::pdo::{
     clippy::large_enum_variant,
     reason = "there is no allocator, and a drive of either kind needs all of it"
 )]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Exchange {
     /// The PDOs of a CANopen drive.
     Pdos(Pdos),
@@ -34,6 +35,7 @@ pub enum Exchange {
 
 /// The PDOs of a drive.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Pdos {
     /// What is sent, in order.
     pub commands: ArrayVec<CommandPdo, MAX_PDOS>,
@@ -145,6 +147,7 @@ impl core::fmt::Display for NoFeedback {
 
 /// A PDO: its frames and its compiled mapping.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Pdo {
     /// The identifier.
     pub id: Id,
@@ -158,6 +161,7 @@ pub struct Pdo {
 
 /// A byte of a frame that says which drive has sent it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct SenderByte {
     /// Its place in the payload, from 0.
     pub at: u8,
@@ -180,6 +184,7 @@ impl Pdo {
 
 /// A PDO that is sent to the drive.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct CommandPdo {
     /// What.
     pub pdo: Pdo,

@@ -11,6 +11,7 @@ use crate::watch::NodeFault;
 
 /// A report of a joint where it cannot have got to.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Jump {
     /// How far that is from its last plausible position: rad (m).
     pub distance: f64,

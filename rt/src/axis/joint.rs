@@ -8,6 +8,7 @@ use crate::units::Scale;
 
 /// How the position of the joint is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 enum Source {
     /// It is not known.
     #[default]
@@ -20,6 +21,7 @@ enum Source {
 
 /// The estimate of a joint's position and velocity. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct JointEstimate {
     check: PlausibilityCheck,
     source: Source,

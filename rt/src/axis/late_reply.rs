@@ -8,6 +8,7 @@ const LATEST_CYCLES: u16 = 50;
 
 /// Counts a drive's replies against the requests, SYNCs or set-points, that they belong to. Cycles are those of its bus.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct LateReplyDetector {
     unanswered: u16,
     /// Cycles since the request that was skipped, while its silence is waited for.
@@ -75,6 +76,7 @@ impl LateReplyDetector {
 
 /// Whether a set-point is skipped, for a drive that answers set-points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum SetPointSkip {
     /// No set-point is.
     #[default]

@@ -83,6 +83,7 @@ const AT_REST: f64 = 0.02;
 
 /// An axis at run time.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Axis {
     parameters: AxisParameters,
     /// The numbers that are sent, and those that were received.
@@ -181,6 +182,15 @@ impl Axis {
     /// Takes over the period of the axis' bus.
     pub fn set_cycle(&mut self, cycle_s: f64) {
         self.reception.set_cycle(cycle_s, self.parameters.exchange.report_cycles());
+    }
+
+    /// Goes on with the parameters of another one of the same joint, but for the process data and the units: bring-up has told them.
+    #[cfg(feature = "checkpoint")]
+    pub(crate) fn take_parameters_of(&mut self, other: &Self) {
+        let AxisParameters { exchange, scale, law, mode_changes, .. } = self.parameters.clone();
+        self.parameters = AxisParameters { exchange, scale, law, mode_changes, ..other.parameters.clone() };
+        self.take_laws_of(other);
+        self.following.take_limit_of(&other.following);
     }
 
     /// Uses the rated torque that the drive has reported (N·m, or N). Nonsense changes nothing.

@@ -19,6 +19,7 @@ use crate::pdo::CommandSlot;
 
 /// Whether the drive is in the mode of the axis' law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum Mode {
     /// It is, or what it shows is a fault.
     #[default]
@@ -37,6 +38,18 @@ impl Axis {
     pub fn law_for(&self, mode: OperationMode) -> Option<&ControlLaw> {
         let laws = core::iter::once(&self.parameters.law).chain(&self.parameters.mode_changes.laws);
         laws.into_iter().find(|law| law.operation_mode() == mode)
+    }
+
+    /// Closes the loops of each mode as another axis does. The mode stays.
+    #[cfg(feature = "checkpoint")]
+    pub(super) fn take_laws_of(&mut self, other: &Self) {
+        let take = |law: &mut ControlLaw| *law = *other.law_for(law.operation_mode()).unwrap_or(law);
+        take(&mut self.parameters.law);
+        self.parameters.mode_changes.laws.iter_mut().for_each(take);
+        self.parameters.mode_changes.timeout_cycles = other.parameters.mode_changes.timeout_cycles;
+        if let Mode::Changing { to, .. } = &mut self.mode {
+            take(to);
+        }
     }
 
     /// Whether the process data of the drive carry a number to it.

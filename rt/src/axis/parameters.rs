@@ -14,6 +14,7 @@ use crate::units::Scale;
 /// Since when feedback must have arrived to be that of the present cycle. PDOs carry no number: the time of their arrival
 /// is what tells an answer of this cycle from one that is late.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum FeedbackSince {
     /// The cycle's SYNC, which the drive answers.
     #[default]
@@ -27,6 +28,7 @@ pub enum FeedbackSince {
 
 /// What a source may ask of an axis whose torque is made here. rad and N·m, or m and N.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct TorqueLimits {
     /// The highest stiffness of an impedance: N·m/rad.
     pub stiffness: f64,
@@ -43,6 +45,7 @@ impl TorqueLimits {
 
 /// What is sent to a drive beside its target, where its process data have room for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum FeedForward {
     /// Nothing: zero is sent.
     #[default]
@@ -70,6 +73,7 @@ impl FeedForward {
 
 /// When a drive takes another mode of operation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum ModeCondition {
     /// Only while it has no torque: the axis must be disabled before, and enabled again after that.
     #[default]
@@ -81,6 +85,7 @@ pub enum ModeCondition {
 /// The modes that an axis may be changed to at run time, beside the one that it starts in. Its process data must carry object
 /// 6060, the target of each mode, and object 6061.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ModeChanges {
     /// How it is commanded in each of them: cyclic synchronous modes, each once.
     pub laws: ArrayVec<ControlLaw, { Self::MOST }>,
@@ -113,6 +118,7 @@ impl ModeChanges {
 
 /// How it is seen that the node of an axis lives, beside its feedback (CiA 301, 7.2.8).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Supervision {
     /// Its feedback alone shows it.
     #[default]
@@ -152,6 +158,7 @@ impl Supervision {
 
 /// Everything about an axis that does not change while it runs.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct AxisParameters {
     /// The bus, an index into the engine's buses.
     pub bus: u8,

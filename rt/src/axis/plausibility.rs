@@ -40,6 +40,7 @@ pub(super) enum Plausibility {
 /// Accepts a position that the joint can have reached since its last plausible position. Another position is accepted when
 /// the next report agrees with it: a corrupted frame does not agree with the next one, an encoder that has jumped does.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct PlausibilityCheck {
     accepted: Option<f64>,
     /// Seconds since the accepted position was reported.

@@ -3,6 +3,7 @@
 /// The permission of a drive to reach and to keep operation enabled. It is decided here, from what the drive reports; the
 /// module documentation of [`crate::axis`] has the table of states and events.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum Power {
     /// The drive is not to be enabled.
     #[default]

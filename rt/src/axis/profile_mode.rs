@@ -19,6 +19,7 @@ const VELOCITY_OVERSHOOT: f64 = 1.2;
 
 /// A target, and when it expires.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct TimedTarget {
     target: ProfileTarget,
     valid_until_ns: Nanoseconds,
@@ -26,6 +27,7 @@ struct TimedTarget {
 
 /// The target of a drive in a profile mode, and what becomes of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct ProfileMode {
     command: ProfileCommand,
     /// What `command` stands for; `None` before the first target since the drive was enabled.

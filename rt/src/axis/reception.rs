@@ -8,6 +8,7 @@ const USUAL_SPAN: f64 = 1.5;
 
 /// The feedback PDOs of an axis as they arrive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Reception {
     /// What arrived before this is no feedback of the present cycle.
     expected_since_ns: Nanoseconds,

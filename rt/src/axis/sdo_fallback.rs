@@ -30,6 +30,7 @@ struct Address {
 
 /// The controlword that a drive is to have by SDO.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum SdoFallback {
     /// Process data serve.
     #[default]

@@ -23,6 +23,7 @@ const STEP_ROUNDING: f64 = 2e-6;
 
 /// The set-points of an axis, on their way from the source to the drive.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct SetPoints {
     /// Of this cycle, the last, and the one before.
     newest: [State; 3],

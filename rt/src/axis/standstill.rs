@@ -16,6 +16,7 @@ const PLACE: f64 = AT_REST / 6.0;
 
 /// The place where a joint has been reported lately.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Standstill {
     /// The lowest and the highest position there: rad (m). `None` before the first report.
     place: Option<(f64, f64)>,

@@ -7,6 +7,7 @@ use crate::control::{ControlLaw, LoopInput, TorqueDemand};
 /// A change of the demand takes effect at a limited rate: what the new one leaves out or adds goes into an offset, which fades.
 /// What the loop makes of the motion of the joint is not held up by that.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct TorqueLoop {
     demand: TorqueDemand,
     /// The demand of the last command.

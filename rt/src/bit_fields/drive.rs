@@ -10,6 +10,7 @@ use crate::frame::Frame;
 
 /// What is known of a drive that is spoken to by bit fields.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct FieldDriveParameters {
     /// The command of a cycle.
     pub command: FieldFrame<CommandValue>,
@@ -34,6 +35,7 @@ pub const MAX_SETUP_FRAMES: usize = 8;
 
 /// The frames that set a drive up which forgets that with its power, and the length by which its replies show that it has.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct SetUpAgain {
     /// The length in bytes of a reply of the drive before it is set up.
     pub reply_bytes: usize,
@@ -43,6 +45,7 @@ pub struct SetUpAgain {
 
 /// What the fields for velocity and torque are, where the drive follows a position, and that for torque, where it follows a velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum BesideTarget {
     /// What is fed forward.
     #[default]
@@ -70,6 +73,7 @@ impl BesideTarget {
 
 /// The gains that a command carries to the position loop of a drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum FieldGains {
     /// Always these, in the unit of their fields.
     Fixed {
@@ -91,6 +95,7 @@ impl Default for FieldGains {
 
 /// What the position of a command is counted from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum PositionReference {
     /// The drive's zero.
     #[default]
@@ -127,6 +132,7 @@ pub enum RunningMode {
 
 /// A drive that is spoken to by bit fields, as its replies show it. What does not change of it is passed in: always the same.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct FieldDrive {
     life: Life,
     reply: ReplyValues,
@@ -139,6 +145,7 @@ pub struct FieldDrive {
 
 /// The ways (rad, m) that a drive has been commanded which counts from where it is. Each one that is commanded twice is gone twice.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct Ways {
     /// That of the last command, until it is answered.
     last: f64,
@@ -156,6 +163,7 @@ impl Ways {
 
 /// A position beyond the range in which it is reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct ExtendedPosition {
     reported: f64,
     laps: i32,

@@ -8,6 +8,7 @@ use core::marker::PhantomData;
 
 /// A command to a drive or a reply of one: identifier, kind of frame and layout.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct FieldFrame<V> {
     id: Id,
     format: FrameFormat,
@@ -19,6 +20,7 @@ pub struct FieldFrame<V> {
 
 /// The codes of [`ReplyValue::State`]. Every other one is an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct StateCodes {
     /// The drive has no torque.
     pub stopped: u8,

@@ -62,6 +62,7 @@ impl FieldBits {
 
 /// The order of the bytes of all fields of a frame, by which their bits are counted, too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum ByteOrder {
     /// The most significant byte comes first. Bit 0 is the highest bit of byte 0, and a field begins with its highest bit.
     BigEndian,
@@ -71,6 +72,7 @@ pub enum ByteOrder {
 
 /// What kind of number a field is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Number {
     /// An integer without a sign.
     Unsigned,
@@ -202,6 +204,7 @@ impl fmt::Display for LayoutError {
 
 /// Neighbouring bits, compiled: `mask` bits of the payload from bit `shift`, which are the bits of the code from bit `above`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct Part {
     shift: u8,
     above: u8,
@@ -210,6 +213,7 @@ struct Part {
 
 /// A field, compiled.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct Field {
     slot: u8,
     width: u8,
@@ -223,6 +227,7 @@ struct Field {
 
 /// The compiled layout of a frame.
 #[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct FrameLayout {
     fields: ArrayVec<Field, MAX_FIELDS>,
     bytes: u8,

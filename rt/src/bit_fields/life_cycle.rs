@@ -23,6 +23,7 @@ use crate::frame::{Frame, Id};
 
 /// How a drive is told to start, to stop, and so on.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum LifeCycle {
     /// By the fields `Run`, `Mode` and `Zero` of its command.
     ByFields {
@@ -35,6 +36,7 @@ pub enum LifeCycle {
 
 /// The codes of the modes in the field `Mode` of a command.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ModeCodes {
     /// Torque.
     pub torque: u8,
@@ -68,6 +70,7 @@ impl ModeCodes {
 
 /// A frame that is always the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct OwnFrame {
     /// The identifier.
     pub id: Id,
@@ -77,6 +80,7 @@ pub struct OwnFrame {
 
 /// The frames of [`LifeCycle::ByFrames`]. A drive without one of the optional ones has no such function, or needs no frame for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct OwnFrames {
     /// The drive gets torque, and follows the last command.
     pub start: OwnFrame,
@@ -96,6 +100,7 @@ pub struct OwnFrames {
 
 /// What a running drive follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum FieldMode {
     /// The torque.
     Torque,
@@ -120,6 +125,7 @@ pub enum LifeWish {
 
 /// What is told to a drive once, without torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Setting {
     /// The present position becomes zero.
     Zero,
@@ -129,6 +135,7 @@ pub enum Setting {
 
 /// How far a drive is. The module documentation has the table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum LifeState {
     /// It is told to stop: whether it has torque is not known.
     #[default]
@@ -169,6 +176,7 @@ pub enum LifeStep {
 
 /// The life of one drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Life {
     state: LifeState,
     /// Replies in a row that do not show torque, while it is told to stop.

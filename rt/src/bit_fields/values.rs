@@ -2,6 +2,7 @@
 
 /// What a field of a command carries. Values are in SI units at the joint; a mode is a code of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum CommandValue {
     /// rad (m)
@@ -26,6 +27,7 @@ pub enum CommandValue {
 
 /// What a field of a reply carries. Values are in SI units at the joint; states are codes of the drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub enum ReplyValue {
     /// rad (m)
@@ -101,6 +103,7 @@ impl CommandValues {
 
 /// What a drive has replied last. Everything is zero at first.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ReplyValues(pub(super) [f64; SLOTS]);
 
 impl ReplyValues {

@@ -9,6 +9,7 @@ use crate::bit_set::BitSet;
 
 /// The buses that are behind, and for how long.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Backlog<const BUSES: usize> {
     /// The buses on which own frames of an earlier cycle wait for the wire.
     behind: BitSet,
@@ -23,6 +24,7 @@ pub(super) struct Backlog<const BUSES: usize> {
 
 /// One bus, in slots in a row.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct BusBacklog {
     /// It was behind.
     behind_cycles: u32,

@@ -85,7 +85,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.shared.deadline = deadline;
         if self.may_leave(bus, deadline, Purpose::Operate) {
             for group in &mut self.groups {
-                let Some(axes) = self.axes.get_mut(group.places.clone()) else { continue };
+                let Some(axes) = self.axes.get_mut(group.places.range()) else { continue };
                 group.encode_set_points(bus, axes, &mut self.shared, batch);
             }
             self.encode_heartbeat_and_time(bus, batch);
@@ -160,7 +160,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         self.unsent.clear(bus);
         let mut shared_frames = SharedFrames::default();
         for place in shared.places_on(bus).iter() {
-            let own_place = place.checked_sub(self.places.start);
+            let own_place = place.checked_sub(self.places.first);
             let Some(axis) = own_place.and_then(|place| axes.get_mut(place)) else { continue };
             let is_faulted = axis.drive_state().is_faulted();
             let reset_word = if is_faulted { self.fault_reset_word() } else { None };

@@ -23,6 +23,7 @@ use crate::stop_category::StopCategory;
 
 /// A trajectory that the group is on.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Execution<const AXES: usize> {
     /// The request that began the motion.
     pub(super) motion: RequestId,
@@ -38,6 +39,7 @@ pub(super) struct Execution<const AXES: usize> {
 
 /// What takes the place of a trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Successor {
     trajectory: TrajectoryId,
     /// The motion that goes on with it: the present one, or one of its own.

@@ -1,7 +1,5 @@
 //! A group: axes that start, move, stop and fault together, with what only they have to do with.
 
-use core::ops::Range;
-
 use arrayvec::ArrayVec;
 
 use super::shared::Shared;
@@ -12,6 +10,7 @@ use crate::bit_set::BitSet;
 use crate::group_trajectory::{GroupTrajectory, ProfileStore};
 use crate::host::GroupSnapshot;
 use crate::motion_reports::MotionState;
+use crate::places::Places;
 use crate::record::{Event, EventKind, GroupRecord, MAX_GROUPS, RecordedStop};
 use crate::source::StreamSample;
 use crate::stop::StopReason;
@@ -19,13 +18,14 @@ use crate::time::Nanoseconds;
 
 /// What belongs to one group.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// Its number.
     pub(super) number: u8,
     /// The groups that stop this one, too, when they stop, by their numbers.
     pub(super) stops_with: ArrayVec<u8, MAX_GROUPS>,
     /// Where its axes stand among those of the engine, which has them beside each other.
-    pub(super) places: Range<usize>,
+    pub(super) places: Places,
     /// The buses that concern it.
     pub(super) buses: BitSet,
     /// Those of them on which set-points are sent in the cycle.
@@ -57,6 +57,7 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
 
 /// What becomes of the commands of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum Commands {
     /// There are none: the group is passive, or every one of its buses is behind.
     None,
@@ -66,11 +67,11 @@ pub(super) enum Commands {
 
 impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// A passive group.
-    pub(super) fn new(number: u8, places: Range<usize>, buses: BitSet) -> Self {
+    pub(super) fn new(number: u8, places: Places, buses: BitSet) -> Self {
         Self {
             number,
             stops_with: ArrayVec::new(),
-            motion: GroupTrajectory::new(places.clone()),
+            motion: GroupTrajectory::new(places),
             places,
             buses,
             set_point_buses: buses,

@@ -20,6 +20,7 @@ const TOGGLE: u8 = 0x80;
 
 /// What a node has said to the requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 enum Exchange {
     /// It has not been asked since it started, or since guarding began.
     #[default]
@@ -32,6 +33,7 @@ enum Exchange {
 
 /// One node that is asked.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct NodeGuard {
     bus: u8,
     node: u8,
@@ -45,6 +47,7 @@ struct NodeGuard {
 
 /// The nodes that are asked, each once, however many axes it has.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct NodeGuards<const AXES: usize> {
     nodes: ArrayVec<NodeGuard, AXES>,
     is_begun: bool,

@@ -15,6 +15,7 @@ const NMT_OPERATIONAL: u8 = 5;
 
 /// Produces the heartbeat.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct HeartbeatProducer<const BUSES: usize> {
     heartbeat: Heartbeat,
     /// Cycles for which it waits after an absence.
@@ -25,6 +26,7 @@ pub(super) struct HeartbeatProducer<const BUSES: usize> {
 
 /// The heartbeat on one bus.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct BusHeartbeat {
     /// Cycles until the next one.
     due: u32,

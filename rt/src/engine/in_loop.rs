@@ -26,6 +26,7 @@ use crate::stop::Origin;
 
 /// A callback that leads the group.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct InLoop {
     run: CallbackRun,
     /// The slot of the last call; `None` before the first one.

@@ -19,6 +19,8 @@
 
 mod backlog;
 mod changing_mode;
+#[cfg(feature = "checkpoint")]
+mod checkpoint;
 mod encode;
 mod executing;
 mod faults;
@@ -51,6 +53,7 @@ use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
 use crate::host::HostInterface;
 use crate::phase::Phase;
+use crate::places::Places;
 use crate::port::BusHealth;
 use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::time::Nanoseconds;
@@ -88,6 +91,7 @@ pub struct CycleInput<'a> {
 
 /// Whether the set-points of a cycle were ready in time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Deadline {
     /// They were.
     Met,
@@ -227,6 +231,7 @@ pub enum Deadline {
 /// assert_eq!(host.phase, Phase::Holding);
 /// ```
 #[derive(Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Engine<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_BUSES> {
     dispatch: [Dispatch; BUSES],
     axes: ArrayVec<Axis, AXES>,
@@ -245,7 +250,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let mut groups: ArrayVec<Group<AXES, BUSES>, MAX_GROUPS> = ArrayVec::new();
         let mut first = 0;
         for (number, axes) in (0..).zip(parameters.axes_of_groups()) {
-            let places = first..first + axes.len();
+            let places = Places { first, end: first + axes.len() };
             first = places.end;
             let mut group = Group::new(number, places, parameters.buses_of(&axes));
             let mut own = axes.iter().filter_map(|axis| parameters.axes.get(usize::from(*axis)));
@@ -315,7 +320,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     fn group(&mut self, number: u8) -> Option<GroupContext<'_, AXES, BUSES>> {
         let group = self.groups.get_mut(usize::from(number))?;
         Some(GroupContext {
-            axes: self.axes.get_mut(group.places.clone())?,
+            axes: self.axes.get_mut(group.places.range())?,
             profiles: &mut self.profiles,
             group,
             shared: &mut self.shared,
@@ -325,7 +330,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Lets every group act, one after the other.
     fn for_each_group(&mut self, mut act: impl FnMut(&mut GroupContext<'_, AXES, BUSES>)) {
         for group in &mut self.groups {
-            let Some(axes) = self.axes.get_mut(group.places.clone()) else { continue };
+            let Some(axes) = self.axes.get_mut(group.places.range()) else { continue };
             act(&mut GroupContext { group, axes, profiles: &mut self.profiles, shared: &mut self.shared });
         }
     }

@@ -10,6 +10,7 @@ const CAPACITY: usize = 64;
 
 /// Events in the order in which they were emitted.
 #[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Outbox {
     events: ArrayVec<Event, CAPACITY>,
     lost: u64,

@@ -15,6 +15,7 @@ use crate::watch::TimingLadder;
 
 /// A bus as the engine knows it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct BusParameters {
     /// What makes it a CANopen network. On any other bus, nothing leaves but what its axes are commanded by, and the service frames of
     /// the host: no SYNC, NMT, heartbeat, TIME or SDO.
@@ -30,6 +31,7 @@ pub struct BusParameters {
 
 /// What a bus has where its nodes speak CANopen (CiA 301).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct CanopenNetwork {
     /// Identifier of SYNC.
     pub sync_id: Id,
@@ -37,6 +39,7 @@ pub struct CanopenNetwork {
 
 /// The heartbeat of this controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Heartbeat {
     /// Its node ID, 1 to 127.
     pub node: u8,

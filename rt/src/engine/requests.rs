@@ -195,7 +195,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// The group of an axis.
     fn group_of(&self, axis: u8) -> Result<u8, Rejection> {
         let place = self.place_of(axis)?;
-        let group = self.groups.iter().find(|group| group.places.contains(&place));
+        let group = self.groups.iter().find(|group| group.places.contains(place));
         Ok(group.map_or(0, |group| group.number))
     }
 

@@ -178,5 +178,5 @@ fn group_at<const AXES: usize, const BUSES: usize>(
     groups: &[Group<AXES, BUSES>],
     place: usize,
 ) -> Option<u8> {
-    groups.iter().find(|group| group.places.contains(&place)).map(|group| group.number)
+    groups.iter().find(|group| group.places.contains(place)).map(|group| group.number)
 }

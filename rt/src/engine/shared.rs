@@ -21,6 +21,7 @@ use crate::time_of_day::TimeProducer;
 
 /// What the groups share.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) period_ns: Nanoseconds,
     pub(super) period_s: f64,
@@ -66,6 +67,7 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
 
 /// What was asked for that no later request takes back.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Requested {
     /// Whether SYNC is sent.
     pub(super) sync: bool,
@@ -75,6 +77,7 @@ pub(super) struct Requested {
 
 /// How far a run is on its way to the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum Ending {
     /// It goes on.
     #[default]

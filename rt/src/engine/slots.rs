@@ -4,6 +4,7 @@ use crate::watch::{LeakyBucket, TimingLadder, TimingLevel};
 
 /// The slots of a run.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct SlotWatch {
     ladder: TimingLadder,
     bucket: LeakyBucket,
@@ -29,6 +30,12 @@ impl SlotWatch {
             missed_now: 0,
             late_cycles: 0,
         }
+    }
+
+    /// Judges from now on as another one does.
+    #[cfg(feature = "checkpoint")]
+    pub(super) fn take_ladder_of(&mut self, other: &Self) {
+        self.ladder = other.ladder;
     }
 
     /// Begins the cycle of a slot. Returns the slots since the one before: 1 if none was skipped.

@@ -34,6 +34,7 @@ use crate::source::CallbackId;
 // With a byte of its own that tells the states apart: it is looked at many times in each cycle, and otherwise the compiler
 // packs it into the payloads.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[repr(u8)]
 pub(super) enum GroupState<const AXES: usize> {
     Passive,
@@ -57,6 +58,7 @@ pub(super) enum GroupState<const AXES: usize> {
 
 /// The phase in which a group changes its mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum AtRest {
     /// Without power.
     Disabled,
@@ -66,6 +68,7 @@ pub(super) enum AtRest {
 
 /// How far a stream has come.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum Stream {
     /// It was asked for, and the host has yet to be told.
     Requested,
@@ -79,6 +82,7 @@ pub(super) enum Stream {
 
 /// How the power is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum PowerRemoval {
     /// By the way of CiA 402: ready to switch on.
     Shutdown,

@@ -49,7 +49,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
         }
         for group in &self.groups {
-            let axes = self.axes.get_mut(group.places.clone()).unwrap_or_default();
+            let axes = self.axes.get_mut(group.places.range()).unwrap_or_default();
             for axis in axes.iter_mut().filter(|axis| axis.is_reply_unverified()) {
                 let bus = usize::from(axis.parameters().bus);
                 match axis.parameters().feedback_since {

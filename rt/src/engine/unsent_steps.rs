@@ -8,6 +8,7 @@ use crate::bit_set::BitSet;
 
 /// Steps since the last set-points that have left, a bus each.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct UnsentSteps<const BUSES: usize>([u32; BUSES]);
 
 impl<const BUSES: usize> Default for UnsentSteps<BUSES> {

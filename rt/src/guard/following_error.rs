@@ -4,6 +4,7 @@ use crate::fault::Fault;
 
 /// The following error of a joint, and for how long it has been too large.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct FollowingErrorGuard {
     limit: f64,
     allowed_cycles: u32,
@@ -16,6 +17,12 @@ impl FollowingErrorGuard {
     /// Allows an error beyond `limit` (rad or m) for `allowed_cycles` cycles in a row.
     pub const fn new(limit: f64, allowed_cycles: u32) -> Self {
         Self { limit, allowed_cycles, error: 0.0, cycles: 0 }
+    }
+
+    /// Allows from now on what another one allows.
+    #[cfg(feature = "checkpoint")]
+    pub fn take_limit_of(&mut self, other: &Self) {
+        (self.limit, self.allowed_cycles) = (other.limit, other.allowed_cycles);
     }
 
     /// Takes the error that a report shows.

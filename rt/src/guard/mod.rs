@@ -15,6 +15,7 @@ pub use stream::{SetPointSteps, check_braking, check_jerk};
 
 /// What an axis may never be asked to do. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct AxisLimits {
     /// Lowest position.
     pub position_min: f64,

@@ -11,9 +11,11 @@ use proptest::prelude::*;
 use super::{AxisLimits, SetPointSteps, TOLERANCE, braking_distance, check, check_braking, check_jerk};
 use crate::fault::Fault;
 use crate::group_trajectory::{GroupTrajectory, Leg, ProfileStore};
+use crate::places::Places;
 use crate::plan::State;
 
 /// A stream of positions of one axis, which is all that the guard looks at.
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct Stream {
     sent: [f64; 3],
     limits: AxisLimits,
@@ -94,7 +96,7 @@ proptest! {
         let mut streams: Vec<Stream> =
             all.iter().map(|limits| Stream::at_rest(0.0, *limits, period_s)).collect();
         let mut states = vec![State::default(); all.len()];
-        let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(0..all.len()));
+        let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(Places { first: 0, end: all.len() }));
         // To rest where the last one is passed at speed.
         for (share, speed, cycles) in targets.into_iter().chain([(0.5, 0.0, usize::MAX)]) {
             let legs = all.iter().zip(&states).map(|(limits, start)| Leg {
@@ -142,7 +144,7 @@ proptest! {
         };
         let steepest = limits.acceleration.max(limits.deceleration);
         let mut stream = Stream::at_rest(0.0, limits, period_s);
-        let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(0..1));
+        let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(Places { first: 0, end: 1 }));
         let mut state = State::default();
         let targets = targets.into_iter().map(|(share, _, cycles)| (share, cycles));
         let positions = targets.flat_map(|(share, cycles)| {

@@ -168,6 +168,7 @@ mod tests {
     use super::*;
     use crate::group_trajectory::{GroupTrajectory, ProfileStore};
     use crate::guard;
+    use crate::places::Places;
     use proptest::prelude::*;
 
     const LIMITS: AxisLimits = AxisLimits {
@@ -231,7 +232,7 @@ mod tests {
                 }
             }
             let last = SetPointSteps { sent: [sent[1], sent[2], sent[2]], next: sent[0], period_s: PERIOD_S };
-            let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(0..1));
+            let (mut profiles, mut motion) = (ProfileStore::<4>::default(), GroupTrajectory::new(Places { first: 0, end: 1 }));
             motion.stop(&mut profiles, [(last.state(&limits), &limits)].into_iter()).unwrap();
             while !motion.is_finished() {
                 motion.advance(PERIOD_S);

@@ -7,6 +7,7 @@ use super::error::{Limit, PlanError, Quantity};
 ///
 /// The planner works with any consistent units: encoder counts give the same motion as radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct State {
     /// Position, in rad.
     pub position: f64,

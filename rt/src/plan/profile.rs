@@ -9,6 +9,7 @@ pub const PHASES_MAX: usize = 16;
 
 /// A time in which the jerk is constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Phase {
     /// When the phase starts, in s after the start of the profile.
     pub start_s: f64,
@@ -63,6 +64,7 @@ pub struct Extrema {
 ///
 /// It occurs where the target moves: the durations before the interval belong to one motion, those behind it to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Blocked {
     /// The longest possible duration before the interval, in s.
     pub after_s: f64,
@@ -75,6 +77,7 @@ pub(super) const BLOCKED_MAX: usize = 4;
 
 /// The trajectory of one axis: up to [`PHASES_MAX`] phases of constant jerk, then the target state.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Profile {
     // The start times are apart from the rest, so that finding a phase reads little. They are infinite behind the last phase.
     starts_s: [f64; PHASES_MAX],
@@ -90,6 +93,7 @@ pub struct Profile {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct Coefficients {
     start: State,
     jerk: f64,

@@ -21,6 +21,7 @@ pub(super) struct IntervalTime {
 
 /// A number that changes evenly from one point to the next, and stays behind that.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Ramp {
     begin: f64,
     change: f64,
@@ -47,6 +48,7 @@ impl Ramp {
 
 /// What an axis is to do between two points.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum AxisPiece {
     Position { path: Piece, torque: Ramp },
     Impedance { path: Piece, stiffness: Ramp, damping: Ramp, torque: Ramp },

@@ -7,10 +7,12 @@ use crate::time::Nanoseconds;
 
 /// The number under which the host has a callback.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct CallbackId(pub u64);
 
 /// Which callback is to lead a group, and how.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct CallbackRun {
     /// Which.
     pub callback: CallbackId,
@@ -56,6 +58,7 @@ impl CallbackCycle {
 
 /// How a call of a callback has ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum CallbackOutcome {
     /// The host has no such callback.
     #[default]
@@ -70,6 +73,7 @@ pub enum CallbackOutcome {
 
 /// What became of a call, and how long it took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct CallbackReturn {
     /// How it has ended.
     pub outcome: CallbackOutcome,

@@ -4,6 +4,7 @@ use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// How far behind the stamps of its points a stream runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum StreamDelay {
     /// As far as the interval of the points and their lateness ask for.
     #[default]
@@ -27,6 +28,7 @@ const RATE_RAMP: f64 = 2.0;
 
 /// Learns the interval of the points and how late they come, and leads the delay to what that asks for.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct DelayEstimator {
     period_ns: i64,
     delay: StreamDelay,
@@ -64,6 +66,16 @@ impl DelayEstimator {
             rate: 0.0,
             goal_ns,
         }
+    }
+
+    /// What this one has learnt, with the settings of another one.
+    #[cfg(feature = "checkpoint")]
+    pub(super) fn with_parameters_of(self, other: &Self) -> Self {
+        let goal_ns = match other.delay {
+            StreamDelay::Automatic => self.goal_ns,
+            StreamDelay::Fixed(_) => other.goal_ns,
+        };
+        Self { period_ns: other.period_ns, delay: other.delay, goal_ns, ..self }
     }
 
     /// A stream begins: forgets those before it.

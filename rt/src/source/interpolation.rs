@@ -86,6 +86,7 @@ impl Window {
 
 /// The motion of an axis between two points.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Piece {
     quintic: Quintic,
     is_within_jerk: bool,
@@ -115,6 +116,7 @@ impl Piece {
 
 /// The polynomial of the fifth degree from one state to another.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 struct Quintic {
     begin: f64,
     duration_s: f64,

@@ -1,5 +1,8 @@
 //! The points of a stream in the order of their stamps, and what they want at a time.
 
+#[cfg(feature = "checkpoint")]
+mod checkpoint;
+
 use arrayvec::ArrayVec;
 
 use super::axis_piece::{AxisPiece, IntervalTime};
@@ -79,6 +82,7 @@ impl core::fmt::Display for PointError {
 
 /// Where a stream is among its points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 enum Playback {
     /// No point has come.
     Awaited,

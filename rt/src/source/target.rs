@@ -6,6 +6,7 @@ use crate::time::Nanoseconds;
 
 /// What is done with a stream that asks for more than the limits of an axis allow.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Follow {
     /// The axis follows as closely as its limits allow.
     #[default]
@@ -16,6 +17,7 @@ pub enum Follow {
 
 /// What a point says of the position of an axis. rad (m) and seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct PositionPoint {
     /// Where it is to be.
     pub position: f64,
@@ -47,6 +49,7 @@ impl PositionPoint {
 /// let pushing = AxisPoint::Torque(4.0);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum AxisPoint {
     /// It is to be somewhere.
     Position {
@@ -172,6 +175,7 @@ impl From<State> for AxisPoint {
 
 /// How a point is put among those that are there already.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum PointRole {
     /// By itself: it takes the place of one with the same stamp, and leaves the others.
     #[default]
@@ -188,6 +192,7 @@ pub enum PointRole {
 
 /// A point of a stream: what every axis is to do at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct StreamPoint<const AXES: usize = MAX_AXES> {
     /// The time that it is meant for.
     pub at_ns: Nanoseconds,
@@ -209,6 +214,7 @@ impl<const AXES: usize> Default for StreamPoint<AXES> {
 /// An impedance and a torque need an axis whose loop is closed here: cyclic synchronous torque. What changes in a torque or a
 /// gain takes effect at the rate that the axis allows for its torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum AxisTarget {
     /// To be in this state of motion at the end of the slot.
     Position {
@@ -260,6 +266,7 @@ impl Default for AxisTarget {
 
 /// What a stream is doing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum StreamState {
     /// The group does not stream.
     #[default]
@@ -292,6 +299,7 @@ impl StreamState {
 
 /// How a stream has gone so far: counts since its beginning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct StreamCounts {
     /// How far the set-points are behind the stamps now.
     pub lag_ns: Nanoseconds,
@@ -305,6 +313,7 @@ pub struct StreamCounts {
 
 /// What observers see of a stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct StreamReport {
     /// What it is doing.
     pub state: StreamState,
@@ -314,6 +323,7 @@ pub struct StreamReport {
 
 /// What a stream wants in one slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum StreamWish<const AXES: usize = MAX_AXES> {
     /// Nothing yet: no point has come.
     Awaited,
@@ -325,6 +335,7 @@ pub enum StreamWish<const AXES: usize = MAX_AXES> {
 
 /// What a stream wants in one slot, and how it has gone so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct StreamSample<const AXES: usize = MAX_AXES> {
     /// What it wants.
     pub wish: StreamWish<AXES>,

@@ -126,6 +126,7 @@ impl TrajectoryView<'_> {
 
 /// What a trajectory wants at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct TrajectorySample<const AXES: usize = MAX_AXES> {
     /// Where the axes are to be; those that it does not have are at zero.
     pub states: [State; AXES],

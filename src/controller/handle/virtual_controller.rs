@@ -19,6 +19,8 @@ use crate::controller::outcome::Outcome;
 use crate::controller::port::Port;
 use crate::controller::supervisor::AfterBringUp;
 use crate::controller::virtual_time::VirtualRun;
+#[cfg(feature = "browser")]
+use crate::journal::RunJournal;
 use crate::link::trace::Trace;
 use crate::sim::SimulatedBus;
 use crate::telemetry::{EachCycle, Logger, Machine, shown_timing};
@@ -65,16 +67,18 @@ impl VirtualController {
         Self::begin(config, AfterBringUp::StayDisabled, each_cycle)
     }
 
-    /// As [`VirtualController::start`], with a logger that gets the frames of the buses as well.
+    /// As [`VirtualController::start`], with a logger that gets the frames of the buses and the journal as well.
     #[cfg(feature = "browser")]
     pub(crate) fn start_logged(
         config: &Config,
-        logger: impl FnOnce(LogSide, Vec<Trace>) -> Logger,
+        logger: impl FnOnce(LogSide, Vec<Trace>, RunJournal) -> Logger,
     ) -> Result<Self, StartFailure> {
         config.validate().map_err(AssembleError::from)?;
         let traced = (0..).zip(&config.buses).map(|(bus, of)| simulated(config, bus).traced(&of.name));
         let (ports, traces) = traced.unzip();
-        let log = |log| VirtualLog::Logger(Box::new(logger(log, traces)));
+        let log = |log, run: &mut VirtualRun<Port>| {
+            VirtualLog::Logger(Box::new(logger(log, traces, run.journal())))
+        };
         Self::begin_on(config, AfterBringUp::Enable, ports, log)
     }
 
@@ -85,16 +89,17 @@ impl VirtualController {
     ) -> Result<Self, StartFailure> {
         config.validate().map_err(AssembleError::from)?;
         let ports = (0..config.buses.len()).map(|bus| simulated(config, bus)).collect();
-        Self::begin_on(config, after_bring_up, ports, |log| VirtualLog::EachCycle(log, each_cycle))
+        Self::begin_on(config, after_bring_up, ports, |log, _| VirtualLog::EachCycle(log, each_cycle))
     }
 
     fn begin_on(
         config: &Config,
         after_bring_up: AfterBringUp,
         ports: Vec<Port>,
-        log: impl FnOnce(LogSide) -> VirtualLog,
+        log: impl FnOnce(LogSide, &mut VirtualRun<Port>) -> VirtualLog,
     ) -> Result<Self, StartFailure> {
         let (mut run, records) = VirtualRun::serving(config, ports, after_bring_up)?;
+        let log = log(records, &mut run);
         let host = run.host();
         let shared = Shared {
             axes: config.axes.clone(),
@@ -113,7 +118,7 @@ impl VirtualController {
             questions: host.questions(),
             messages: Arc::default(),
             life: Arc::<Life>::default(),
-            pace: Pace::Virtual(Box::new(VirtualPace::new(run, log(records)))),
+            pace: Pace::Virtual(Box::new(VirtualPace::new(run, log))),
         };
         let controller = Self { handle: Handle(Arc::new(shared)) };
         match controller.wait_until_brought_up(after_bring_up) {
