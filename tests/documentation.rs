@@ -63,3 +63,65 @@ fn the_program_for_another_process_is_an_example() {
     let (_, program) = example.split_once("\n\n").unwrap();
     assert!(page.contains(&format!("```rust,no_run\n{program}```")), "the page does not show\n{program}");
 }
+
+/// The rows of the tables of a page whose heading begins with a word: their cells, without the heading itself.
+fn rows(page: &str, heading: &str) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(root().join(page)).unwrap();
+    let cells = |line: &str| line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect();
+    let begin = format!("| {heading} |");
+    let tables = text.split("\n\n").filter(|part| part.starts_with(&begin));
+    tables.flat_map(|table| table.lines().skip(2).map(cells).collect::<Vec<_>>()).collect()
+}
+
+/// The names that a cell writes as code: of a call without its arguments, of a path all parts.
+fn names(cell: &str) -> Vec<String> {
+    let codes = cell.split('`').skip(1).step_by(2).map(|code| code.split(['(', '[', ' ']).next().unwrap());
+    codes.flat_map(|code| code.split([':', '.']).filter(|name| !name.is_empty())).map(str::to_owned).collect()
+}
+
+fn words_of(text: &str) -> std::collections::HashSet<&str> {
+    text.split(|letter: char| !letter.is_alphanumeric() && letter != '_').collect()
+}
+
+/// The text of every file in Rust of a folder.
+fn sources(folder: &Path, text: &mut String) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, text);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            *text += &fs::read_to_string(path).unwrap();
+        }
+    }
+}
+
+#[test]
+fn every_word_that_is_said_to_be_ours_is_a_name_of_its_language() {
+    let mut rust = String::new();
+    sources(&root().join("src"), &mut rust);
+    sources(&root().join("rt/src"), &mut rust);
+    let read = |file: &str| fs::read_to_string(root().join(file)).unwrap();
+    let (c, cpp) = (read("bindings/c/include/takt.h"), read("bindings/c/include/takt.hpp"));
+    let (cpp, python) = (cpp + &c, read("bindings/python/python/takt/_takt.pyi"));
+    let languages = [words_of(&rust), words_of(&c), words_of(&cpp), words_of(&python)];
+    let in_each = rows("docs/words.md", "Rust");
+    assert!(in_each.len() > 20, "{in_each:?}");
+    for row in in_each {
+        for (cell, known) in row.iter().zip(&languages) {
+            for name in names(cell) {
+                assert!(known.contains(name.as_str()), "there is no {name}, of {row:?}");
+            }
+        }
+    }
+    let (ours, theirs) = (rows("docs/words.md", "takt"), rows("docs/words.md", "`RTDEControlInterface`"));
+    let cells = ours.iter().map(|row| &row[0]).chain(theirs.iter().map(|row| &row[1]));
+    let all: Vec<String> = cells.flat_map(|cell| names(cell)).collect();
+    assert!(all.len() > 60, "{all:?}");
+    let settings = words_of(&python);
+    for name in all {
+        assert!(
+            languages[0].contains(name.as_str()) || settings.contains(name.as_str()),
+            "there is no {name}"
+        );
+    }
+}

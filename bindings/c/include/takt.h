@@ -445,6 +445,10 @@ typedef struct {
   uint32_t is_linear;
   // The CANopen node ID of its drive.
   uint32_t node;
+  // Its group among those of the controller.
+  uint32_t group;
+  // Its bus among those of the controller, as `buses` of a state has them.
+  uint32_t bus;
   // Lowest position: rad (m).
   double position_min;
   // Highest position: rad (m).
@@ -466,6 +470,20 @@ typedef struct {
   // Its name. UTF-8.
   char name[TAKT_NAME_LENGTH];
 } takt_axis;
+
+// A group of axes that start, stop and fault together. Set `size` to `sizeof(takt_group)`.
+typedef struct {
+  // `sizeof(takt_group)`
+  uint32_t size;
+  // Its number among the groups of the controller, as events count them.
+  uint32_t number;
+  // How many axes it has.
+  uint32_t axis_count;
+  // 0; for later.
+  uint32_t reserved;
+  // Its name, for takt_open_group(). UTF-8. Empty where the configuration names no groups, and all axes are one.
+  char name[TAKT_NAME_LENGTH];
+} takt_group;
 
 // The last failure of a call in this thread. Set `size` to `sizeof(takt_error)`.
 typedef struct {
@@ -759,6 +777,19 @@ uint64_t takt_period_ns(takt_handle handle);
 //
 // Pointers: `described` is null, or points to a structure of the size that it says.
 takt_result takt_describe_axis(takt_handle handle, uint32_t axis, takt_axis *described);
+
+// How many groups a handle has: those of the controller, or the one of its own; 0 for one that is null, closed or of another kind. Any
+// thread; does not block.
+size_t takt_group_count(takt_handle handle);
+
+// The name and the size of a group, counted as `groups` of a state has them.
+//
+// Any thread, not in a callback; does not block.
+//
+// Errors: TAKT_ERROR_ARGUMENT, TAKT_ERROR_HANDLE.
+//
+// Pointers: `described` is null, or points to a structure of the size that it says.
+takt_result takt_describe_group(takt_handle handle, uint32_t group, takt_group *described);
 
 // Opens a handle for one group of a controller, by its name in the configuration. Every function takes it as it takes that of the
 // controller, and concerns the axes of the group alone, in the order of the group.

@@ -307,12 +307,22 @@ public:
         return {code, described};
     }
 
+    std::size_t group_count() const noexcept { return takt_group_count(raw_); }
+    result_of<takt_group> describe_group(std::uint32_t group) const {
+        takt_group described{};
+        described.size = sizeof described;
+        takt_result code = takt_describe_group(raw_, group, &described);
+        return {code, described};
+    }
+
     /// The newest state; of a handle that is closed, an empty one.
     takt::state state() const {
         takt::state state;
         takt_read_state(raw_, &state.raw);
         return state;
     }
+    /// The same, into one that is there already.
+    result read_state(takt::state &state) const { return result(takt_read_state(raw_, &state.raw)); }
     /// Waits for a cycle that is later than that of `state`, and reads it.
     result wait_cycle(takt::state &state, double timeout_s = forever) const {
         return result(takt_wait_cycle(raw_, timeout_s, &state.raw));

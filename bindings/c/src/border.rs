@@ -178,3 +178,42 @@ pub(crate) fn put_text<const LENGTH: usize>(text: &str) -> [c_char; LENGTH] {
     }
     array
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    fn text() -> String {
+        // SAFETY: it is a text until the next failure of this thread.
+        unsafe { CStr::from_ptr(errors::takt_last_error_text()) }.to_string_lossy().into_owned()
+    }
+
+    #[test]
+    fn no_panic_crosses_the_border_and_the_next_call_goes_on() {
+        let lock = Mutex::new(());
+        let panics = || {
+            let _held = lock.lock();
+            panic!("a defect")
+        };
+        assert_eq!(enter(panics), takt_result::TAKT_ERROR_DEFECT);
+        assert!(text().contains("please report it"), "{}", text());
+        assert_eq!(enter_without_words(|| panic!("a defect")), takt_result::TAKT_ERROR_DEFECT);
+        assert_eq!(carry_out(|| Ok(())), takt_result::TAKT_OK);
+        let refused = carry_out(|| Err(Failure::argument("a count is wrong")));
+        assert_eq!((refused, text()), (takt_result::TAKT_ERROR_ARGUMENT, "a count is wrong".to_owned()));
+    }
+
+    #[test]
+    fn in_a_callback_nothing_is_done_that_may_wait() {
+        let is_done = Cell::new(false);
+        let called = in_callback(|| {
+            enter(|| {
+                is_done.set(true);
+                Ok(takt_result::TAKT_OK)
+            })
+        });
+        assert_eq!((called, is_done.get()), (takt_result::TAKT_ERROR_IN_CALLBACK, false));
+        assert_eq!(carry_out(|| Ok(())), takt_result::TAKT_OK);
+    }
+}

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <utility>
 
@@ -57,6 +58,8 @@ TaktSystem::CallbackReturn TaktSystem::read_tag(const hardware_interface::Hardwa
         complain("<hardware> needs <param name=\"configuration\">, a file");
         return CallbackReturn::ERROR;
     }
+    // Whole, so that a message shows where it was looked for.
+    configuration_ = std::filesystem::absolute(configuration_).string();
     const std::string drives = parameter("drives", "configured");
     if (drives == "configured") {
         options_.drives = TAKT_CONFIGURED;
@@ -121,10 +124,11 @@ bool TaktSystem::find_axes() {
             is_found = described && joint.name == described->name;
             if (is_found) joint.axis = axis;
         }
-        if (!is_found) {
-            complain(joint.name + " is no axis of " + configuration_);
-            return false;
-        }
+        if (is_found) continue;
+        std::string known;
+        for (std::uint32_t axis = 0; axis < arm_->size(); axis++) known += std::string(axis ? ", " : "") + arm_->describe(axis)->name;
+        complain(joint.name + " is no axis of " + configuration_ + "; the axes are: " + known);
+        return false;
     }
     return true;
 }
@@ -312,12 +316,15 @@ return_type TaktSystem::read(const rclcpp::Time &, const rclcpp::Duration &perio
     if (!arm_) return return_type::ERROR;
     if (options_.drives == TAKT_VIRTUAL) {
         const auto cycles = static_cast<std::uint64_t>(std::max(std::llround(period.seconds() / period_s_), 0LL));
-        if (const auto passed = arm_->advance(cycles); !passed) {
+        if (const auto passed = cycles == 0 ? takt::result() : arm_->advance(cycles); !passed) {
             complain(passed.words());
             return return_type::ERROR;
         }
     }
-    state_ = arm_->state();
+    if (const auto seen = arm_->read_state(state_); !seen) {
+        complain(seen.words());
+        return return_type::ERROR;
+    }
     take_state();
     for (const auto &group : state_.groups()) {
         if (is_active_ && group.is_faulted) {

@@ -4,6 +4,7 @@ with takt."""
 import os
 import queue
 import re
+import shlex
 import signal
 import socket
 import subprocess
@@ -15,6 +16,7 @@ import pytest
 import xxhash
 import zenoh
 from rosbags.typesys import Stores, get_typestore
+from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parents[3]
 PROGRAMS = Path(os.environ["TAKT_PROGRAMS"])
@@ -230,3 +232,34 @@ def test_the_tokens_go_with_the_bridge(arm, peer, bridge):
         if sample.kind == zenoh.SampleKind.DELETE:
             gone.append(sample)
     subscriber.undeclare()
+
+
+def test_the_commands_of_the_page_move_the_arm(peer, tmp_path):
+    session, endpoint = peer
+    page = (ROOT / "bindings/zenoh/README.md").read_text()
+    robot, other = (rest.split("```")[0].replace("\\\n", " ") for rest in page.split("```sh\n")[1:])
+    here = {"arm": tmp_path / "arm", "tcp/ROUTER:7447": endpoint}
+
+    def program(line):
+        words = [here.get(word, ROOT / word if word.startswith("configs/") else word) for word in shlex.split(line, comments=True)]
+        return [PROGRAMS / Path(words[0]).name, *words[1:]]
+
+    run, connect = (program(line) for line in robot.splitlines() if line.startswith("target/release/"))
+    echo, publish = (shlex.split(line) for line in other.splitlines() if line.startswith("ros2 topic"))
+    received = queue.Queue()
+    subscriber = session.declare_subscriber(key(echo[3].strip("/"), "sensor_msgs/msg/JointState"), received.put)
+    served = start(run, tmp_path / "takt.txt")
+    served.wait_for("served by the name")
+    bridge = start(connect, tmp_path / "bridge.txt")
+    bridge.wait_for("publishes /joint_states")
+    assert publish[:4] == ["ros2", "topic", "pub", "--once"] and publish[5] == "trajectory_msgs/msg/JointTrajectory"
+    wanted = YAML(typ="safe").load(publish[6])
+    [point] = wanted["points"]
+    message = trajectory(wanted["joint_names"], [(point["time_from_start"]["sec"], point["positions"])])
+    home, _ = state(received)
+    assert abs(home.position[0] - 0.3) > 0.1
+    session.put(key(publish[4].strip("/"), publish[5]), message)
+    wait_until(received, lambda now: abs(now.position[0] - 0.3) < 0.005)
+    subscriber.undeclare()
+    end(bridge)
+    end(served)

@@ -124,6 +124,15 @@ impl Installed {
         program
     }
 
+    /// Commands of a page, in the folder of the programs, that find takt as on a system that has it.
+    pub fn shell(&self, commands: &str) -> Command {
+        let mut shell = Command::new("sh");
+        shell.args(["-e", "-c", commands]).current_dir(self.programs.path());
+        shell.env("PKG_CONFIG_PATH", self.prefix.join("lib/pkgconfig"));
+        shell.env("LD_LIBRARY_PATH", self.prefix.join("lib")).env("CMAKE_PREFIX_PATH", &self.prefix);
+        shell
+    }
+
     /// A program, in a folder where its recordings may go.
     pub fn run(&self, runner: &[&str], program: &Path, config: &str) -> String {
         succeeds(&mut self.command(runner, program, repository().join(config).to_str().unwrap()))

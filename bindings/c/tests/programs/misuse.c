@@ -30,12 +30,13 @@ static void use_every_function(takt_handle arm) {
     takt_motion motion = {1 << 8};
     takt_state state = {.size = sizeof state};
     takt_axis axis = {.size = sizeof axis};
+    takt_group shown = {.size = sizeof shown};
     takt_events events;
     takt_handle group;
     takt_callback callback;
     takt_target target = {.kind = TAKT_POSITION};
     double zero = 0.0, one = 1.0;
-    CHECK(takt_now_ns(arm) == 0 && takt_axis_count(arm) == 0 && takt_period_ns(arm) == 0);
+    CHECK(takt_now_ns(arm) == 0 && takt_axis_count(arm) == 0 && takt_group_count(arm) == 0 && takt_period_ns(arm) == 0);
     CHECK(takt_stop(arm, TAKT_STOP_AND_HOLD) == TAKT_ERROR_HANDLE);
     FAILS(takt_close(arm), TAKT_ERROR_HANDLE);
     FAILS(takt_read_state(arm, &state), TAKT_ERROR_HANDLE);
@@ -46,6 +47,7 @@ static void use_every_function(takt_handle arm) {
     FAILS(takt_disable(arm), TAKT_ERROR_HANDLE);
     FAILS(takt_clear_faults(arm), TAKT_ERROR_HANDLE);
     FAILS(takt_describe_axis(arm, 0, &axis), TAKT_ERROR_HANDLE);
+    FAILS(takt_describe_group(arm, 0, &shown), TAKT_ERROR_HANDLE);
     FAILS(takt_open_group(arm, "arm", &group), TAKT_ERROR_HANDLE);
     FAILS(takt_open_events(arm, &events), TAKT_ERROR_HANDLE);
     FAILS(takt_move_to(arm, &zero, 1, NULL, &motion), TAKT_ERROR_HANDLE);
@@ -162,6 +164,12 @@ int main(int count, char **arguments) {
     takt_axis described = {.size = sizeof described};
     CHECK(takt_describe_axis(arm, (uint32_t)axes - 1, &described) == TAKT_OK && described.name[0] != 0);
     FAILS(takt_describe_axis(arm, (uint32_t)axes, &described), TAKT_ERROR_ARGUMENT);
+    CHECK(strchr(takt_version(), '.') != NULL && takt_check_urdf(arguments[1], "<robot") == TAKT_ERROR_CONFIGURATION);
+    takt_group all = {.size = sizeof all};
+    CHECK(takt_group_count(arm) == 1 && takt_describe_group(arm, 0, &all) == TAKT_OK);
+    CHECK(all.number == 0 && all.axis_count == axes && all.name[0] == 0);
+    FAILS(takt_describe_group(arm, 1, &all), TAKT_ERROR_ARGUMENT);
+    FAILS(takt_describe_group(arm, 0, NULL), TAKT_ERROR_ARGUMENT);
     targets[axes - 1] = described.position_max + 1.0;
     FAILS(takt_move_to(arm, targets, axes, NULL, &motion), TAKT_ERROR_LIMIT);
     CHECK(takt_last_error(&refusal) == TAKT_OK && refusal.axis == (int32_t)axes - 1);

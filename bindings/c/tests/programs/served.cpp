@@ -20,6 +20,12 @@ int main(int count, char **arguments) try {
     auto all = takt::controller::connect(arguments[1]);
     auto arm = all.group("arm");
     check(all.size() == 4 && arm.size() == 3, "axes");
+    check(all.group_count() == 2 && arm.group_count() == 1, "groups");
+    const auto second = all.describe_group(1), last = all.describe_group(all.describe(3)->group);
+    check(std::string_view(second->name) == "gripper" && second->axis_count == 1 && last->number == 1, "the second group");
+    check(std::string_view(arm.describe_group(0)->name) == "arm" && arm.describe_group(0)->axis_count == 3, "the first group");
+    check(all.describe_group(2).code() == TAKT_ERROR_ARGUMENT, "there are two");
+    check(all.describe(3)->bus < all.state().buses().size(), "its bus");
     check(!all.execute({1.0}, {0.0, 0.0, 0.0, 0.0}), "a trajectory is for one group");
     arm.wait(arm.move_to({0.1, -0.1, 0.1}).or_throw(), 30.0).or_throw();
     check(arm.state().axes().size() == 3 && all.state().groups().size() == 2, "states");

@@ -1,0 +1,5 @@
+# A stand-in: see ../README.md.
+if(NOT TARGET rclcpp::rclcpp)
+  add_library(rclcpp::rclcpp INTERFACE IMPORTED)
+  target_include_directories(rclcpp::rclcpp INTERFACE ${CMAKE_CURRENT_LIST_DIR}/../ros)
+endif()

@@ -1,0 +1,5 @@
+# A stand-in: see ../README.md.
+if(NOT TARGET rclcpp_lifecycle::rclcpp_lifecycle)
+  add_library(rclcpp_lifecycle::rclcpp_lifecycle INTERFACE IMPORTED)
+  target_include_directories(rclcpp_lifecycle::rclcpp_lifecycle INTERFACE ${CMAKE_CURRENT_LIST_DIR}/../ros)
+endif()
