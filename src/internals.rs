@@ -84,7 +84,14 @@ pub mod erob_can {
     pub use crate::erob_can::*;
 }
 
+pub mod erob_parameter {
+    pub use crate::erob_parameter::*;
+}
+
 pub mod family {
+    pub mod erob {
+        pub use crate::family::erob::*;
+    }
     pub mod erob_can {
         pub use crate::family::erob_can::*;
     }
@@ -164,6 +171,9 @@ pub mod sim {
     pub use crate::sim::object_dictionary::table::ObjectRow;
     pub mod bit_fields {
         pub use crate::sim::bit_fields::*;
+    }
+    pub mod commanded_module {
+        pub use crate::sim::commanded_module::ModuleParameters;
     }
     pub mod erob_can {
         pub use crate::sim::erob_can::*;

@@ -119,6 +119,14 @@ mod doctor;
     )
 )]
 mod erob_can;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(
+        unnameable_types,
+        reason = "the tables of two protocols name its types, and nobody outside names those tables"
+    )
+)]
+mod erob_parameter;
 pub mod error;
 pub mod family;
 pub mod faults;

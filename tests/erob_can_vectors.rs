@@ -4,8 +4,9 @@
 mod rows;
 
 use rows::columns;
-use takt::internals::erob_can::entries::{self, Entry, EntryAccess, Unit};
+use takt::internals::erob_can::entries::{self, Entry};
 use takt::internals::erob_can::frame::{EntryAddress, ReceivedRequest, Reply, Request, replying_node};
+use takt::internals::erob_parameter::{Access, Parameter, Unit};
 use takt_rt::{Frame, Id};
 
 const VECTORS: &str = include_str!("vectors/erob-can.csv");
@@ -70,7 +71,7 @@ fn every_request_of_the_manual_is_encoded_and_decoded() {
         let received = ReceivedRequest { node: row.node, address: request.address(), value: request.value() };
         assert_eq!(ReceivedRequest::decode(&row.frame), Some(received), "{}", row.id);
         let entry = entries::find(request.address()).unwrap_or_else(|| panic!("{}", row.meaning));
-        assert_eq!(request.value().map_or(Ok(()), |value| entry.check(value)), Ok(()), "{}", row.id);
+        assert_eq!(request.value().map_or(Ok(()), |value| entry.check(value.into())), Ok(()), "{}", row.id);
     }
 }
 
@@ -107,14 +108,14 @@ fn the_table_has_every_address_of_the_manual_with_its_access_and_unit() {
     }
 }
 
-fn access(row: &[String]) -> EntryAccess {
+fn access(row: &[String]) -> Access {
     match (row[3].as_str(), row[6].as_str()) {
-        ("RO", _) => EntryAccess::Read,
-        ("RW", _) => EntryAccess::ReadWrite,
-        ("W" | "", "yes") => EntryAccess::CommandWithArgument,
-        ("W", "no") => EntryAccess::Command,
+        ("RO", _) => Access::Read,
+        ("RW", _) => Access::ReadWrite,
+        ("W" | "", "yes") => Access::CommandWithArgument,
+        ("W", "no") => Access::Command,
         // The set-point and its type: written in the procedures, and in no table.
-        ("", "") => EntryAccess::Write,
+        ("", "") => Access::Write,
         other => panic!("{other:?}"),
     }
 }

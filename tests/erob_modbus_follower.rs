@@ -1,5 +1,8 @@
 //! The drives of a serial line are led by velocities, one request at a time, beside the cycle: in virtual time.
 
+#[path = "simulated/erob_module.rs"]
+mod erob_module;
+
 use std::f64::consts::TAU;
 
 use takt::family::{OffCycleLine, OffCycleTarget, OffCycleWish};
@@ -8,11 +11,10 @@ use takt::internals::family::erob_modbus::line::FollowedLine;
 use takt::internals::modbus::frame::{ReceivedRequest, Request, SlaveAddress};
 use takt::internals::modbus::line_timing::LineTiming;
 use takt::internals::modbus::master::MasterTiming;
-use takt::internals::sim::erob_modbus::{
-    ErobModbusDrive, ErobModbusParameters, ModbusDriveFault, SimulatedLine,
-};
-use takt::sim::plant::{Encoder, JointParameters};
-use takt::sim::{DevicesOnLine, LineDisturbance};
+use takt::internals::sim::commanded_module::ModuleParameters;
+use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
+use takt::sim::plant::Encoder;
+use takt::sim::{Defect, DevicesOnLine, Drive, LineDisturbance, Observation};
 use takt_rt::{DriveState, OffCycleReport};
 
 type Nanoseconds = u64;
@@ -33,26 +35,16 @@ struct Bench {
 
 impl Bench {
     fn new(ready_ns: Nanoseconds) -> Self {
-        let joint = JointParameters {
-            inertia: 0.3,
-            viscous_friction: 2.0,
-            coulomb_friction: 4.0,
-            friction_shape: takt::config::FrictionShape::Constant,
-            brake_torque: 60.0,
-        };
         let drive = ErobModbusDrive::new(ErobModbusParameters {
             address: 2,
             bit_rate_code: 4,
-            joint,
-            encoder: Encoder { counts_per_unit: -COUNTS_PER_UNIT, zero_counts: 1_000.0 },
-            counts_per_turn: 524_288.0,
-            initial_position: 0.25,
-            peak_torque: 60.0,
-            torque_per_ampere: 5.0,
-            highest_velocity: 3.0,
-            ready_ns,
+            module: ModuleParameters {
+                encoder: Encoder { counts_per_unit: -COUNTS_PER_UNIT, zero_counts: 1_000.0 },
+                initial_position: 0.25,
+                ready_ns,
+                ..erob_module::module()
+            },
             reply_ns: 2 * MS,
-            has_battery: true,
             has_torque_sensor: false,
         });
         let parameters = FollowerParameters {
@@ -124,12 +116,31 @@ impl Bench {
         }
     }
 
-    fn drive(&mut self) -> &mut ErobModbusDrive {
-        self.line.module(0).unwrap()
+    fn drive(&mut self) -> &mut dyn Drive {
+        self.line.drive(2).unwrap()
+    }
+
+    fn observe(&mut self) -> Observation {
+        let now_ns = self.now_ns;
+        self.drive().observe(now_ns)
+    }
+
+    fn is_enabled(&mut self) -> bool {
+        self.observe().state == DriveState::OperationEnabled
+    }
+
+    /// counts/s
+    fn velocity(&mut self) -> f64 {
+        self.observe().velocity * COUNTS_PER_UNIT
+    }
+
+    fn inject(&mut self, defect: Defect) {
+        let now_ns = self.now_ns;
+        self.drive().inject_defect(now_ns, defect, true).unwrap();
     }
 
     fn position(&mut self) -> f64 {
-        (f64::from(self.drive().counts()) - 1_000.0) / -COUNTS_PER_UNIT
+        (f64::from(self.observe().position_counts) - 1_000.0) / -COUNTS_PER_UNIT
     }
 
     fn state(&self) -> DriveState {
@@ -179,12 +190,12 @@ fn the_manuals_writes_and_its_wait_come_before_the_first_velocity() {
     assert!(bench.written.is_empty());
     bench.run(400, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!(bench.written, [0x0040, 0x0042, 0x0049, 0x004B, 0x0051, 0x0002, 0x00F0]);
-    assert!(bench.drive().is_enabled());
+    assert!(bench.is_enabled());
     assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
     bench.run(700, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!((bench.written[7], bench.state()), (0x0051, DriveState::OperationEnabled));
     bench.run(100, |_| (OffCycleWish::Stop, 0.25, 0.0));
-    assert!(!bench.drive().is_enabled());
+    assert!(!bench.is_enabled());
     // It does not wait for its master any more.
     assert_eq!(bench.written[bench.written.len() - 2..], [0x00F0, 0x0002]);
 }
@@ -200,12 +211,12 @@ fn a_drive_that_was_just_switched_on_is_enabled_as_soon_as_it_can_be() {
 fn stale_targets_stop_the_joint_and_disable_it_until_its_group_is_enabled() {
     let mut bench = Bench::following();
     bench.run(1_000, |time_s| (OffCycleWish::Follow, 0.25 + 0.5 * time_s, 0.5));
-    assert!(bench.drive().velocity().abs() > 30_000.0);
+    assert!(bench.velocity().abs() > 30_000.0);
     let stale_ns = bench.now_ns;
     let mut stood_ns = None;
-    while bench.drive().is_enabled() {
+    while bench.is_enabled() {
         bench.turn();
-        if bench.drive().velocity().abs() < 500.0 {
+        if bench.velocity().abs() < 500.0 {
             stood_ns = stood_ns.or(Some(bench.now_ns));
         }
         assert!(bench.now_ns < stale_ns + 1_000 * MS);
@@ -214,7 +225,7 @@ fn stale_targets_stop_the_joint_and_disable_it_until_its_group_is_enabled() {
     assert!((100..350).contains(&passed_ms), "it stands after {passed_ms} ms");
     // It does not follow again by itself.
     bench.run(1_000, |_| (OffCycleWish::Follow, 0.9, 0.0));
-    assert!(!bench.drive().is_enabled());
+    assert!(!bench.is_enabled());
     assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
     let here = bench.position();
     bench.run(1_500, |_| (OffCycleWish::Enable, here, 0.0));
@@ -229,7 +240,7 @@ fn a_drive_whose_targets_were_stale_while_it_was_enabled_is_enabled_when_they_co
         bench.run(200, |_| (OffCycleWish::Stop, 0.25, 0.0));
         bench.run(before_ms, |_| (OffCycleWish::Enable, 0.25, 0.0));
         (0..1_000).for_each(|_| bench.turn());
-        assert!(!bench.drive().is_enabled(), "{before_ms}");
+        assert!(!bench.is_enabled(), "{before_ms}");
         bench.run(1_500, |_| (OffCycleWish::Enable, 0.25, 0.0));
         assert_eq!(bench.state(), DriveState::OperationEnabled, "{before_ms}");
     }
@@ -238,7 +249,7 @@ fn a_drive_whose_targets_were_stale_while_it_was_enabled_is_enabled_when_they_co
 #[test]
 fn a_fault_is_reported_with_its_code_and_cleared_when_that_is_wished() {
     let mut bench = Bench::following();
-    bench.drive().inject(ModbusDriveFault::Code(0x2310));
+    bench.inject(Defect::Alarm { code: 0x2310 });
     bench.run(300, |_| (OffCycleWish::Follow, 0.25, 0.0));
     let (_, report) = *bench.reports.last().unwrap();
     assert_eq!((report.state, report.error_code), (DriveState::Fault, 0x2310));
@@ -254,10 +265,10 @@ fn a_fault_is_reported_with_its_code_and_cleared_when_that_is_wished() {
 #[test]
 fn a_drive_that_has_lost_its_torque_is_reported_and_not_enabled_again() {
     let mut bench = Bench::following();
-    bench.drive().inject(ModbusDriveFault::TorqueOff);
+    bench.inject(Defect::TorqueOff);
     bench.run(1_000, |_| (OffCycleWish::Follow, 0.25, 0.0));
     assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
-    assert!(!bench.drive().is_enabled());
+    assert!(!bench.is_enabled());
 }
 
 #[test]
@@ -267,7 +278,7 @@ fn a_cut_line_ends_the_reports_and_the_communication_time_out_stops_the_joint() 
     let reports = bench.reports.len();
     bench.run(1_000, |time_s| (OffCycleWish::Follow, 0.25 + 0.5 * time_s, 0.5));
     assert!(bench.reports.len() <= reports + 1);
-    assert_eq!(bench.drive().fault(), 0x0FA2);
+    assert_eq!(bench.observe().error_code, 0x0FA2);
     assert!(bench.follower.counts().failures > 3);
     bench.line.disturb(LineDisturbance::default(), 0);
     bench.run(500, |_| (OffCycleWish::Stop, 0.25, 0.0));
@@ -293,5 +304,5 @@ fn a_noisy_line_costs_turns_and_no_motion() {
 fn a_target_that_is_no_number_commands_the_velocity_0() {
     let mut bench = Bench::following();
     bench.run(500, |_| (OffCycleWish::Follow, f64::NAN, f64::INFINITY));
-    assert_eq!(bench.drive().velocity(), 0.0);
+    assert_eq!(bench.velocity(), 0.0);
 }

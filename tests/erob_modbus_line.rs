@@ -1,5 +1,8 @@
 //! Drives on a Modbus line of this machine: procedures, `takt drive`, and a simulated drive behind a pseudo-terminal, in real time.
 
+#[path = "simulated/erob_module.rs"]
+mod erob_module;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -10,8 +13,11 @@ use std::time::Duration;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
+use takt::family;
+use takt::family::commission::TargetDrive;
+use takt::internals::family::erob::motion::{Motion, Profile};
+use takt::internals::family::erob::procedure::{self, End, MotionFailure, Run};
 use takt::internals::family::erob_modbus::drive::{AccessError, ErobDrive};
-use takt::internals::family::erob_modbus::motion::{self, End, Motion, MotionFailure, Profile};
 use takt::internals::family::erob_modbus::registers;
 use takt::internals::link::modbus_line::ModbusLine;
 use takt::internals::link::serial_line::{SerialLine, SerialLineError, SerialSettings};
@@ -23,33 +29,17 @@ use takt::internals::procedure::{ModbusClient, ModbusSession, Procedure, Procedu
 use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::internals::sim::pseudo_terminal::PseudoTerminal;
 use takt::internals::sim::serial_line::host;
-use takt::sim::plant::{Encoder, JointParameters};
 
 const SLAVE: u8 = 2;
 const SETTINGS: SerialSettings = SerialSettings::new(115_200);
 const TIMING: MasterTiming = MasterTiming::new(LineTiming::new(115_200));
 
 fn drive(address: u8) -> ErobModbusDrive {
-    let joint = JointParameters {
-        inertia: 0.3,
-        viscous_friction: 2.0,
-        coulomb_friction: 4.0,
-        friction_shape: takt::config::FrictionShape::Constant,
-        brake_torque: 60.0,
-    };
     ErobModbusDrive::new(ErobModbusParameters {
         address,
         bit_rate_code: 4,
-        joint,
-        encoder: Encoder { counts_per_unit: 524_288.0 / std::f64::consts::TAU, zero_counts: 0.0 },
-        counts_per_turn: 524_288.0,
-        initial_position: 0.0,
-        peak_torque: 60.0,
-        torque_per_ampere: 31.0 / 6.3,
-        highest_velocity: 3.0,
-        ready_ns: 0,
+        module: erob_module::module(),
         reply_ns: 1_000_000,
-        has_battery: true,
         has_torque_sensor: false,
     })
 }
@@ -134,8 +124,14 @@ fn a_motion_is_carried_out_over_a_line_of_this_machine() {
         let session = ModbusSession::new(ModbusClient::new(slave(SLAVE), TIMING));
         let drive = ErobDrive::new(session.clone());
         let profile = Profile { velocity: 100_000, acceleration: 1_000_000, deceleration: 1_000_000 };
-        let work = async move { motion::carry_out(&drive, Motion::To(30_000, profile)).await };
-        let mut procedure = Procedure::<_, _, MotionFailure>::new(session, work);
+        let family = family::all().into_iter().find(|family| family.word() == "erob-modbus").unwrap();
+        let target = TargetDrive::unconfigured(SLAVE, family.unconfigured().unwrap()).unwrap();
+        let motion = Motion::To(30_000, profile);
+        let work = async move {
+            let run = Run { motion, duration_ns: None, keeps_enabled: false, target: &target };
+            procedure::carry_out(&drive, run).await
+        };
+        let mut procedure = Procedure::<_, _, MotionFailure<AccessError>>::new(session, work);
         let mut readings = 0;
         let outcome = carry_out(&mut line, &mut procedure, || readings += 1);
         assert!(readings > 5);
@@ -220,6 +216,9 @@ fn takt_drive_commissions_a_drive_on_a_serial_line() {
         done(line, &["zero", "--yes"]);
         refused(line, &["write", "actual position", "0 deg"], "can only be read");
         refused(line, &["torque", "1 Nm", "--max-velocity", "10 deg/s"], "the value is a current in mA");
+        refused(line, &["torque", "20000", "--raw", "--max-velocity", "20000"], "peak current, 12600 mA");
+        let swung = done(line, &[&["move", "reciprocate", "2 deg", "--times", "1"], &profile[..]].concat());
+        assert_eq!((&swung["moves"], &swung["state"]), (&2.into(), &"motor off".into()), "{swung}");
         refused(line, &["home"], "no homing");
     });
 }

@@ -4,7 +4,9 @@
 mod rows;
 
 use rows::columns;
-use takt::internals::family::erob_modbus::registers::{self, Access, Number, Register, Unit};
+use takt::internals::erob_parameter::{Access, Unit};
+use takt::internals::family::erob_modbus::register::{Number, Register};
+use takt::internals::family::erob_modbus::registers;
 use takt::internals::modbus::frame::{
     Received, ReceivedRequest, RegisterRange, RegisterValues, Reply, Request, SlaveAddress, evaluate,
     reply_frame,
@@ -144,7 +146,7 @@ fn the_table_has_every_register_of_the_manual_with_its_access_its_width_and_its_
         let access = match row[3].as_str() {
             "R" => Access::Read,
             "R/W" => Access::ReadWrite,
-            "W" => Access::Command,
+            "W" => Access::CommandWithArgument,
             other => panic!("{other}"),
         };
         let number = match (row[5].as_str(), row[6].as_str()) {
@@ -156,17 +158,22 @@ fn the_table_has_every_register_of_the_manual_with_its_access_its_width_and_its_
         };
         assert_eq!(
             (register.access, register.number, register.unit),
-            (access, number, unit(&row[4])),
+            (access, number, unit(&row[4], register)),
             "{register}"
         );
         assert_eq!(row[7] == "high-first", number.words() == 2, "{register}");
     }
 }
 
-fn unit(text: &str) -> Unit {
+fn unit(text: &str, register: &Register) -> Unit {
     match text {
         "" | "enum" | "code (printed unit: bps)" => Unit::None,
-        "count" => Unit::Counts,
+        // The table calls positions, distances and the counts of the encoders alike.
+        "count" => match register.address {
+            0x0045 | 0x0068 | 0x0079 | 0x00B9 => Unit::DistanceCounts,
+            0x007D => Unit::EncoderCounts,
+            _ => Unit::Counts,
+        },
         "count/s" => Unit::CountsPerSecond,
         "count/s^2" => Unit::CountsPerSecondSquared,
         "mA" => Unit::Milliamperes,

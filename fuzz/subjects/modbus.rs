@@ -6,6 +6,7 @@ use takt::internals::modbus::frame::{
 };
 use takt::internals::modbus::line_timing::LineTiming;
 use takt::internals::modbus::master::{Master, MasterTiming, Repeat};
+use takt::internals::sim::commanded_module::ModuleParameters;
 use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::internals::sim::serial_line::DevicesOnLine;
 use takt::sim::plant::{Encoder, JointParameters};
@@ -103,22 +104,24 @@ fn drive() -> ErobModbusDrive {
     ErobModbusDrive::new(ErobModbusParameters {
         address: SLAVE,
         bit_rate_code: 4,
-        joint: JointParameters {
-            inertia: 0.3,
-            viscous_friction: 2.0,
-            coulomb_friction: 4.0,
-            friction_shape: takt::config::FrictionShape::Constant,
-            brake_torque: 60.0,
+        module: ModuleParameters {
+            joint: JointParameters {
+                inertia: 0.3,
+                viscous_friction: 2.0,
+                coulomb_friction: 4.0,
+                friction_shape: takt::config::FrictionShape::Constant,
+                brake_torque: 60.0,
+            },
+            encoder: Encoder { counts_per_unit: 524_288.0 / std::f64::consts::TAU, zero_counts: 0.0 },
+            counts_per_turn: 524_288.0,
+            initial_position: 0.0,
+            peak_torque: 60.0,
+            torque_per_ampere: 5.0,
+            highest_velocity: 3.0,
+            ready_ns: 0,
+            has_battery: true,
         },
-        encoder: Encoder { counts_per_unit: 524_288.0 / std::f64::consts::TAU, zero_counts: 0.0 },
-        counts_per_turn: 524_288.0,
-        initial_position: 0.0,
-        peak_torque: 60.0,
-        torque_per_ampere: 5.0,
-        highest_velocity: 3.0,
-        ready_ns: 0,
         reply_ns: 1_000_000,
-        has_battery: true,
         has_torque_sensor: false,
     })
 }
@@ -144,6 +147,6 @@ fn talk_to_drive(mut input: Input<'_>) {
         let taken = evaluate(&request, slave(), &reply);
         assert!(matches!(taken, Received::Whole(Ok(_))), "{request:?}: {reply:02X?}");
     }
-    let velocity = line.module(0).expect("the drive is there").velocity();
+    let velocity = line.drive(SLAVE).expect("the drive is there").observe(now_ns).velocity;
     assert!(velocity.is_finite());
 }

@@ -7,6 +7,7 @@ use takt_rt::{Frame, Id, Nanoseconds};
 use super::entries;
 use super::error_code::ErrorCode;
 use super::frame::{Reply, Request, replying_node};
+use crate::erob_parameter::Parameter as _;
 
 /// How long the client waits, and how often it asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,8 +64,8 @@ impl fmt::Display for RequestError {
         match self.request {
             Request::Read(_) => write!(f, "reading {name}: ")?,
             Request::Write(address, value) => {
-                let shown =
-                    entries::find(address).map_or_else(|| value.to_string(), |entry| entry.show(value));
+                let shown = entries::find(address)
+                    .map_or_else(|| value.to_string(), |entry| entry.show(value.into()));
                 write!(f, "writing {shown} to {name}: ")?;
             }
             Request::Command(_) => write!(f, "command {name}: ")?,

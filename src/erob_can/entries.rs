@@ -4,6 +4,7 @@
 use std::fmt;
 
 use super::frame::EntryAddress;
+use crate::erob_parameter::{Access, Parameter, Unit, Values};
 
 /// An entry of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,7 +14,7 @@ pub struct Entry {
     /// Its name.
     pub name: &'static str,
     /// What may be done with it.
-    pub access: EntryAccess,
+    pub access: Access,
     /// The unit of its number on the wire.
     pub unit: Unit,
     /// Which numbers it takes, or shows.
@@ -22,162 +23,52 @@ pub struct Entry {
     pub note: &'static str,
 }
 
-/// What may be done with an entry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EntryAccess {
-    /// It is read.
-    Read,
-    /// It is read and written.
-    ReadWrite,
-    /// It is written; whether it can be read is not known.
-    Write,
-    /// It is a command without an argument.
-    Command,
-    /// It is a command with an argument.
-    CommandWithArgument,
-}
+impl Parameter for Entry {
+    const KIND: &'static str = "entry";
+    const EXAMPLE: &'static str = "0x0086, 0x0232:5";
 
-impl EntryAccess {
-    /// Whether the entry can be read.
-    pub const fn can_read(self) -> bool {
-        matches!(self, Self::Read | Self::ReadWrite)
+    fn all() -> &'static [Self] {
+        &ALL
     }
 
-    /// Whether a value can be sent to the entry.
-    pub const fn can_write(self) -> bool {
-        matches!(self, Self::ReadWrite | Self::Write | Self::CommandWithArgument)
-    }
-}
-
-/// The unit of a number on the wire.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unit {
-    /// None: a plain number.
-    None,
-    /// A position in counts at the output: 524288 are a turn.
-    Counts,
-    /// A distance in counts at the output.
-    DistanceCounts,
-    /// Counts of one of the two encoders.
-    EncoderCounts,
-    /// Counts per second.
-    CountsPerSecond,
-    /// Counts per second squared.
-    CountsPerSecondSquared,
-    /// Milliamperes.
-    Milliamperes,
-    /// Millivolts.
-    Millivolts,
-    /// Milliseconds, as printed. The Modbus manual has the same quantities in units of 0.05 ms: try it on hardware.
-    Milliseconds,
-    /// Degrees Celsius.
-    Celsius,
-    /// Bits per second.
-    BitsPerSecond,
-    /// Thousandths of the continuous current.
-    PerMille,
-    /// Millinewton-metres.
-    MillinewtonMetres,
-}
-
-impl Unit {
-    /// The unit as it is written behind a number; empty for a plain number.
-    pub const fn symbol(self) -> &'static str {
-        match self {
-            Self::None => "",
-            Self::Counts | Self::DistanceCounts | Self::EncoderCounts => "count",
-            Self::CountsPerSecond => "count/s",
-            Self::CountsPerSecondSquared => "count/s²",
-            Self::Milliamperes => "mA",
-            Self::Millivolts => "mV",
-            Self::Milliseconds => "ms",
-            Self::Celsius => "°C",
-            Self::BitsPerSecond => "bit/s",
-            Self::PerMille => "‰",
-            Self::MillinewtonMetres => "mN·m",
-        }
-    }
-}
-
-/// The numbers that an entry takes or shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Values {
-    /// Any.
-    Any,
-    /// Those from here to there.
-    Range(i32, i32),
-    /// These, with their meanings.
-    Named(&'static [(i32, &'static str)]),
-}
-
-/// A value that an entry does not take.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ValueError {
-    /// The entry.
-    pub entry: Entry,
-    /// The value.
-    pub value: i32,
-}
-
-impl std::error::Error for ValueError {}
-
-impl fmt::Display for ValueError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} cannot be {}: it takes ", self.entry, self.value)?;
-        self.entry.values.fmt(f)
-    }
-}
-
-impl fmt::Display for Values {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Any => write!(f, "any number"),
-            Self::Range(lowest, i32::MAX) => write!(f, "{lowest} and more"),
-            Self::Range(lowest, highest) if lowest == highest => write!(f, "{lowest}"),
-            Self::Range(lowest, highest) => write!(f, "{lowest} to {highest}"),
-            Self::Named(names) => {
-                for (place, (value, name)) in names.iter().enumerate() {
-                    write!(f, "{}{value} ({name})", if place > 0 { ", " } else { "" })?;
-                }
-                Ok(())
-            }
-        }
-    }
-}
-
-impl Entry {
-    /// Checks that the entry takes a value.
-    ///
-    /// # Errors
-    /// It does not.
-    pub fn check(&self, value: i32) -> Result<(), ValueError> {
-        let is_taken = match self.values {
-            Values::Any => true,
-            Values::Range(lowest, highest) => (lowest..=highest).contains(&value),
-            Values::Named(names) => names.iter().any(|(known, _)| *known == value),
-        };
-        if is_taken { Ok(()) } else { Err(ValueError { entry: *self, value }) }
+    /// `index:sub-index` in hexadecimal: `86`, `0x0232`, `0232:5`. One that the table does not have can be read and written as well.
+    fn at(address: &str) -> Option<Self> {
+        let address = EntryAddress::parse(address)?;
+        Some(find(address).copied().unwrap_or(Self::unlisted(address)))
     }
 
-    /// What a value means, where the entry has words for its values.
-    pub fn meaning(&self, value: i32) -> Option<&'static str> {
-        let Values::Named(names) = self.values else { return None };
-        names.iter().find(|(known, _)| *known == value).map(|(_, meaning)| *meaning)
+    fn address(&self) -> String {
+        self.address.to_string()
     }
 
-    /// A value in words: with its unit, or its meaning.
-    pub fn show(&self, value: i32) -> String {
-        match (self.meaning(value), self.unit.symbol()) {
-            (Some(meaning), _) => format!("{value} ({meaning})"),
-            (None, "") => value.to_string(),
-            (None, unit) => format!("{value} {unit}"),
-        }
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn access(&self) -> Access {
+        self.access
+    }
+
+    fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    fn values(&self) -> Values {
+        self.values
+    }
+
+    fn range(&self) -> (i64, i64) {
+        (i32::MIN.into(), i32::MAX.into())
+    }
+
+    fn note(&self) -> &'static str {
+        self.note
     }
 }
 
 impl fmt::Display for Entry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} ({})", self.name, self.address)
+        if self.is_listed() { write!(f, "{} ({})", self.name, self.address) } else { self.address.fmt(f) }
     }
 }
 
@@ -192,13 +83,12 @@ pub fn describe(address: EntryAddress) -> String {
 }
 
 const YES_NO: Values = Values::Named(&[(0, "no"), (1, "yes")]);
-const NOT_NEGATIVE: Values = Values::Range(0, i32::MAX);
 
 const fn read(index: u16, name: &'static str, unit: Unit) -> Entry {
     Entry {
         address: EntryAddress::new(index),
         name,
-        access: EntryAccess::Read,
+        access: Access::Read,
         unit,
         values: Values::Any,
         note: "",
@@ -210,23 +100,40 @@ const fn read_sub(index: u16, sub_index: u16, name: &'static str) -> Entry {
 }
 
 const fn set(index: u16, name: &'static str, unit: Unit) -> Entry {
-    Entry { access: EntryAccess::ReadWrite, ..read(index, name, unit) }
+    Entry { access: Access::ReadWrite, ..read(index, name, unit) }
 }
 
 const fn command(index: u16, name: &'static str) -> Entry {
-    Entry { access: EntryAccess::Command, ..read(index, name, Unit::None) }
+    Entry { access: Access::Command, ..read(index, name, Unit::None) }
 }
 
 impl Entry {
-    const fn note(self, note: &'static str) -> Self {
+    /// An address that the table does not have: what is known of it is that it has 32 bits.
+    const fn unlisted(address: EntryAddress) -> Self {
+        Self {
+            address,
+            name: "entry",
+            access: Access::ReadWrite,
+            unit: Unit::None,
+            values: Values::Any,
+            note: "",
+        }
+    }
+
+    /// Whether the table has it.
+    pub fn is_listed(&self) -> bool {
+        find(self.address).is_some()
+    }
+
+    const fn with_note(self, note: &'static str) -> Self {
         Self { note, ..self }
     }
 
-    const fn values(self, values: Values) -> Self {
+    const fn taking(self, values: Values) -> Self {
         Self { values, ..self }
     }
 
-    const fn access(self, access: EntryAccess) -> Self {
+    const fn with_access(self, access: Access) -> Self {
         Self { access, ..self }
     }
 }
@@ -237,7 +144,7 @@ pub const HARDWARE_VERSION: Entry = read_sub(0x0001, 3, "hardware version");
 pub const FIRMWARE_VERSION: Entry = read_sub(0x0001, 4, "firmware version");
 /// Actual position.
 pub const ACTUAL_POSITION: Entry =
-    read(0x0002, "actual position", Unit::Counts).note("at the output; it may lie beyond one turn");
+    read(0x0002, "actual position", Unit::Counts).with_note("at the output; it may lie beyond one turn");
 /// Actual velocity.
 pub const ACTUAL_VELOCITY: Entry =
     Entry { unit: Unit::CountsPerSecond, ..read_sub(0x0005, 1, "actual velocity") };
@@ -249,21 +156,21 @@ pub const PHASE_U_CURRENT: Entry = read(0x0009, "phase U current", Unit::Milliam
 pub const PHASE_V_CURRENT: Entry = read(0x000A, "phase V current", Unit::Milliamperes);
 /// Phase U voltage.
 pub const PHASE_U_VOLTAGE: Entry =
-    read(0x000D, "phase U voltage", Unit::Millivolts).note("printed in mA, as no other voltage is");
+    read(0x000D, "phase U voltage", Unit::Millivolts).with_note("printed in mA, as no other voltage is");
 /// Phase V voltage.
 pub const PHASE_V_VOLTAGE: Entry = read(0x000E, "phase V voltage", Unit::Millivolts);
 /// Phase W voltage.
 pub const PHASE_W_VOLTAGE: Entry = read(0x000F, "phase W voltage", Unit::Millivolts);
 /// Error code.
 pub const ERROR_CODE: Entry = read(0x001F, "error code", Unit::None)
-    .note("0 is ready; the others stand in appendix 2 of the eRob user manual");
+    .with_note("0 is ready; the others stand in appendix 2 of the eRob user manual");
 /// Running state.
 pub const RUNNING_STATE: Entry = read(0x0020, "running state", Unit::None)
-    .values(Values::Named(&[(0, "stopped"), (1, "moving"), (3, "stopping reciprocation")]))
-    .note("the numbers are those of the Modbus manual; try them on hardware");
+    .taking(Values::Named(&[(0, "stopped"), (1, "moving"), (3, "stopping reciprocation")]))
+    .with_note("the numbers are those of the Modbus manual; try them on hardware");
 /// Digital inputs.
 pub const DIGITAL_INPUTS: Entry = read(0x0022, "digital inputs", Unit::None)
-    .note("bits 0 to 5 are IN1 to IN6; joint modules have IN1 and IN2");
+    .with_note("bits 0 to 5 are IN1 to IN6; joint modules have IN1 and IN2");
 /// Analogue input.
 pub const ANALOGUE_INPUT: Entry = read(0x0023, "analogue input", Unit::Millivolts);
 /// DC bus voltage.
@@ -272,91 +179,91 @@ pub const BUS_VOLTAGE: Entry = read(0x0024, "DC bus voltage", Unit::Millivolts);
 pub const TEMPERATURE: Entry = read(0x0026, "power stage temperature", Unit::Celsius);
 /// Continuous current.
 pub const CONTINUOUS_CURRENT: Entry =
-    read(0x0033, "continuous current", Unit::Milliamperes).note("eTunner, page safety power supply");
+    read(0x0033, "continuous current", Unit::Milliamperes).with_note("eTunner, page safety power supply");
 /// Peak current.
 pub const PEAK_CURRENT: Entry =
-    read(0x0034, "peak current", Unit::Milliamperes).note("eTunner, page safety power supply");
+    read(0x0034, "peak current", Unit::Milliamperes).with_note("eTunner, page safety power supply");
 /// Peak current duration.
-pub const PEAK_CURRENT_DURATION: Entry =
-    read(0x0035, "peak current duration", Unit::Milliseconds).note("for so long the peak current may flow");
+pub const PEAK_CURRENT_DURATION: Entry = read(0x0035, "peak current duration", Unit::Milliseconds)
+    .with_note("for so long the peak current may flow");
 /// CAN address.
 pub const CAN_ADDRESS: Entry =
-    set(0x0043, "CAN address", Unit::None).values(Values::Range(1, 64)).note("the node ID of the joint");
+    set(0x0043, "CAN address", Unit::None).taking(Values::Range(1, 64)).with_note("the node ID of the joint");
 /// CAN bit rate.
 pub const BIT_RATE: Entry =
-    read(0x0044, "CAN bit rate", Unit::BitsPerSecond).note("1 Mbit/s, which cannot be changed");
+    read(0x0044, "CAN bit rate", Unit::BitsPerSecond).with_note("1 Mbit/s, which cannot be changed");
 /// Operating mode.
 pub const OPERATING_MODE: Entry = set(0x004E, "operating mode", Unit::None)
-    .values(Values::Named(&[(1, "torque control"), (2, "velocity control"), (3, "position control")]))
-    .note("disable before a change; 4 is printed too, with a meaning that nobody can read");
+    .taking(Values::Named(&[(1, "torque control"), (2, "velocity control"), (3, "position control")]))
+    .with_note("disable before a change; 4 is printed too, with a meaning that nobody can read");
 /// Maximum velocity.
 pub const MAXIMUM_VELOCITY: Entry =
-    set(0x0050, "maximum velocity", Unit::CountsPerSecond).values(NOT_NEGATIVE);
+    set(0x0050, "maximum velocity", Unit::CountsPerSecond).taking(Values::NotNegative);
 /// Position limit minimum.
 pub const POSITION_LIMIT_MINIMUM: Entry = set(0x0052, "position limit minimum", Unit::Counts);
 /// Position limit maximum.
 pub const POSITION_LIMIT_MAXIMUM: Entry = set(0x0053, "position limit maximum", Unit::Counts);
 /// Maximum position error.
 pub const MAXIMUM_POSITION_ERROR: Entry = set(0x0054, "maximum position error", Unit::DistanceCounts)
-    .values(NOT_NEGATIVE)
-    .note("a fault beyond it; from the factory 5242 to 10484, of the eRob142 1800 to 4320");
+    .taking(Values::NotNegative)
+    .with_note("a fault beyond it; from the factory 5242 to 10484, of the eRob142 1800 to 4320");
 /// Maximum velocity error.
 pub const MAXIMUM_VELOCITY_ERROR: Entry = set(0x0055, "maximum velocity error", Unit::CountsPerSecond)
-    .values(NOT_NEGATIVE)
-    .note("a fault beyond it; from the factory 42000 to 84000");
+    .taking(Values::NotNegative)
+    .with_note("a fault beyond it; from the factory 42000 to 84000");
 /// Stall current.
 pub const STALL_CURRENT: Entry = set(0x0056, "stall current", Unit::Milliamperes)
-    .values(NOT_NEGATIVE)
-    .note("from the factory 120 % of the continuous current, of the eRob110 and eRob142 110 %");
+    .taking(Values::NotNegative)
+    .with_note("from the factory 120 % of the continuous current, of the eRob110 and eRob142 110 %");
 /// Stall velocity.
 pub const STALL_VELOCITY: Entry = set(0x0057, "stall velocity", Unit::CountsPerSecond)
-    .values(NOT_NEGATIVE)
-    .note("a fault below it, with more than the stall current for the stall time");
+    .taking(Values::NotNegative)
+    .with_note("a fault below it, with more than the stall current for the stall time");
 /// Stall time.
-pub const STALL_TIME: Entry = set(0x0058, "stall time", Unit::Milliseconds).values(NOT_NEGATIVE);
+pub const STALL_TIME: Entry = set(0x0058, "stall time", Unit::Milliseconds).taking(Values::NotNegative);
 /// Maximum phase current.
 pub const MAXIMUM_PHASE_CURRENT: Entry = set(0x0062, "maximum phase current", Unit::Milliamperes)
-    .values(NOT_NEGATIVE)
-    .note("the drive shuts off beyond it");
+    .taking(Values::NotNegative)
+    .with_note("the drive shuts off beyond it");
 /// Maximum motor current.
 pub const MAXIMUM_MOTOR_CURRENT: Entry = set(0x0063, "maximum motor current", Unit::Milliamperes)
-    .values(NOT_NEGATIVE)
-    .note("the drive shuts off beyond it");
+    .taking(Values::NotNegative)
+    .with_note("the drive shuts off beyond it");
 /// Position loop gain.
 pub const POSITION_LOOP_GAIN: Entry = set(0x0064, "position loop gain", Unit::None)
-    .values(NOT_NEGATIVE)
-    .note("the factory value suits most uses");
+    .taking(Values::NotNegative)
+    .with_note("the factory value suits most uses");
 /// Velocity loop gain.
 pub const VELOCITY_LOOP_GAIN: Entry = set(0x0066, "velocity loop gain", Unit::None)
-    .values(NOT_NEGATIVE)
-    .note("the factory value suits most uses");
+    .taking(Values::NotNegative)
+    .with_note("the factory value suits most uses");
 /// Velocity loop integral.
 pub const VELOCITY_LOOP_INTEGRAL: Entry = set(0x0067, "velocity loop integral", Unit::None)
-    .values(NOT_NEGATIVE)
-    .note("the factory value suits most uses");
+    .taking(Values::NotNegative)
+    .with_note("the factory value suits most uses");
 /// Start motion.
 pub const START_MOTION: Entry = command(0x0083, "start motion");
 /// Stop motion.
-pub const STOP_MOTION: Entry = command(0x0084, "stop motion").note("with the profile deceleration");
+pub const STOP_MOTION: Entry = command(0x0084, "stop motion").with_note("with the profile deceleration");
 /// Absolute target position.
 pub const TARGET_POSITION: Entry =
-    set(0x0086, "absolute target position", Unit::Counts).note("the relative position must be 0");
+    set(0x0086, "absolute target position", Unit::Counts).with_note("the relative position must be 0");
 /// Relative position.
 pub const RELATIVE_POSITION: Entry = set(0x0087, "relative position", Unit::DistanceCounts)
-    .note("0 for an absolute move; the sign is the direction");
+    .with_note("0 for an absolute move; the sign is the direction");
 /// Profile acceleration.
 pub const PROFILE_ACCELERATION: Entry = set(0x0088, "profile acceleration", Unit::CountsPerSecondSquared)
-    .values(NOT_NEGATIVE)
-    .note("at most three times the profile velocity is advised");
+    .taking(Values::NotNegative)
+    .with_note("at most three times the profile velocity is advised");
 /// Profile deceleration.
 pub const PROFILE_DECELERATION: Entry = set(0x0089, "profile deceleration", Unit::CountsPerSecondSquared)
-    .values(NOT_NEGATIVE)
-    .note("at most three times the profile velocity is advised");
+    .taking(Values::NotNegative)
+    .with_note("at most three times the profile velocity is advised");
 /// Profile velocity.
 pub const PROFILE_VELOCITY: Entry = set(0x008A, "profile velocity", Unit::CountsPerSecond)
-    .note("its sign is the direction of continuous motion, in which it may be changed");
+    .with_note("its sign is the direction of continuous motion, in which it may be changed");
 /// Jerk setting.
-pub const JERK_SETTING: Entry = set(0x008B, "jerk setting", Unit::None).values(Values::Named(&[
+pub const JERK_SETTING: Entry = set(0x008B, "jerk setting", Unit::None).taking(Values::Named(&[
     (0, "50 µs"),
     (1, "100 µs"),
     (2, "200 µs"),
@@ -371,93 +278,94 @@ pub const JERK_SETTING: Entry = set(0x008B, "jerk setting", Unit::None).values(V
 /// Quick-stop deceleration.
 pub const QUICK_STOP_DECELERATION: Entry =
     set(0x008C, "quick-stop deceleration", Unit::CountsPerSecondSquared)
-        .values(NOT_NEGATIVE)
-        .note("at a temperature alarm, and at a position limit");
+        .taking(Values::NotNegative)
+        .with_note("at a temperature alarm, and at a position limit");
 /// Motion mode.
 pub const MOTION_MODE: Entry = set(0x008D, "motion mode", Unit::None)
-    .values(Values::Named(&[(0, "continuous"), (1, "target position"), (2, "reciprocating")]))
-    .note("stop before a change");
+    .taking(Values::Named(&[(0, "continuous"), (1, "target position"), (2, "reciprocating")]))
+    .with_note("stop before a change");
 /// Dwell time.
 pub const DWELL_TIME: Entry = set(0x0093, "dwell time", Unit::Milliseconds)
-    .values(NOT_NEGATIVE)
-    .note("at each reversal of reciprocating motion");
+    .taking(Values::NotNegative)
+    .with_note("at each reversal of reciprocating motion");
 /// Motor angle.
 pub const MOTOR_ANGLE: Entry =
-    read(0x009C, "motor angle", Unit::EncoderCounts).note("of the encoder on the motor's side");
+    read(0x009C, "motor angle", Unit::EncoderCounts).with_note("of the encoder on the motor's side");
 /// Apply acceleration limits to all motion.
 pub const LIMITS_APPLY: Entry =
-    set(0x009E, "apply acceleration limits to all motion", Unit::None).values(YES_NO);
+    set(0x009E, "apply acceleration limits to all motion", Unit::None).taking(YES_NO);
 /// Load angle.
-pub const LOAD_ANGLE: Entry =
-    read(0x009F, "load angle", Unit::EncoderCounts).note("of the single-turn encoder on the load's side");
+pub const LOAD_ANGLE: Entry = read(0x009F, "load angle", Unit::EncoderCounts)
+    .with_note("of the single-turn encoder on the load's side");
 /// Save parameters.
-pub const SAVE: Entry = command(0x00E8, "save parameters").note("leave the power on for 3 s");
+pub const SAVE: Entry = command(0x00E8, "save parameters").with_note("leave the power on for 3 s");
 /// Three-phase current sum error.
 pub const PHASE_CURRENT_SUM_ERROR: Entry =
-    set(0x00FD, "three-phase current sum error", Unit::Milliamperes).values(NOT_NEGATIVE);
+    set(0x00FD, "three-phase current sum error", Unit::Milliamperes).taking(Values::NotNegative);
 /// Phase W current.
 pub const PHASE_W_CURRENT: Entry = read(0x00FE, "phase W current", Unit::Milliamperes);
 /// COM number.
 pub const COM_NUMBER: Entry =
-    set(0x00FF, "COM number", Unit::None).values(NOT_NEGATIVE).note("the ID on the RS-485 line");
+    set(0x00FF, "COM number", Unit::None).taking(Values::NotNegative).with_note("the ID on the RS-485 line");
 /// Motor enable.
 pub const MOTOR_ENABLE: Entry = command(0x0100, "motor enable")
-    .access(EntryAccess::CommandWithArgument)
-    .values(Values::Named(&[(0, "disable"), (1, "enable")]));
+    .with_access(Access::CommandWithArgument)
+    .taking(Values::Named(&[(0, "disable"), (1, "enable")]));
 /// Positioning-complete threshold.
 pub const POSITIONED_THRESHOLD: Entry =
-    set(0x0109, "positioning-complete threshold", Unit::DistanceCounts).values(NOT_NEGATIVE);
+    set(0x0109, "positioning-complete threshold", Unit::DistanceCounts).taking(Values::NotNegative);
 /// Positioning-complete time.
 pub const POSITIONED_TIME: Entry =
-    set(0x010A, "positioning-complete time", Unit::Milliseconds).values(NOT_NEGATIVE);
+    set(0x010A, "positioning-complete time", Unit::Milliseconds).taking(Values::NotNegative);
 /// Target-reached state.
 pub const TARGET_REACHED_STATE: Entry = read(0x010C, "target-reached state", Unit::None)
-    .values(Values::Named(&[
+    .taking(Values::Named(&[
         (0, "motor off"),
         (1, "motor on"),
         (2, "running"),
         (3, "settling"),
         (4, "target reached"),
     ]))
-    .note("2 is that of the Modbus manual");
+    .with_note("2 is that of the Modbus manual");
 /// Control source.
 pub const CONTROL_SOURCE: Entry = set(0x0112, "control source", Unit::None)
-    .values(Values::Named(&[(0, "not used"), (1, "EtherCAT")]))
-    .note("16 is printed too, with a meaning that nobody can read");
+    .taking(Values::Named(&[(0, "not used"), (1, "EtherCAT")]))
+    .with_note("16 is printed too, with a meaning that nobody can read");
 /// Reset load-side encoder.
 pub const RESET_LOAD_ENCODER: Entry = command(0x0114, "reset load-side encoder")
-    .access(EntryAccess::CommandWithArgument)
-    .values(Values::Range(1, 1))
-    .note(
+    .with_access(Access::CommandWithArgument)
+    .taking(Values::Range(1, 1))
+    .with_note(
         "WIPES THE MULTI-TURN COUNT: home the joint again; only after a battery alarm of a multi-turn model",
     );
 /// Encoder difference.
 pub const ENCODER_DIFFERENCE: Entry = read(0x0119, "encoder difference", Unit::EncoderCounts)
-    .note("between the two encoders, a measure of the torque; in no table of the manual, read by a program of the vendor");
+    .with_note("between the two encoders, a measure of the torque; in no table of the manual, read by a program of the vendor");
 /// Allow loop changes over the bus.
-pub const LOOP_CHANGES: Entry = set(0x0124, "allow loop changes over the bus", Unit::None).values(YES_NO);
+pub const LOOP_CHANGES: Entry = set(0x0124, "allow loop changes over the bus", Unit::None).taking(YES_NO);
 /// Maximum output torque.
 pub const MAXIMUM_TORQUE: Entry = set(0x0129, "maximum output torque", Unit::PerMille)
-    .values(NOT_NEGATIVE)
-    .note("of the continuous current: sets the peak current");
+    .taking(Values::NotNegative)
+    .with_note("of the continuous current: sets the peak current");
 /// Release brake.
-pub const RELEASE_BRAKE: Entry = command(0x014F, "release brake").note("nothing holds the joint then");
+pub const RELEASE_BRAKE: Entry = command(0x014F, "release brake").with_note("nothing holds the joint then");
 /// Analogue quantity type.
 pub const ANALOGUE_TYPE: Entry = set(0x01FD, "analogue quantity type", Unit::None)
-    .access(EntryAccess::Write)
-    .values(Values::Named(&[(0, "internal")]))
-    .note("not in the table of the manual, and used in its procedures");
+    .with_access(Access::Write)
+    .taking(Values::Named(&[(0, "internal")]))
+    .with_note("not in the table of the manual, and used in its procedures");
 /// Analogue quantity: the set-point of velocity and torque control.
-pub const SET_POINT: Entry = set(0x01FE, "analogue quantity", Unit::None)
-    .access(EntryAccess::Write)
-    .note("the set-point: count/s in velocity control, mA in torque control; not in the table of the manual");
+pub const SET_POINT: Entry =
+    set(0x01FE, "analogue quantity", Unit::None).with_access(Access::Write).with_note(
+        "the set-point: count/s in velocity control, mA in torque control; not in the table of the manual",
+    );
 /// Torque-mode velocity limit.
 pub const TORQUE_VELOCITY_LIMIT: Entry = set(0x0204, "torque-mode velocity limit", Unit::CountsPerSecond)
-    .values(NOT_NEGATIVE)
-    .note("may be changed only while disabled");
+    .taking(Values::NotNegative)
+    .with_note("may be changed only while disabled");
 /// Torque sensor value.
 pub const TORQUE_SENSOR: Entry =
-    read(0x020D, "torque sensor value", Unit::MillinewtonMetres).note("of models with a torque sensor");
+    read(0x020D, "torque sensor value", Unit::MillinewtonMetres).with_note("of models with a torque sensor");
 /// Module serial counter.
 pub const SERIAL_COUNTER: Entry = read_sub(0x0232, 1, "module serial counter");
 /// Module model information A.
@@ -468,7 +376,7 @@ pub const MODEL_B: Entry = read_sub(0x0232, 5, "module model information B");
 pub const HARDWARE_CHANGE: Entry = read_sub(0x0232, 6, "hardware change identifier");
 /// IO function identifier.
 pub const IO_IDENTIFIER: Entry = read_sub(0x0232, 7, "IO function identifier")
-    .note("modules with EtherCAT always have inputs and outputs, and show 0");
+    .with_note("modules with EtherCAT always have inputs and outputs, and show 0");
 /// Module version.
 pub const MODULE_VERSION: Entry = read_sub(0x0232, 8, "module version");
 

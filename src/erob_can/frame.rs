@@ -37,6 +37,21 @@ impl EntryAddress {
     pub const fn sub(index: u16, sub_index: u16) -> Self {
         Self { index, sub_index: Some(sub_index) }
     }
+
+    /// Reads `index:sub-index` in hexadecimal: `86`, `0x0232`, `0232:5`.
+    pub fn parse(text: &str) -> Option<Self> {
+        let hexadecimal = |text: &str| {
+            let digits = text.strip_prefix("0x").or(text.strip_prefix("0X")).unwrap_or(text);
+            u16::from_str_radix(digits.strip_suffix(['h', 'H']).unwrap_or(digits), 16).ok()
+        };
+        let (index, sub_index) = text.split_once(':').map_or((text, None), |(index, sub)| (index, Some(sub)));
+        // A name begins with a letter.
+        let index = hexadecimal(index).filter(|_| text.starts_with(|first: char| first.is_ascii_digit()))?;
+        match sub_index {
+            None => Some(Self::new(index)),
+            Some(sub_index) => Some(Self::sub(index, hexadecimal(sub_index)?)),
+        }
+    }
 }
 
 impl fmt::Display for EntryAddress {

@@ -10,6 +10,11 @@ pub mod bring_up;
 pub mod cia402;
 pub mod commission;
 mod data_sheet;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unnameable_types, reason = "the procedures of two families alone name its types")
+)]
+pub(crate) mod erob;
 pub(crate) mod erob_can;
 pub(crate) mod erob_canopen;
 #[cfg_attr(

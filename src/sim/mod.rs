@@ -13,7 +13,9 @@
 //!     frames   bits,        │
 //!     waiting  stuffing     ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
 //!                           │     canopen_node ── these together, for the drives with CiA 402
-//!                         erob_modbus ── a drive on a serial line, with its line; profile_motions ── what both protocols of its maker do
+//!                         erob_modbus ── a drive on a serial line, with its line
+//!                           │
+//!                         commanded_module, profile_motions ── an eRob that commands move, as both protocols of its maker do
 //!                           │
 //!                         motion ── ramps, profiles, interpolation; servo ── position, velocity and torque loops
 //!                           │
@@ -45,6 +47,11 @@
 pub(crate) mod bit_fields;
 mod canopen_node;
 pub mod cia402;
+#[cfg_attr(
+    not(feature = "internals"),
+    allow(unnameable_types, reason = "its parameters are those of an axis, which nobody outside makes")
+)]
+pub(crate) mod commanded_module;
 mod defect;
 mod drive;
 pub(crate) mod erob;

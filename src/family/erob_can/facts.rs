@@ -2,15 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::{Nanoseconds, OperationMode};
+use takt_rt::OperationMode;
 
 use crate::config::{
     DriveFacts, ErrorControl, ModeChangeRule, ModeSet, OwnIdentifiers, Plausible, Protocol, VelocityUnit,
 };
 use crate::erob_can::frame;
-
-/// From power-on until a drive can be enabled (cure of the errors 001F and 0056).
-pub const ENABLED_FROM_NS: Nanoseconds = 8_000_000_000;
+use crate::family::erob::ENABLED_FROM_NS;
 
 /// The facts.
 pub static FACTS: DriveFacts = DriveFacts {

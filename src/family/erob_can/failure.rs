@@ -1,10 +1,9 @@
 //! Why a task with a drive has failed, as commissioning shows it.
 
 use super::follower::UNKNOWN_REFUSAL;
-use super::motion::MotionFailure;
 use crate::canopen::emcy::ErrorCode;
 use crate::erob_can::client::{RequestError, RequestFailure};
-use crate::family::commission::{Failure, TargetDrive};
+use crate::family::commission::Failure;
 
 /// What helps after an error of the drive.
 pub const FAULT_CURE: &str =
@@ -23,28 +22,6 @@ impl From<RequestError> for Failure {
         };
         Self::Request { what: error.to_string(), cure }
     }
-}
-
-/// The failure of a motion of this drive.
-pub fn of_motion(target: &TargetDrive, failure: MotionFailure) -> Failure {
-    let words = failure.to_string();
-    match failure {
-        MotionFailure::Request(error) => error.into(),
-        MotionFailure::Drive { code } => faulted(target, code),
-        MotionFailure::TooLong { .. } => Failure::Request {
-            what: words,
-            cure: Some("check whether something blocks the joint, and the profile in the drive"),
-        },
-        MotionFailure::NotStopped { .. } => {
-            Failure::Request { what: words, cure: Some("use the emergency stop") }
-        }
-        MotionFailure::Limit(failure) => failure,
-    }
-}
-
-/// The drive shows an error, index 001F.
-pub fn faulted(target: &TargetDrive, code: i32) -> Failure {
-    Failure::Faulted { what: target.error_words(code as u16), advice: Some(FAULT_CURE) }
 }
 
 /// An error in words: of the drive, index 001F, or why it refuses to be enabled. The eRunner manual has no list of the codes of

@@ -12,13 +12,14 @@
 
 use takt_rt::{DriveState, Frame, Nanoseconds, OffCycleReport};
 
-use super::motion::OperatingMode;
-use super::reading::STANDING;
 use crate::config::Axis;
 use crate::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure, RequestTiming};
 use crate::erob_can::entries::{self, Entry};
 use crate::erob_can::frame::Request;
 use crate::family::commission::{CommandValue, TargetDrive};
+use crate::family::erob::following::{self, LOST_NS, STALE_NS, STEEPER};
+use crate::family::erob::motion::OperatingMode;
+use crate::family::erob::{AGAIN_NS, ENABLING_NS, STANDING};
 use crate::family::{OffCycleBudget, OffCycleDrive, OffCycleTarget, OffCycleWish};
 use crate::frame_time::{FrameShape, worst_case_bits};
 
@@ -34,20 +35,10 @@ const REQUESTS_PER_ROUND: u64 = 3;
 const ROUNDS_TO_REPETITION: usize = 8;
 /// The temperature takes the place of the current once in so many of them, a multiple of four.
 const ROUNDS_TO_TEMPERATURE: usize = 32;
-/// The set-points of a controller that is alive are never so old.
-const STALE_NS: Nanoseconds = 100_000_000;
-/// A drive that has not answered for so long is stopped as soon as it answers again.
-const LOST_NS: Nanoseconds = 200_000_000;
-/// From enabling to the first set-point (eRob Modbus-RTU manual).
-const SETTLING_NS: Nanoseconds = 500_000_000;
-/// From one attempt to enable to the next, while the drive starts.
-const AGAIN_NS: Nanoseconds = 500_000_000;
 /// A stop may take so much longer than its ramp.
 const PATIENCE_NS: Nanoseconds = 500_000_000;
 /// Velocity for one unit of position error: 1/s. An answer takes some 10 ms, so that this is far from where it would swing.
 const GAIN: f64 = 12.0;
-/// The ramps of the drive are steeper than those of the axis, so that it follows them.
-const STEEPER: f64 = 1.5;
 
 /// What an axis that follows asks of a bus of this bit rate, whose controller sends a service frame in each of its cycles.
 pub fn budget(cycle_ns: Nanoseconds, bit_rate: u32) -> OffCycleBudget {
@@ -291,7 +282,7 @@ impl Follower {
         }
         self.stage = match self.stage {
             Stage::Preparing { setting, .. } => Stage::Preparing { setting: setting + 1, differs: false },
-            Stage::Enabling { .. } => Stage::Settling { until_ns: now_ns.saturating_add(SETTLING_NS) },
+            Stage::Enabling { .. } => Stage::Settling { until_ns: now_ns.saturating_add(ENABLING_NS) },
             Stage::Stopping { is_told: false, until_ns } if request.value() == Some(0) => {
                 Stage::Stopping { is_told: true, until_ns }
             }
@@ -427,14 +418,11 @@ impl Follower {
 
     /// The velocity that leads the joint to the reference: counts/s.
     fn set_point_for(&self, now_ns: Nanoseconds, target: &OffCycleTarget) -> i32 {
-        let since = |at_ns: Nanoseconds| now_ns.saturating_sub(at_ns).min(STALE_NS) as f64 * 1e-9;
         let Some(seen) = self.position else { return 0 };
-        let wanted = target.position + target.velocity * since(target.at_ns);
-        let here = seen.value + self.velocity.value * since(seen.at_ns);
-        let velocity = target.velocity + GAIN * (wanted - here);
-        let within = velocity.clamp(-self.velocity_limit, self.velocity_limit);
+        let seen = following::Seen { position: seen.value, velocity: self.velocity.value, at_ns: seen.at_ns };
+        let velocity = following::velocity(now_ns, target, seen, GAIN, self.velocity_limit);
         // A float that is too large becomes the largest integer.
-        (within / self.drive.scale.velocity_from_drive(1)).round() as i32
+        (velocity / self.drive.scale.velocity_from_drive(1)).round() as i32
     }
 
     fn report(&self) -> Option<OffCycleReport> {

@@ -3,19 +3,18 @@
 //! The protocol is too slow and too loose for the cycle: procedures move such a drive, one request at a time, and an axis follows
 //! its group beside the cycle.
 //!
-//! - [`motion`]: the motions of the manual, with their steps and waits.
+//! - `commanded`: the sequences of the manual, as the motions of [`erob`](super::erob) carry them out.
 //! - [`module`]: what a module tells of itself, saving, the brake, and the encoder.
 //! - `commission`: what `takt drive` does with it.
 //! - [`follower`]: an axis that follows the reference of its group.
 //! - `simulated`: the drive that stands in for an axis.
 
+mod commanded;
 mod commission;
 mod facts;
 mod failure;
 pub mod follower;
 pub mod module;
-pub mod motion;
-mod reading;
 mod scan;
 pub mod session;
 mod simulated;
@@ -35,9 +34,10 @@ use crate::canopen::function_code;
 use crate::canopen::objects::DEVICE_TYPE;
 use crate::canopen::sdo::SdoRequest;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
-use crate::erob_can::entries;
+use crate::erob_can::entries::{self, Entry};
 use crate::erob_can::frame::Request;
 use crate::family::bring_up::{AxisSession, ProcessData};
+use crate::family::erob::selection;
 use crate::sim::Drive;
 use follower::Follower;
 
@@ -140,7 +140,7 @@ impl Family for ErobCan {
     }
 
     fn entries(&self, _: &DriveFamily) -> Vec<NamedEntry> {
-        commission::entries()
+        selection::entries::<Entry>()
     }
 
     fn frame_words(&self, target: TargetDrive) -> FrameWords {

@@ -1,14 +1,10 @@
 //! What a module tells of itself; and what is done with it beside motions: saving, the brake, the encoder, other node IDs.
 
-use takt_rt::Nanoseconds;
-
 use crate::erob_can::client::{RequestError, RequestFailure};
 use crate::erob_can::entries::{self, Entry};
 use crate::erob_can::module_information::ModuleNumbers;
+use crate::family::erob::SAVING_NS;
 use crate::family::erob_can::session::ErobCanSession;
-
-/// The time that a module needs to save its parameters; its power must stay on.
-const SAVING_NS: Nanoseconds = 3_000_000_000;
 
 /// What a module tells of itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,6 +4,7 @@ use takt_rt::Nanoseconds;
 
 use super::follower::FollowerParameters;
 use crate::config::{Axis, FamilyKeys, Quantity};
+use crate::family::erob::following::STEEPER;
 use crate::family::simulated_joint::counts_per_unit;
 
 /// The longest communication time-out that register 0x0002 takes: ms.
@@ -14,8 +15,6 @@ const USUAL_TIMEOUT_MS: u16 = 500;
 const GAIN: f64 = 8.0;
 /// The same in a round: so little is far from where the joint would swing, since what is known of it is up to two rounds old.
 const GAIN_PER_ROUND: f64 = 0.2;
-/// The ramps of the drive are steeper than those of the axis, so that it follows them.
-const STEEPER: f64 = 1.5;
 
 /// What an axis says of its drive beside what every axis says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

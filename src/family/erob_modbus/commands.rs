@@ -6,11 +6,11 @@ use takt_rt::Nanoseconds;
 
 use super::drive::{AccessError, ErobDrive};
 use super::fault_code::FaultCode;
-use super::registers::{self, Register};
+use super::register::Register;
+use super::registers;
+use crate::family::erob::SAVING_NS;
 use crate::modbus::exception::ExceptionCode;
 
-/// The time that a drive needs to save its parameters; its power must stay on.
-const SAVING_NS: Nanoseconds = 3_000_000_000;
 /// From a command to what it has brought.
 const ACTING_NS: Nanoseconds = 100_000_000;
 /// The shortest communication time-out that procedures keep, ms: they ask every 50 ms, and a USB adapter may hold a reply for 16 ms.

@@ -1,28 +1,17 @@
 //! Commissioning of a drive by Modbus-RTU: the tasks of `takt drive`.
 
-use std::num::NonZeroU32;
-
-use takt_rt::Nanoseconds;
-
 use super::commands::{self, CommandFailure};
-use super::drive::{AccessError, AccessFailure, ErobDrive, MotionStatus, ReachedStatus, Status};
-use super::motion::{self, Direction, End, Motion, MotionFailure, Profile, Run};
-use super::registers::{self, Register};
-use super::selection;
-use crate::family::commission::polling;
-use crate::family::commission::{
-    CommandValue, DriveTask, Failure, MotionProfile, MoveKind, Report, TargetDrive, Task,
-};
+use super::drive::{AccessError, AccessFailure, ErobDrive};
+use super::register::Register;
+use super::registers;
+use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
+use crate::family::erob::module::CommandedModule as _;
+use crate::family::erob::{selection, tasks};
 use crate::modbus::exception::ExceptionCode;
 use crate::modbus::frame::{ReceivedRequest, SlaveAddress};
 use crate::modbus::line_timing::LineTiming;
 use crate::modbus::master::{MasterTiming, RequestFailure};
-use crate::procedure::{AxisReading, ModbusClient, ModbusSession, Procedure};
-
-/// A joint slower than this stands: counts/s.
-const STANDING: i32 = 300;
-/// 1 ms in the unit of the dwell time.
-const DWELL_UNIT_NS: Nanoseconds = 50_000;
+use crate::procedure::{ModbusClient, ModbusSession, Procedure};
 
 /// A task with a drive on a line of this bit rate.
 ///
@@ -75,42 +64,46 @@ impl Work {
 }
 
 async fn carry_out(drive: &ErobDrive, s: &TargetDrive, work: Work) -> Result<Report, Failure> {
-    if !matches!(work, Work::Task(Task::EmergencyStop)) {
-        connect(drive).await?;
-    }
     let task = match work {
-        Work::Read(registers) => return selection::read(drive, s, &registers).await,
-        Work::Write(register, value) => return selection::write(drive, s, &register, value).await,
+        Work::Read(registers) => {
+            drive.connect(s).await?;
+            return selection::read(drive, s, &registers).await;
+        }
+        Work::Write(register, value) => {
+            drive.connect(s).await?;
+            return selection::write(drive, s, &register, value).await;
+        }
         Work::Task(task) => task,
     };
     match task {
-        Task::Info => info(drive, s).await,
-        Task::Watch { every_ns, duration_ns } => watch(drive, s, every_ns, duration_ns).await,
-        Task::Enable { hold_ns, keeps_enabled } => {
-            let duration_ns = if keeps_enabled { Some(0) } else { hold_ns };
-            run(drive, s, Run { motion: Motion::Hold, duration_ns, keeps_enabled }).await?;
-            summary(drive, s).await
+        Task::Watch { every_ns, duration_ns } => tasks::watch(drive, s, every_ns, duration_ns).await,
+        Task::Enable { hold_ns, keeps_enabled } => tasks::enable(drive, s, hold_ns, keeps_enabled).await,
+        Task::Disable => tasks::disable(drive, s).await,
+        Task::Move { kind, profile, keeps_enabled } => {
+            tasks::run_move(drive, s, kind, profile, keeps_enabled).await
         }
-        Task::Disable => {
-            drive.session().step("disable");
-            drive.write(&registers::STOP_MOTION, 0).await?;
-            drive.write(&registers::MOTOR_ENABLE, 0).await?;
-            summary(drive, s).await
-        }
-        Task::Move { kind, profile, keeps_enabled } => run_move(drive, s, kind, profile, keeps_enabled).await,
         Task::Velocity { velocity, profile, duration_ns, keeps_enabled } => {
-            let raw = s.velocity_raw(velocity);
-            s.check_velocity(raw)?;
-            let profile = MotionProfile { velocity: Some(CommandValue::Drive(raw.abs().max(1))), ..profile };
-            let motion = Motion::Velocity(whole(raw)?, complete(drive, s, &profile).await?);
-            run(drive, s, Run { motion, duration_ns, keeps_enabled }).await?;
-            summary(drive, s).await
+            tasks::velocity(drive, s, velocity, profile, duration_ns, keeps_enabled).await
         }
         Task::Torque { torque, velocity_limit, duration_ns } => {
-            let motion = torque_of(s, torque, velocity_limit)?;
-            run(drive, s, Run { motion, duration_ns, keeps_enabled: false }).await?;
-            summary(drive, s).await
+            tasks::torque(drive, s, torque, velocity_limit, duration_ns).await
         }
+        // It does not wait for an answer before it stops the joint.
+        Task::EmergencyStop => {
+            commands::stop_in_an_emergency(drive).await?;
+            tasks::summary(drive, s).await
+        }
+        task => {
+            drive.connect(s).await?;
+            maintain(drive, s, task).await
+        }
+    }
+}
+
+/// The tasks that move nothing.
+async fn maintain(drive: &ErobDrive, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
+    match task {
+        Task::Info => info(drive, s).await,
         Task::Save => {
             commands::save(drive).await?;
             let mut report = Report::new();
@@ -119,10 +112,6 @@ async fn carry_out(drive: &ErobDrive, s: &TargetDrive, work: Work) -> Result<Rep
         }
         Task::SetId { node } => set_address(drive, node).await,
         Task::Zero { is_confirmed } => clear_turns(drive, s, is_confirmed).await,
-        Task::EmergencyStop => {
-            commands::stop_in_an_emergency(drive).await?;
-            summary(drive, s).await
-        }
         Task::CommunicationTimeout { milliseconds } => {
             commands::set_communication_timeout(drive, milliseconds).await.map_err(of_command)?;
             drive.session().note(
@@ -144,30 +133,23 @@ async fn carry_out(drive: &ErobDrive, s: &TargetDrive, work: Work) -> Result<Rep
     }
 }
 
-/// Sees that the drive answers. It reads the fault code, which changes nothing.
-async fn connect(drive: &ErobDrive) -> Result<(), Failure> {
-    drive.session().step("contact");
-    drive.fault().await?;
-    Ok(())
-}
-
 /// `info`
 async fn info(drive: &ErobDrive, s: &TargetDrive) -> Result<Report, Failure> {
     let mut report = Report::new();
     let status = drive.status().await?;
-    let state = state_of(&status);
-    report.add("state", "state", state, state);
-    let (position, velocity) = (s.position(status.position.into()), s.velocity(status.velocity.into()));
-    let shown = format!("{} ({} counts)", s.position_quantity().show(position), status.position);
+    let reading = status.reading(drive.session().now_ns(), s);
+    report.add("state", "state", reading.state, reading.state);
+    let (position, counts, velocity) = (reading.position, reading.position_counts, reading.velocity);
+    let shown = format!("{} ({counts} counts)", s.position_quantity().show(position));
     report.add("position", "position", position, shown);
-    report.add("position_counts", "position counts", status.position, status.position.to_string());
+    report.add("position_counts", "position counts", counts, counts.to_string());
     report.add("velocity", "velocity", velocity, s.velocity_quantity().show(velocity));
     for (register, value) in commands::read_all(drive).await? {
         if let Some(value) = value {
-            report.add("", register.name, value, selection::words(s, register, value));
+            report.add("", register.name, value, selection::words::<ErobDrive>(s, register, value));
         }
     }
-    let code = status.fault.map_or(0, |code| code.0);
+    let code = status.fault;
     report.add("error_code", "error", code, s.error_words(code));
     if code != 0 {
         drive.session().note(s.error_cure(code));
@@ -175,102 +157,9 @@ async fn info(drive: &ErobDrive, s: &TargetDrive) -> Result<Report, Failure> {
     Ok(report)
 }
 
-/// `watch`
-async fn watch(
-    drive: &ErobDrive,
-    s: &TargetDrive,
-    every_ns: Nanoseconds,
-    duration_ns: Option<Nanoseconds>,
-) -> Result<Report, Failure> {
-    let session = drive.session();
-    let read = async || Ok(reading(session.now_ns(), s, &drive.status().await?));
-    polling::watch(session, every_ns, duration_ns, read).await
-}
-
-/// `move`
-async fn run_move(
-    drive: &ErobDrive,
-    s: &TargetDrive,
-    kind: MoveKind,
-    profile: MotionProfile,
-    keeps_enabled: bool,
-) -> Result<Report, Failure> {
-    let profile = complete(drive, s, &profile).await?;
-    let from = drive.read(&registers::ACTUAL_POSITION).await?;
-    let mut duration_ns = None;
-    let (motion, target) = match kind {
-        MoveKind::Absolute { to, .. } => {
-            let to = position(s, s.position_counts(to))?;
-            (Motion::To(to, profile), Some(i64::from(to)))
-        }
-        MoveKind::Relative(by) => {
-            let to = position(s, from.saturating_add(s.distance_counts(by)))?;
-            (Motion::By(whole(i64::from(to) - from)?, profile), Some(to.into()))
-        }
-        MoveKind::Reciprocate { times: Some(times), .. } if times > 1 => {
-            return Err(Failure::Unsupported {
-                what: "the drive does not count how often it has gone to and fro".to_owned(),
-                instead: "use `--endless` and Ctrl-C, or `move absolute` in a loop".to_owned(),
-            });
-        }
-        MoveKind::Reciprocate { to, dwell_ns, .. } => {
-            let target = position(s, s.position_counts(to))?;
-            let dwell = u32::try_from(dwell_ns / DWELL_UNIT_NS).unwrap_or(u32::MAX);
-            (Motion::Reciprocating { target, dwell, profile }, None)
-        }
-        MoveKind::Continuous { is_forward, duration_ns: lasts_ns } => {
-            duration_ns = lasts_ns;
-            let goes_up = is_forward == (s.scale.resolution() > 0.0);
-            let direction = if goes_up { Direction::Forward } else { Direction::Backward };
-            (Motion::Continuous(direction, profile), None)
-        }
-    };
-    let at = run(drive, s, Run { motion, duration_ns, keeps_enabled }).await?;
-    let mut report = match target {
-        Some(target) => polling::move_report(s, from, target, 1, i64::from(at) - target),
-        None => Report::new(),
-    };
-    report.append(summary(drive, s).await?);
-    Ok(report)
-}
-
-/// Carries out a motion. Returns where the joint is: counts.
-async fn run(drive: &ErobDrive, s: &TargetDrive, run: Run) -> Result<i32, Failure> {
-    match motion::carry_out(drive, run).await {
-        Ok(ended) if ended.end == End::Interrupted => {
-            let at = s.position_quantity().show(s.position(ended.position.into()));
-            drive.session().note(format!("the axis is at {at}"));
-            Err(Failure::Interrupted)
-        }
-        Ok(ended) => Ok(ended.position),
-        Err(failure) => Err(of_motion(s, failure)),
-    }
-}
-
-/// `torque`: a current, because the drive takes no other measure.
-fn torque_of(
-    s: &TargetDrive,
-    torque: CommandValue,
-    velocity_limit: Option<CommandValue>,
-) -> Result<Motion, Failure> {
-    let CommandValue::Drive(current) = torque else {
-        return Err(Failure::Unsuitable(
-            "the drive takes a current, and does not tell its torque: with `--raw` the value is a current in mA".to_owned(),
-        ));
-    };
-    let limit = velocity_limit
-        .map(|limit| s.velocity_raw(limit))
-        .and_then(|limit| NonZeroU32::new(u32::try_from(limit.unsigned_abs()).unwrap_or(u32::MAX)));
-    let velocity_limit = limit.ok_or(Failure::Missing {
-        what: "--max-velocity",
-        why: "without a limit the joint turns as fast as the current makes it",
-    })?;
-    Ok(Motion::Torque { current: whole(current)?, velocity_limit })
-}
-
 /// `set-id`
 async fn set_address(drive: &ErobDrive, address: u8) -> Result<Report, Failure> {
-    check_standstill(drive).await?;
+    tasks::check_standstill(drive).await?;
     drive.session().step("set the slave address");
     drive.write(&registers::SLAVE_ADDRESS, address.into()).await?;
     commands::save(drive).await?;
@@ -289,7 +178,7 @@ async fn clear_turns(drive: &ErobDrive, s: &TargetDrive, is_confirmed: bool) -> 
             option: "--yes",
         });
     }
-    check_standstill(drive).await?;
+    tasks::check_standstill(drive).await?;
     let before = drive.read(&registers::ACTUAL_POSITION).await?;
     commands::reset_encoder(drive).await?;
     let after = drive.read(&registers::ACTUAL_POSITION).await?;
@@ -299,84 +188,6 @@ async fn clear_turns(drive: &ErobDrive, s: &TargetDrive, is_confirmed: bool) -> 
     let position = s.position(after);
     report.add("position", "position", position, s.position_quantity().show(position));
     Ok(report)
-}
-
-/// Such settings are made at standstill without torque.
-async fn check_standstill(drive: &ErobDrive) -> Result<(), Failure> {
-    let status = drive.status().await?;
-    let is_off = status.reached == ReachedStatus::MotorOff && status.velocity.saturating_abs() <= STANDING;
-    if is_off { Ok(()) } else { Err(Failure::Enabled) }
-}
-
-async fn summary(drive: &ErobDrive, s: &TargetDrive) -> Result<Report, Failure> {
-    let status = drive.status().await?;
-    Ok(polling::summary(s, &reading(drive.session().now_ns(), s, &status)))
-}
-
-fn reading(at_ns: Nanoseconds, s: &TargetDrive, status: &Status) -> AxisReading {
-    AxisReading {
-        at_ns,
-        position: s.position(status.position.into()),
-        position_counts: status.position.into(),
-        velocity: s.velocity(status.velocity.into()),
-        torque: None,
-        current_a: Some(f64::from(status.current_ma) / 1000.0),
-        temperature_c: Some(status.temperature_c.into()),
-        statusword: None,
-        state: state_of(status),
-    }
-}
-
-fn state_of(status: &Status) -> &'static str {
-    match (status.fault, status.reached, status.motion) {
-        (Some(_), ..) => "fault",
-        (None, ReachedStatus::MotorOff, _) => "motor off",
-        (None, ReachedStatus::Reached, _) => "target reached",
-        (None, ReachedStatus::Settling, _) => "settling",
-        (None, _, MotionStatus::Moving) => "moving",
-        (None, ..) => "motor on",
-    }
-}
-
-/// The profile in the units of the drive. What neither the user nor the limits say is that of the drive.
-async fn complete(drive: &ErobDrive, s: &TargetDrive, profile: &MotionProfile) -> Result<Profile, Failure> {
-    let given = s.drive_profile(profile)?;
-    drive.session().step("profile");
-    let of_drive = async |given: Option<i64>, register: &Register| match given {
-        Some(value) => Ok::<_, Failure>(value),
-        None => Ok(drive.read(register).await?.abs()),
-    };
-    let velocity = of_drive(given.velocity, &registers::PROFILE_VELOCITY).await?;
-    let acceleration = of_drive(given.acceleration, &registers::PROFILE_ACCELERATION).await?;
-    let deceleration = of_drive(given.deceleration, &registers::PROFILE_DECELERATION).await?;
-    if velocity == 0 {
-        return Err(Failure::Missing {
-            what: "--velocity",
-            why: "the drive's profile velocity (0x0047) is 0",
-        });
-    }
-    if acceleration == 0 || deceleration == 0 {
-        return Err(Failure::Missing {
-            what: "--acceleration and --deceleration",
-            why: "those of the drive (0x0049 and 0x004B) are 0",
-        });
-    }
-    let rate = |value: i64| u32::try_from(value).unwrap_or(u32::MAX);
-    Ok(Profile {
-        velocity: whole(velocity)?,
-        acceleration: rate(acceleration),
-        deceleration: rate(deceleration),
-    })
-}
-
-/// A position within the limits of the axis.
-fn position(s: &TargetDrive, counts: i64) -> Result<i32, Failure> {
-    s.check_position(counts)?;
-    whole(counts)
-}
-
-fn whole(value: i64) -> Result<i32, Failure> {
-    i32::try_from(value).map_err(|_| Failure::Unsuitable(format!("{value} does not fit the drive's 32 bits")))
 }
 
 /// Why a drive with this protocol cannot do a task; `None` where it can.
@@ -436,24 +247,5 @@ fn of_command(failure: CommandFailure) -> Failure {
             Failure::FaultPersists { what: code.words().to_owned(), advice: Some(code.cure()) }
         }
         CommandFailure::ReadBack { .. } => Failure::Request { what: failure.to_string(), cure: None },
-    }
-}
-
-fn of_motion(s: &TargetDrive, failure: MotionFailure) -> Failure {
-    let what = failure.to_string();
-    match failure {
-        MotionFailure::Access(error) => error.into(),
-        MotionFailure::Drive(code) => {
-            Failure::Faulted { what: s.error_words(code.0), advice: Some(code.cure()) }
-        }
-        MotionFailure::NotEnabled => Failure::Request { what, cure: None },
-        MotionFailure::TooLong { .. } => Failure::Request {
-            what,
-            cure: Some("check whether something blocks the joint, and the profile in the drive"),
-        },
-        MotionFailure::NotStopped { .. } => Failure::Request {
-            what,
-            cure: Some("`takt drive … emergency-stop` stops it in less than 50 ms"),
-        },
     }
 }

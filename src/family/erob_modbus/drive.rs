@@ -2,10 +2,11 @@
 
 use std::fmt;
 
-use takt_rt::Nanoseconds;
-
 use super::fault_code::FaultCode;
-use super::registers::{self, Register, ValueError};
+use super::register::Register;
+use super::registers;
+use crate::erob_parameter::ValueError;
+use crate::family::erob::module::Status;
 use crate::modbus::exception::ExceptionCode;
 use crate::modbus::frame::{RegisterRange, RegisterValues, Values};
 use crate::modbus::master::{Repeat, RequestError, RequestFailure};
@@ -48,7 +49,7 @@ impl std::error::Error for AccessError {}
 impl fmt::Display for AccessError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.failure {
-            AccessFailure::Value { value } => ValueError { register: self.register, value: *value }.fmt(f),
+            AccessFailure::Value { value } => ValueError { parameter: self.register, value: *value }.fmt(f),
             AccessFailure::NotReadable => {
                 write!(f, "{} cannot be read: a write to it is a command", self.register)
             }
@@ -56,79 +57,6 @@ impl fmt::Display for AccessError {
             AccessFailure::Request(error) => {
                 write!(f, "{}: slave {}: {}", self.register, error.slave, error.failure)
             }
-        }
-    }
-}
-
-/// What a drive does, read in three requests.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Status {
-    /// The fault, if there is one.
-    pub fault: Option<FaultCode>,
-    /// Register 0x0061.
-    pub motion: MotionStatus,
-    /// Register 0x0063.
-    pub reached: ReachedStatus,
-    /// counts
-    pub position: i32,
-    /// counts/s
-    pub velocity: i32,
-    /// mA
-    pub current_ma: i32,
-    /// °C
-    pub temperature_c: i32,
-}
-
-/// Register 0x0061.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MotionStatus {
-    /// No motion.
-    Stopped,
-    /// A motion.
-    Moving,
-    /// A reciprocating motion was stopped.
-    ReciprocationStopped,
-    /// A number that the manual does not explain.
-    Unknown(u16),
-}
-
-impl From<u16> for MotionStatus {
-    fn from(number: u16) -> Self {
-        match number {
-            0 => Self::Stopped,
-            1 => Self::Moving,
-            3 => Self::ReciprocationStopped,
-            number => Self::Unknown(number),
-        }
-    }
-}
-
-/// Register 0x0063.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ReachedStatus {
-    /// Disabled; the brake is engaged.
-    MotorOff,
-    /// Enabled; the brake is released.
-    MotorOn,
-    /// On the way.
-    Running,
-    /// In the window of the target, for less than the time that is asked for.
-    Settling,
-    /// At the target.
-    Reached,
-    /// A number that the manual does not explain.
-    Unknown(u16),
-}
-
-impl From<u16> for ReachedStatus {
-    fn from(number: u16) -> Self {
-        match number {
-            0 => Self::MotorOff,
-            1 => Self::MotorOn,
-            2 => Self::Running,
-            3 => Self::Settling,
-            4 => Self::Reached,
-            number => Self::Unknown(number),
         }
     }
 }
@@ -193,7 +121,7 @@ impl ErobDrive {
         Ok(fault_of(code as u16))
     }
 
-    /// What the drive does.
+    /// What the drive does, read in three requests.
     ///
     /// # Errors
     /// The drive refuses, or does not reply.
@@ -208,7 +136,7 @@ impl ErobDrive {
         };
         let word = |words: &Values, at: usize| words.get(at).copied().unwrap_or(0);
         Ok(Status {
-            fault: fault_of(word(&status, 0)),
+            fault: word(&status, 0),
             motion: word(&status, 1).into(),
             reached: word(&place, 0).into(),
             position: double(&place, &registers::REACHED_STATUS, &registers::ACTUAL_POSITION),
@@ -229,27 +157,7 @@ impl ErobDrive {
             .await
             .map_err(|error| failed(AccessFailure::Request(Box::new(error))))
     }
-
-    /// Waits for a time, in which the drive still hears its master: silence could end in fault 0x0FA2. Ends early when the session is
-    /// interrupted. Returns the fault that has come up.
-    ///
-    /// # Errors
-    /// The drive refuses, or does not reply.
-    pub async fn wait(&self, duration_ns: Nanoseconds) -> Result<Option<FaultCode>, AccessError> {
-        let end_ns = self.session.now_ns().saturating_add(duration_ns);
-        loop {
-            let fault = self.fault().await?;
-            let left_ns = end_ns.saturating_sub(self.session.now_ns());
-            if fault.is_some() || left_ns == 0 || self.session.is_interrupted() {
-                return Ok(fault);
-            }
-            self.session.sleep(left_ns.min(SIGN_OF_LIFE_NS)).await;
-        }
-    }
 }
-
-/// From one request to the next in a wait: four in the shortest communication time-out that is advised.
-const SIGN_OF_LIFE_NS: Nanoseconds = 50_000_000;
 
 fn fault_of(code: u16) -> Option<FaultCode> {
     (code != 0).then_some(FaultCode(code))

@@ -13,28 +13,21 @@
 
 use takt_rt::{DriveState, Nanoseconds, OffCycleReport};
 
-use super::drive::ReachedStatus;
 use super::fault_code::FaultCode;
-use super::registers::{self, Register};
+use super::register::Register;
+use super::registers;
+use crate::family::erob::following::{self, LOST_NS, STALE_NS};
+use crate::family::erob::module::ReachedStatus;
+use crate::family::erob::{AGAIN_NS, ENABLING_NS, STANDING};
 use crate::family::{OffCycleTarget, OffCycleWish};
 use crate::modbus::exception::ExceptionCode;
 use crate::modbus::frame::{RegisterRange, RegisterValues, Request, Values};
 use crate::modbus::master::{Answer, RequestError, RequestFailure};
 
-/// From enabling to the first velocity.
-const ENABLED_NS: Nanoseconds = 500_000_000;
-/// From one attempt to enable, or to clear a fault, to the next.
-const AGAIN_NS: Nanoseconds = 500_000_000;
 /// A joint that does not come to rest in this time is disabled all the same.
 const STOPPING_NS: Nanoseconds = 2_000_000_000;
 /// Once in so many readings beside the position, the temperature is read.
 const OTHERS_TO_TEMPERATURE: usize = 32;
-/// A joint slower than this stands: counts/s. The readings of a joint at rest are not quite 0.
-const STANDING: f64 = 300.0;
-/// The set-points of a controller that is alive are never so old.
-pub const STALE_NS: Nanoseconds = 100_000_000;
-/// A drive that has not replied for so long is stopped as soon as it replies again.
-const LOST_NS: Nanoseconds = 200_000_000;
 /// A drive that did not reply so often in a row is asked less often, so that the other ones of its line have their turns.
 const SILENT_AFTER: u32 = 3;
 /// From one request to a silent drive to the next.
@@ -288,7 +281,7 @@ impl Follower {
             {
                 self.life = Life::Disabling;
             }
-            Life::Enabled { since_ns } if now_ns.saturating_sub(since_ns) >= ENABLED_NS => {
+            Life::Enabled { since_ns } if now_ns.saturating_sub(since_ns) >= ENABLING_NS => {
                 self.life = Life::Following;
             }
             Life::Following if self.seen.fault != 0 || self.seen.is_motor_off => {
@@ -299,7 +292,8 @@ impl Follower {
             }
             Life::Stopping { since_ns } => {
                 let has_taken_long = now_ns.saturating_sub(since_ns) > STOPPING_NS;
-                let stands = self.seen.speed_at_ns > since_ns && self.seen.velocity.abs() < STANDING;
+                let stands =
+                    self.seen.speed_at_ns > since_ns && self.seen.velocity.abs() <= f64::from(STANDING);
                 if has_taken_long || stands {
                     self.life = Life::Disabling;
                 }
@@ -369,15 +363,13 @@ impl Follower {
 
     /// The velocity for the drive: counts/s.
     fn velocity(&self, now_ns: Nanoseconds, target: &OffCycleTarget) -> i64 {
-        // What is older stops the joint, so that nothing is foretold for longer.
-        let seconds = |since_ns: Nanoseconds| now_ns.saturating_sub(since_ns).min(LOST_NS) as f64 * 1e-9;
-        let wanted = target.position + target.velocity * seconds(target.at_ns);
-        let here =
-            self.position() + self.seen.velocity / self.parameters.counts_per_unit * seconds(self.seen.at_ns);
-        let limit = self.parameters.velocity_limit;
-        let velocity = target.velocity + self.parameters.position_gain * (wanted - here);
-        // No number: then the joint stands.
-        let velocity = if velocity.is_finite() { velocity.clamp(-limit, limit) } else { 0.0 };
+        let seen = following::Seen {
+            position: self.position(),
+            velocity: self.seen.velocity / self.parameters.counts_per_unit,
+            at_ns: self.seen.at_ns,
+        };
+        let FollowerParameters { position_gain, velocity_limit, .. } = self.parameters;
+        let velocity = following::velocity(now_ns, target, seen, position_gain, velocity_limit);
         self.counts(velocity).clamp(f64::from(i32::MIN), f64::from(i32::MAX)).round() as i64
     }
 

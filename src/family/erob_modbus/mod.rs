@@ -3,10 +3,10 @@
 //! The line is too slow for the cycle: procedures move such a drive, one request at a time, and an axis follows its group beside the
 //! cycle.
 //!
-//! - [`registers`]: the table of registers.
+//! - [`register`], [`registers`]: a register on the wire, and the table of them.
 //! - [`fault_code`]: the codes of faults in words.
 //! - [`drive`]: the registers of one drive, by a session.
-//! - [`motion`]: the motions of the manual, with their steps and waits.
+//! - `commanded`: the sequences of the manual, as the motions of [`erob`](super::erob) carry them out.
 //! - [`commands`]: what is done with a drive beside motions: saving, faults, the encoder, the communication time-out.
 //! - `axis`, [`follower`], [`line`]: an axis of a group, led by velocities beside the cycle, and the drives of a line by turns.
 //! - [`budget`]: how often each of them is spoken to.
@@ -15,6 +15,7 @@
 
 mod axis;
 pub mod budget;
+mod commanded;
 pub mod commands;
 mod commission;
 pub mod drive;
@@ -22,10 +23,9 @@ mod facts;
 pub mod fault_code;
 pub mod follower;
 pub mod line;
-pub mod motion;
+pub mod register;
 pub mod registers;
 mod scan;
-mod selection;
 mod simulated;
 
 pub use facts::FACTS;
@@ -37,6 +37,7 @@ use super::scan::{FoundDevice, StartingKeys};
 use super::{Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, erob_can};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
+use crate::family::erob::selection;
 use crate::modbus::frame::SlaveAddress;
 use crate::procedure::ModbusSession;
 use crate::sim::{DevicesOnLine, Drive};
@@ -44,6 +45,7 @@ use axis::LineKeys;
 use budget::LineBudget;
 use fault_code::FaultCode;
 use line::FollowedLine;
+use register::Register;
 
 /// The family.
 #[derive(Clone, Copy, Debug)]
@@ -152,7 +154,7 @@ impl Family for ErobModbus {
     }
 
     fn entries(&self, _: &DriveFamily) -> Vec<NamedEntry> {
-        selection::entries()
+        selection::entries::<Register>()
     }
 
     fn commission(&self, _: TargetDrive, _: Task) -> Result<DriveTask<Frame>, Failure> {

@@ -2,7 +2,8 @@
 
 use super::FACTS;
 use super::fault_code::FaultCode;
-use super::registers::{BIT_RATE, FAULT_CODE, Register, SLAVE_ADDRESS, Values};
+use super::register::Register;
+use super::registers::{BIT_RATE, FAULT_CODE, SLAVE_ADDRESS};
 use crate::family::erob_can;
 use crate::family::scan::{Answered, FoundDevice};
 use crate::modbus::frame::RegisterRange;
@@ -15,12 +16,7 @@ pub async fn look(session: &ModbusSession, bit_rate: u32) -> Option<FoundDevice>
         return None;
     }
     let rate = number(session, &BIT_RATE).await?;
-    let is_rate = match BIT_RATE.values {
-        Values::Named(names) => names.iter().any(|(known, _)| *known == rate),
-        Values::Range(lowest, highest) => (lowest..=highest).contains(&rate),
-        Values::Any => true,
-    };
-    let fault = number(session, &FAULT_CODE).await.filter(|_| is_rate)?;
+    let fault = number(session, &FAULT_CODE).await.filter(|_| BIT_RATE.values.contain(rate))?;
     let mut device = FoundDevice::new(Some(node), Answered::Modbus { bit_rate }, FACTS.name);
     (device.vendor, device.drive) = (Some(erob_can::MAKER.to_owned()), Some(FACTS.word));
     if let Some(code) = u16::try_from(fault).ok().filter(|code| *code != 0) {

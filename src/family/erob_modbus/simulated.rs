@@ -3,18 +3,17 @@
 use std::f64::consts::TAU;
 
 use crate::config::{Axis, Config, FrictionShape};
+use crate::family::erob::simulated::{TORQUE_PER_AMPERE, module};
 use crate::family::simulated_bus::gravity;
-use crate::family::simulated_joint::{encoder, mechanics};
 use crate::modbus::frame::SlaveAddress;
 use crate::modbus::line_timing::LineTiming;
+use crate::sim::commanded_module::ModuleParameters;
 use crate::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use crate::sim::plant::{Encoder, JointParameters};
 use crate::sim::{DevicesOnLine, Drive};
 
 /// A program on a pseudo-terminal may write a frame in pieces so far apart.
 const PAUSE_NS: u64 = 20_000_000;
-/// Torque for one ampere where the axis says nothing of it: that of an eRob80 with a ratio of 120.
-const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
 /// From a request to its reply. Not published.
 const REPLY_NS: u64 = 1_000_000;
 
@@ -34,16 +33,8 @@ pub fn drive(axis: &Axis, config: &Config) -> ErobModbusDrive {
     ErobModbusDrive::new(ErobModbusParameters {
         address: axis.node,
         bit_rate_code: bit_rate_code(bit_rate),
-        joint: mechanics(axis),
-        encoder: encoder(axis),
-        counts_per_turn: axis.counts_per_turn,
-        initial_position: axis.simulated.initial_position,
-        peak_torque: axis.simulated.peak_torque,
-        torque_per_ampere: TORQUE_PER_AMPERE,
-        highest_velocity: 1.5 * axis.limits.velocity,
-        ready_ns: axis.power_up_ns,
+        module: module(axis),
         reply_ns: REPLY_NS,
-        has_battery: true,
         has_torque_sensor: false,
     })
 }
@@ -72,22 +63,24 @@ pub fn line(addresses: &[u8]) -> Result<Box<dyn DevicesOnLine>, String> {
         drives.push(ErobModbusDrive::new(ErobModbusParameters {
             address: *address,
             bit_rate_code: 4,
-            joint: JointParameters {
-                inertia: 0.647,
-                viscous_friction: 2.0,
-                coulomb_friction: 4.0,
-                friction_shape: FrictionShape::HarmonicDrive,
-                brake_torque: 140.0,
+            module: ModuleParameters {
+                joint: JointParameters {
+                    inertia: 0.647,
+                    viscous_friction: 2.0,
+                    coulomb_friction: 4.0,
+                    friction_shape: FrictionShape::HarmonicDrive,
+                    brake_torque: 140.0,
+                },
+                encoder: Encoder { counts_per_unit: 524_288.0 / TAU, zero_counts: 0.0 },
+                counts_per_turn: 524_288.0,
+                initial_position: 0.0,
+                peak_torque: 70.0,
+                torque_per_ampere: TORQUE_PER_AMPERE,
+                highest_velocity: 2.618,
+                ready_ns: 0,
+                has_battery: true,
             },
-            encoder: Encoder { counts_per_unit: 524_288.0 / TAU, zero_counts: 0.0 },
-            counts_per_turn: 524_288.0,
-            initial_position: 0.0,
-            peak_torque: 70.0,
-            torque_per_ampere: TORQUE_PER_AMPERE,
-            highest_velocity: 2.618,
-            ready_ns: 0,
             reply_ns: REPLY_NS,
-            has_battery: true,
             has_torque_sensor: false,
         }));
     }

@@ -1,5 +1,6 @@
 //! What can be written to a module, and what of it is kept without power.
 
+use crate::sim::commanded_module::{ControlMode, ModuleSettings, STEEPEST, ramp};
 use crate::sim::profile_motions::MotionProfile;
 
 /// When a setting may be written.
@@ -119,8 +120,24 @@ impl Settings {
         }
     }
 
-    /// What shapes the motions of position control.
-    pub fn profile(&self) -> MotionProfile {
+    /// What shapes the motions.
+    pub fn of_module(&self) -> ModuleSettings {
+        let settling_ms = self.value(POSITIONED_TIME).and_then(|ms| u64::try_from(ms).ok()).unwrap_or(0);
+        ModuleSettings {
+            mode: ControlMode::of(self.value(OPERATING_MODE).unwrap_or(0).into()),
+            motion_mode: self.value(MOTION_MODE).unwrap_or(0).into(),
+            target: self.get(TARGET_POSITION),
+            distance: self.get(RELATIVE_POSITION),
+            profile: self.profile(),
+            set_point: self.get(SET_POINT),
+            velocity_limit: self.get(TORQUE_VELOCITY_LIMIT).abs(),
+            position_error: self.get(POSITION_ERROR),
+            window: self.get(POSITIONED_THRESHOLD),
+            settling_ns: settling_ms.saturating_mul(1_000_000),
+        }
+    }
+
+    fn profile(&self) -> MotionProfile {
         let most = self.get(MAXIMUM_VELOCITY);
         let dwell_ms = self.value(DWELL_TIME).and_then(|ms| u64::try_from(ms).ok()).unwrap_or(0);
         MotionProfile {
@@ -133,13 +150,11 @@ impl Settings {
         }
     }
 
-    /// A rate: at least 1 count/s², because with 0 no motion would end. Without limits of their own, motions change the velocity at once.
+    /// Without limits of their own, motions change the velocity at once.
     fn rate(&self, index: u16) -> f64 {
-        /// The loops of the drive do not follow steeper ramps: count/s².
-        const STEEPEST: f64 = 1e8;
         match self.value(LIMITS_APPLY) {
             Some(0) => STEEPEST,
-            _ => self.get(index).clamp(1.0, STEEPEST),
+            _ => ramp(self.get(index)),
         }
     }
 

@@ -44,12 +44,6 @@ impl SimulatedLine {
         Self { timing, gathering, drives, from_master, to_master, disturbance, disconnected: vec![], random }
     }
 
-    /// A drive, by its place, for those who look into it.
-    #[cfg(any(test, feature = "internals"))]
-    pub fn module(&mut self, place: usize) -> Option<&mut ErobModbusDrive> {
-        self.drives.get_mut(place)
-    }
-
     fn advance(&mut self, now_ns: Nanoseconds) {
         while self.from_master.front().is_some_and(|(arrives_ns, _)| *arrives_ns <= now_ns) {
             let Some((arrives_ns, bytes)) = self.from_master.pop_front() else { return };
@@ -141,6 +135,7 @@ impl DevicesOnLine for SimulatedLine {
 mod tests {
     use super::*;
     use crate::modbus::frame::{RegisterRange, Request, SlaveAddress};
+    use crate::sim::commanded_module::ModuleParameters;
     use crate::sim::erob_modbus::ErobModbusParameters;
     use crate::sim::plant::{Encoder, JointParameters};
 
@@ -158,16 +153,18 @@ mod tests {
         ErobModbusDrive::new(ErobModbusParameters {
             address,
             bit_rate_code,
-            joint,
-            encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
-            counts_per_turn: 524_288.0,
-            initial_position: 0.0,
-            peak_torque: 60.0,
-            torque_per_ampere: 5.0,
-            highest_velocity: 3.0,
-            ready_ns: 0,
+            module: ModuleParameters {
+                joint,
+                encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
+                counts_per_turn: 524_288.0,
+                initial_position: 0.0,
+                peak_torque: 60.0,
+                torque_per_ampere: 5.0,
+                highest_velocity: 3.0,
+                ready_ns: 0,
+                has_battery: true,
+            },
             reply_ns: MS,
-            has_battery: true,
             has_torque_sensor: false,
         })
     }

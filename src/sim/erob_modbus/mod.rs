@@ -8,5 +8,5 @@ mod drive;
 mod line;
 mod registers;
 
-pub use drive::{ErobModbusDrive, ErobModbusParameters, ModbusDriveFault};
+pub use drive::{ErobModbusDrive, ErobModbusParameters};
 pub use line::SimulatedLine;

@@ -1,6 +1,7 @@
 //! What can be read and written in a module, and what of it is kept without power.
 
 use crate::modbus::exception::ExceptionCode;
+use crate::sim::commanded_module::{ControlMode, ModuleSettings, ramp};
 use crate::sim::profile_motions::MotionProfile;
 
 /// The addresses of a module end before this one.
@@ -193,20 +194,35 @@ impl Settings {
         Ok(())
     }
 
-    /// What shapes the motions of position control.
-    pub fn profile(&self) -> MotionProfile {
-        /// The loops of the drive do not follow steeper ramps: count/s².
-        const STEEPEST: f64 = 1e8;
-        let most = self.get(MAXIMUM_VELOCITY) as f64;
-        // At least 1 count/s²: with 0 no motion would end.
-        let rate = |address| (self.get(address) as f64).clamp(1.0, STEEPEST);
-        MotionProfile {
-            velocity: (self.get(VELOCITY) as f64).clamp(-most, most),
-            acceleration: rate(ACCELERATION),
-            deceleration: rate(DECELERATION),
-            quick_stop: 1e6,
-            dwell_ns: u64::try_from(self.get(DWELL_TIME)).unwrap_or(0).saturating_mul(FIFTY_MICROSECONDS),
-            positions: (self.get(POSITION_MINIMUM) as f64, self.get(POSITION_MAXIMUM) as f64),
+    /// What shapes the motions.
+    pub fn of_module(&self) -> ModuleSettings {
+        let number = |address| self.get(address) as f64;
+        let fifty_microseconds =
+            |address| u64::try_from(self.get(address)).unwrap_or(0).saturating_mul(FIFTY_MICROSECONDS);
+        let mode = ControlMode::of(self.get(OPERATION_MODE));
+        let most = number(MAXIMUM_VELOCITY);
+        ModuleSettings {
+            mode,
+            motion_mode: self.get(MOTION_MODE),
+            target: number(TARGET_POSITION),
+            distance: number(RELATIVE_POSITION),
+            profile: MotionProfile {
+                velocity: number(VELOCITY).clamp(-most, most),
+                acceleration: ramp(number(ACCELERATION)),
+                deceleration: ramp(number(DECELERATION)),
+                quick_stop: 1e6,
+                dwell_ns: fifty_microseconds(DWELL_TIME),
+                positions: (number(POSITION_MINIMUM), number(POSITION_MAXIMUM)),
+            },
+            set_point: number(if mode == ControlMode::Torque { TARGET_CURRENT } else { TARGET_VELOCITY }),
+            // As in the manual's example: the joint moves with 0.
+            velocity_limit: match self.get(TORQUE_VELOCITY_LIMIT) {
+                0 => f64::INFINITY,
+                limit => limit.unsigned_abs() as f64,
+            },
+            position_error: number(POSITION_ERROR),
+            window: number(REACHED_WINDOW),
+            settling_ns: fifty_microseconds(REACHED_TIME),
         }
     }
 

@@ -1,17 +1,15 @@
-//! What the drive tells of itself, readings of its joint, and the other drives on the bus.
+//! What the drive tells of itself, and the other drives on the bus.
 
-use takt_rt::Nanoseconds;
-
+use super::super::failure::FAULT_CURE;
 use super::super::module;
-use super::super::reading;
-use super::{connect, selection};
 use crate::erob_can::client::RequestTiming;
 use crate::erob_can::entries::{self, Entry};
 use crate::erob_can::frame::NODES;
 use crate::erob_can::module_information::{ModuleNumbers, UnknownField};
-use crate::family::commission::polling;
 use crate::family::commission::scan::report;
 use crate::family::commission::{Failure, Report, TargetDrive};
+use crate::family::erob::module::CommandedModule as _;
+use crate::family::erob::selection;
 use crate::family::erob_can::session::ErobCanSession;
 
 /// So long a scan waits for the answer of a node. A drive answers within 1 ms.
@@ -19,7 +17,7 @@ const SCAN: RequestTiming = RequestTiming { timeout_ns: 10_000_000, silence_ns: 
 
 /// `info`
 pub async fn info(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, Failure> {
-    connect(c, s).await?;
+    c.connect(s).await?;
     let mut report = Report::new();
     let information = module::information(c).await?;
     report.add("firmware", "firmware version", information.firmware, information.firmware.to_string());
@@ -30,7 +28,7 @@ pub async fn info(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, Failure
         ),
     }
     c.step("condition");
-    let reading = reading::read_with_state(c, s).await?;
+    let reading = c.status().await?.reading(c.now_ns(), s);
     report.add("state", "state", reading.state, reading.state);
     for (key, label, entry) in [
         ("mode", "operating mode", &entries::OPERATING_MODE),
@@ -57,7 +55,7 @@ pub async fn info(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, Failure
     let code = c.read(&entries::ERROR_CODE).await?;
     report.add("error_code", "error", code, s.error_words(code as u16));
     if code != 0 {
-        c.note(super::failure::FAULT_CURE);
+        c.note(FAULT_CURE);
     }
     Ok(report)
 }
@@ -71,7 +69,7 @@ async fn add(
     entry: &Entry,
 ) -> Result<(), Failure> {
     let value = c.read(entry).await?;
-    report.add(key, label, value, selection::words(s, entry, value));
+    report.add(key, label, value, selection::words::<ErobCanSession>(s, entry, value.into()));
     Ok(())
 }
 
@@ -85,17 +83,6 @@ fn identity(c: &ErobCanSession, report: &mut Report, numbers: &ModuleNumbers) {
     add("serial_number", "serial number", numbers.serial_number());
     add("hardware_version", "hardware version", Ok(numbers.hardware_version()));
     add("module_version", "module version", numbers.module_version());
-}
-
-/// `watch`
-pub async fn watch(
-    c: &ErobCanSession,
-    s: &TargetDrive,
-    every_ns: Nanoseconds,
-    duration_ns: Option<Nanoseconds>,
-) -> Result<Report, Failure> {
-    connect(c, s).await?;
-    polling::watch(c, every_ns, duration_ns, async || Ok(reading::read_with_state(c, s).await?)).await
 }
 
 /// `scan`: asks every node ID for its firmware version.

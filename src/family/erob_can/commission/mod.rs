@@ -1,32 +1,26 @@
-//! Commissioning of a drive by eRob's own protocol: the tasks of `takt drive`.
+//! Commissioning of a drive by eRob's own protocol: the tasks of `takt drive`. Motions, and what is read and written by name, are those
+//! of every module that commands move: [`erob`](crate::family::erob).
 //!
-//! - `selection`: what the user reads and writes, by name or address, with units and words.
-//! - `moving`: the motions, with the limits of the axis.
 //! - `inspection`: what the drive tells of itself; the other drives on the bus.
 //! - `upkeep`: saving, node ID, brake, faults, the count of turns.
 //! - `words`: requests and replies in words.
 
 mod inspection;
-mod moving;
-mod selection;
 mod upkeep;
 mod words;
 
-use takt_rt::{Frame, Nanoseconds};
+use takt_rt::Frame;
 
-use super::failure;
-use crate::erob_can::client::{RequestClient, RequestError, RequestFailure, RequestTiming};
-use crate::erob_can::entries::{self, EntryAccess, Values};
+use crate::canopen::object::DataType;
+use crate::erob_can::client::{RequestClient, RequestTiming};
+use crate::erob_can::entries::Entry;
 use crate::erob_can::frame::NODES;
 use crate::family::FrameWords;
-use crate::family::commission::{
-    AnsweredProtocol, DriveTask, Failure, NamedEntry, Report, TargetDrive, Task,
-};
+use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
+use crate::family::erob::module::CommandedModule as _;
+use crate::family::erob::{selection, tasks};
 use crate::family::erob_can::session::ErobCanSession;
 use crate::procedure::Procedure;
-
-/// How long to wait for an answer of CANopen firmware.
-const OTHER_PROTOCOL_NS: Nanoseconds = 50_000_000;
 
 /// A task with a drive.
 ///
@@ -54,17 +48,27 @@ pub fn frame_words(target: TargetDrive) -> FrameWords {
 
 /// A task whose entries have been found.
 enum Work {
-    Read(Vec<selection::ToRead>),
-    Write(selection::ToWrite),
+    Read(Vec<Entry>),
+    Write(Entry, i64),
     Task(Task),
 }
 
 impl Work {
     fn of(target: &TargetDrive, task: Task) -> Result<Self, Failure> {
         Ok(match task {
-            Task::Read { names, data_type } => Self::Read(selection::to_read(&names, data_type)?),
+            Task::Read { names, data_type } => {
+                check_type(data_type)?;
+                Self::Read(selection::to_read(&names)?)
+            }
             Task::Write { name, value, data_type } => {
-                Self::Write(selection::to_write(target, &name, &value, data_type)?)
+                check_type(data_type)?;
+                let (entry, value): (Entry, i64) = selection::to_write(target, &name, &value)?;
+                if !entry.is_listed() && data_type.is_none() {
+                    return Err(Failure::Unsuitable(format!(
+                        "nothing is known of {entry}: say with --type i32 that you mean it"
+                    )));
+                }
+                Self::Write(entry, value)
             }
             task => match unsupported(&task) {
                 Some(failure) => return Err(failure),
@@ -74,30 +78,40 @@ impl Work {
     }
 }
 
+/// On the wire every entry has 32 bits.
+fn check_type(data_type: Option<DataType>) -> Result<(), Failure> {
+    match data_type {
+        None | Some(DataType::I32 | DataType::U32) => Ok(()),
+        Some(_) => {
+            Err(Failure::Unsuitable("every entry of this protocol has 32 bits: --type i32".to_owned()))
+        }
+    }
+}
+
 async fn carry_out(c: &ErobCanSession, s: &TargetDrive, work: Work) -> Result<Report, Failure> {
     match work {
         Work::Read(entries) => {
-            connect(c, s).await?;
+            c.connect(s).await?;
             selection::read(c, s, &entries).await
         }
-        Work::Write(write) => {
-            connect(c, s).await?;
-            selection::write(c, s, write).await
+        Work::Write(entry, value) => {
+            c.connect(s).await?;
+            selection::write(c, s, &entry, value).await
         }
-        Work::Task(Task::Scan) => inspection::scan(c).await,
         Work::Task(task) => match task {
+            Task::Scan => inspection::scan(c).await,
             Task::Info => inspection::info(c, s).await,
-            Task::Watch { every_ns, duration_ns } => inspection::watch(c, s, every_ns, duration_ns).await,
-            Task::Enable { hold_ns, keeps_enabled } => moving::enable(c, s, hold_ns, keeps_enabled).await,
-            Task::Disable => moving::disable(c, s).await,
+            Task::Watch { every_ns, duration_ns } => tasks::watch(c, s, every_ns, duration_ns).await,
+            Task::Enable { hold_ns, keeps_enabled } => tasks::enable(c, s, hold_ns, keeps_enabled).await,
+            Task::Disable => tasks::disable(c, s).await,
             Task::Move { kind, profile, keeps_enabled } => {
-                moving::run_move(c, s, kind, profile, keeps_enabled).await
+                tasks::run_move(c, s, kind, profile, keeps_enabled).await
             }
             Task::Velocity { velocity, profile, duration_ns, keeps_enabled } => {
-                moving::velocity(c, s, velocity, profile, duration_ns, keeps_enabled).await
+                tasks::velocity(c, s, velocity, profile, duration_ns, keeps_enabled).await
             }
             Task::Torque { torque, velocity_limit, duration_ns } => {
-                moving::torque(c, s, torque, velocity_limit, duration_ns).await
+                tasks::torque(c, s, torque, velocity_limit, duration_ns).await
             }
             Task::Save => upkeep::save(c, s).await,
             Task::SetId { node } => upkeep::set_id(c, s, node).await,
@@ -107,50 +121,6 @@ async fn carry_out(c: &ErobCanSession, s: &TargetDrive, work: Work) -> Result<Re
             task => Err(unsupported(&task).unwrap_or(Failure::Interrupted)),
         },
     }
-}
-
-/// Waits until the drive answers. It reads the position, which changes nothing.
-async fn connect(c: &ErobCanSession, s: &TargetDrive) -> Result<(), Failure> {
-    c.step("contact");
-    let end_ns = c.now_ns().saturating_add(s.patience_ns);
-    loop {
-        match c.read(&entries::ACTUAL_POSITION).await {
-            Ok(_) | Err(RequestError { failure: RequestFailure::Refused(_), .. }) => return Ok(()),
-            Err(RequestError { failure: RequestFailure::NoReply, .. }) => {}
-            Err(error) => return Err(error.into()),
-        }
-        if c.is_interrupted() {
-            return Err(Failure::Interrupted);
-        }
-        if c.now_ns() >= end_ns {
-            break;
-        }
-    }
-    let mut other_protocol = None;
-    if let Some(other) = s.family().other_protocol(s.node)
-        && c.answers(other.request, other.answer, OTHER_PROTOCOL_NS).await
-    {
-        other_protocol = Some(AnsweredProtocol { name: other.name, cure: other.cure });
-    }
-    Err(Failure::Silent { node: s.node, reported: None, other_protocol })
-}
-
-/// Everything in the table of the manual.
-pub fn entries() -> Vec<NamedEntry> {
-    let named = entries::ALL.iter().map(|entry| NamedEntry {
-        address: entry.address.to_string(),
-        name: entry.name,
-        access: match entry.access {
-            EntryAccess::Read => "read",
-            EntryAccess::ReadWrite => "read, write",
-            EntryAccess::Write => "write",
-            EntryAccess::Command | EntryAccess::CommandWithArgument => "command",
-        },
-        unit: entry.unit.symbol().to_owned(),
-        values: if entry.values == Values::Any { String::new() } else { entry.values.to_string() },
-        note: entry.note,
-    });
-    named.collect()
 }
 
 /// Why a drive with this protocol cannot do a task; `None` where it can.

@@ -1,19 +1,16 @@
 //! Saving, the node ID, the brake, faults, and the count of turns.
 
-use super::super::failure::faulted;
 use super::super::module;
-use super::super::motion;
-use super::super::reading::{self, STANDING};
-use super::connect;
 use crate::erob_can::entries;
 use crate::erob_can::frame::NODES;
-use crate::family::commission::polling;
 use crate::family::commission::{Failure, Report, TargetDrive};
+use crate::family::erob::module::CommandedModule as _;
+use crate::family::erob::tasks;
 use crate::family::erob_can::session::ErobCanSession;
 
 /// `save`
 pub async fn save(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, Failure> {
-    connect(c, s).await?;
+    c.connect(s).await?;
     module::save(c).await?;
     let mut report = Report::new();
     report.add("saved", "saved", true, "the parameters are kept without power");
@@ -27,8 +24,8 @@ pub async fn set_id(c: &ErobCanSession, s: &TargetDrive, node: u8) -> Result<Rep
             "an eRob with its own protocol has a node ID from 1 to 64, not {node}"
         )));
     }
-    connect(c, s).await?;
-    check_standstill(c).await?;
+    c.connect(s).await?;
+    tasks::check_standstill(c).await?;
     c.step("set the node ID");
     c.write(&entries::CAN_ADDRESS, node.into()).await?;
     module::save(c).await?;
@@ -50,8 +47,8 @@ pub async fn release_brake(
             option: "--yes",
         });
     }
-    connect(c, s).await?;
-    check_standstill(c).await?;
+    c.connect(s).await?;
+    tasks::check_standstill(c).await?;
     module::release_brake(c).await?;
     c.note("the brake is released, and nothing holds the joint; Ctrl-C applies it again");
     c.step("brake released");
@@ -60,16 +57,14 @@ pub async fn release_brake(
     c.step("apply the brake");
     c.write(&entries::MOTOR_ENABLE, 0).await?;
     watched?;
-    let mut report = Report::new();
-    report.append(polling::summary(s, &reading::read_with_state(c, s).await?));
-    Ok(report)
+    tasks::summary(c, s).await
 }
 
 /// Shows readings until the user ends it.
 async fn watch_until_interrupted(c: &ErobCanSession, s: &TargetDrive) -> Result<(), Failure> {
     const EVERY_NS: u64 = 100_000_000;
     while !c.is_interrupted() {
-        c.show(reading::read_with_state(c, s).await?);
+        c.show(c.status().await?.reading(c.now_ns(), s));
         c.pause(EVERY_NS).await;
     }
     Ok(())
@@ -84,8 +79,8 @@ pub async fn clear_turns(c: &ErobCanSession, s: &TargetDrive, is_confirmed: bool
             option: "--yes",
         });
     }
-    connect(c, s).await?;
-    check_standstill(c).await?;
+    c.connect(s).await?;
+    tasks::check_standstill(c).await?;
     let before = c.read(&entries::ACTUAL_POSITION).await?;
     module::reset_encoder(c).await?;
     let after = c.read(&entries::ACTUAL_POSITION).await?;
@@ -102,16 +97,15 @@ pub async fn clear_turns(c: &ErobCanSession, s: &TargetDrive, is_confirmed: bool
 
 /// `clear-fault`: the protocol has no command for it. Disabling ends a fault whose cause is gone.
 pub async fn clear_fault(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, Failure> {
-    connect(c, s).await?;
+    c.connect(s).await?;
     c.step("read the error code");
     let before = c.read(&entries::ERROR_CODE).await?;
-    motion::come_to_rest(c).await.map_err(|failure| super::failure::of_motion(s, failure))?;
+    tasks::come_to_rest(c, s).await?;
     c.step("read the error code");
     let after = c.read(&entries::ERROR_CODE).await?;
     if after != 0 {
-        let Failure::Faulted { what, .. } = faulted(s, after) else { return Err(faulted(s, after)) };
         return Err(Failure::FaultPersists {
-            what,
+            what: s.error_words(after as u16),
             advice: Some(
                 "the protocol has no command that clears it: mend the cause, then switch the power off and on; after a \
                  battery alarm of a multi-turn model use `zero`",
@@ -122,14 +116,4 @@ pub async fn clear_fault(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, 
     let words = if before == 0 { "there was no error".to_owned() } else { s.error_words(before as u16) };
     report.add("cleared", "cleared", before, words);
     Ok(report)
-}
-
-/// Such settings are made at standstill without torque.
-async fn check_standstill(c: &ErobCanSession) -> Result<(), Failure> {
-    c.step("state");
-    let is_off = c.read(&entries::TARGET_REACHED_STATE).await? == 0;
-    if is_off && c.read(&entries::ACTUAL_VELOCITY).await?.saturating_abs() <= STANDING {
-        return Ok(());
-    }
-    Err(Failure::Enabled)
 }

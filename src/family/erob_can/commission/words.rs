@@ -2,10 +2,12 @@
 
 use takt_rt::Frame;
 
-use super::selection;
-use crate::erob_can::entries::{self, EntryAccess};
+use crate::erob_can::entries;
 use crate::erob_can::frame::{ReceivedRequest, Reply, replying_node};
+use crate::erob_parameter::Access;
 use crate::family::commission::TargetDrive;
+use crate::family::erob::selection;
+use crate::family::erob_can::session::ErobCanSession;
 
 /// The words for the frames on the bus of a drive.
 pub struct Words {
@@ -43,7 +45,7 @@ impl Words {
         let name = entries::describe(request.address);
         match (request.value, entries::find(request.address)) {
             (Some(value), _) => format!("set {name} to {}", self.value(request, value)),
-            (None, Some(entry)) if entry.access == EntryAccess::Command => format!("command {name}"),
+            (None, Some(entry)) if entry.access == Access::Command => format!("command {name}"),
             (None, _) => format!("read {name}"),
         }
     }
@@ -60,7 +62,8 @@ impl Words {
 
     fn value(&self, request: &ReceivedRequest, value: i32) -> String {
         let entry = entries::find(request.address);
-        entry.map_or_else(|| value.to_string(), |entry| selection::words(&self.target, entry, value))
+        let words = |entry| selection::words::<ErobCanSession>(&self.target, entry, value.into());
+        entry.map_or_else(|| value.to_string(), words)
     }
 }
 
