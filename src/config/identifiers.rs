@@ -12,6 +12,8 @@ pub enum IdUse {
     Request,
     /// Frames of the drive.
     Reply,
+    /// Frames that the drive sends by itself and nobody reads.
+    Heartbeat,
     /// Frames of the controller that set the drive up. Drives of one make may share them.
     Setup,
     /// Frames of a drive with another protocol, in either direction.
@@ -26,6 +28,7 @@ impl DriveFamily {
         };
         let requests = device.request_ids(node).into_iter().map(|id| (id, IdUse::Request));
         let setup = device.setup_ids(node).into_iter().map(|id| (id, IdUse::Setup));
-        requests.chain(setup).chain([(device.reply_id(node), IdUse::Reply)]).collect()
+        let heartbeat = device.heartbeat_id(node).map(|id| (id, IdUse::Heartbeat));
+        requests.chain(setup).chain([(device.reply_id(node), IdUse::Reply)]).chain(heartbeat).collect()
     }
 }

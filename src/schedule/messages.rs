@@ -269,7 +269,11 @@ fn field_messages(
         is_asynchronous: kind == MessageKind::Feedback,
         ..message(kind, Some(index), reply_id, reply.bytes, reply_ns)
     };
-    vec![request, reply]
+    let heartbeat = device.description.heartbeat.map(|heartbeat| {
+        let (id, kind) = (device.id(&heartbeat.id, axis.node), MessageKind::DriveHeartbeat);
+        message(kind, Some(index), id, heartbeat.bytes, heartbeat.period_ns)
+    });
+    [request, reply].into_iter().chain(heartbeat).collect()
 }
 
 /// The length of the longest frame that may be the request of a cycle.

@@ -49,6 +49,13 @@ fn identifiers_of_nmt_and_of_other_drives_are_refused() {
     let erob = "drive = \"erob-canopen\"\nnode = 5\n".to_owned();
     let text = text("1 ms", "", &[erob, hollow("master_id = 0x185\nnode = 2\n")]);
     assert_says(&text, &["0x185", "`joint1`"]);
+    // Node 12 of ODrive sends its heartbeat by the identifier of the feedback of node 1.
+    let odrive =
+        |node| format!("drive = \"bit-fields\"\ndescription = \"odrive-can-simple\"\nnode = {node}\n");
+    let erob = "drive = \"erob-canopen\"\nnode = 1\n".to_owned();
+    let beside = |node| self::text("1 ms", "", &[erob.clone(), odrive(node)]);
+    assert_says(&beside(12), &["0x181", "`joint1`"]);
+    Config::parse("beside.toml", &beside(13)).unwrap();
 }
 
 #[test]
@@ -108,6 +115,8 @@ fn keys_of_another_drive_mean_nothing() {
     );
     let counts = two("master_id = 0x64\ncounts_per_turn = 4096\n", "master_id = 0x65\n");
     assert_says(&counts, &["counts_per_turn", "32768"]);
+    let extended = hollow("extended = true\nmaster_id = 0x64\ncounts_per_turn = 2097152\n");
+    assert_says(&text("1 ms", "", &[extended]), &["counts_per_turn", "1048576", "more turns can be counted"]);
 }
 
 #[test]

@@ -45,6 +45,8 @@ pub struct Description {
     pub states: Option<StateCodes>,
     /// When the reply comes.
     pub reply_moment: ReplyMoment,
+    /// What it sends by itself beside its replies, and nobody reads here.
+    pub heartbeat: Option<DescribedHeartbeat>,
     /// How the drive is started and stopped.
     pub life_cycle: DescribedLifeCycle,
     /// The frames that set it up before it is used, in their order.
@@ -212,6 +214,17 @@ pub enum ReplyMoment {
     },
 }
 
+/// A classic frame that a drive sends by itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DescribedHeartbeat {
+    /// Its identifier.
+    pub id: IdExpression,
+    /// Its length.
+    pub bytes: usize,
+    /// From one to the next.
+    pub period_ns: Nanoseconds,
+}
+
 /// How a drive is told to start, to stop, and so on.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DescribedLifeCycle {
@@ -309,6 +322,7 @@ impl FieldDevice {
         let fixed = own.into_iter().chain(setup);
         description.command.id.has_master()
             || description.reply.id.has_master()
+            || description.heartbeat.is_some_and(|heartbeat| heartbeat.id.has_master())
             || fixed
                 .into_iter()
                 .any(|frame| frame.id.has_master() || frame.payload.contains(&PayloadByte::Master))
@@ -353,6 +367,11 @@ impl FieldDevice {
     /// The identifiers of the frames that set the drive with this motor ID up.
     pub fn setup_ids(&self, motor: u8) -> Vec<Id> {
         self.description.setup.iter().map(|setup| self.id(&setup.frame.id, motor)).collect()
+    }
+
+    /// The identifier of the heartbeat of the drive with this motor ID, if it has one.
+    pub fn heartbeat_id(&self, motor: u8) -> Option<Id> {
+        self.description.heartbeat.map(|heartbeat| self.id(&heartbeat.id, motor))
     }
 
     /// The identifier by which the drive with this motor ID replies.
@@ -418,6 +437,19 @@ impl FieldDevice {
                 field.scale.codes / turns
             }
         }
+    }
+
+    /// Whether the drive tells more turns than 32 bits of its counts hold.
+    pub fn outruns_counts(&self) -> bool {
+        let position = self.description.reply.field(ReplyValue::Position);
+        let highest = position.map_or(0.0, |field| field.code_range().1);
+        self.description.wraps || highest > f64::from(i32::MAX)
+    }
+
+    /// Whether a turn may count so much here: as in the frames, or less, so that 32 bits hold more turns.
+    pub fn may_count(&self, counts_per_turn: f64) -> bool {
+        let share = counts_per_turn / self.counts_per_turn();
+        (share - 1.0).abs() <= 1e-9 || share < 1.0 && self.outruns_counts()
     }
 
     /// Whether stiffness and damping of a command are those of a spring and a damper at the shaft, and no mere gains of a loop.

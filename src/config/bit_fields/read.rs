@@ -9,9 +9,9 @@ use takt_rt::{
 use toml::de::DeTable;
 
 use super::{
-    Amount, BesideTargetKind, DescribedFrames, DescribedLifeCycle, DescribedScale, Description,
-    FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, IdExpression, PayloadByte,
-    ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
+    Amount, BesideTargetKind, DescribedFrames, DescribedHeartbeat, DescribedLifeCycle, DescribedScale,
+    Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, IdExpression,
+    PayloadByte, ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
 };
 use crate::config::ConfigError;
 use crate::config::bounds::Bounds;
@@ -105,6 +105,8 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
     );
     let has_watchdog = watchdog.and_then(|entry| entry.boolean());
     let reply_moment = reply_moment(&mut root);
+    let has_heartbeat = root.get("heartbeat").is_some();
+    let heartbeat = has_heartbeat.then(|| heartbeat(root.section("heartbeat")));
     let states = root.get("states").is_some().then(|| states(root.section("states")));
     let command_section = root.section("command");
     let (command_spot, reply_section) = (command_section.header_spot(), root.section("reply"));
@@ -129,6 +131,10 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
             Some(states) => Some(states?),
         },
         reply_moment: reply_moment?,
+        heartbeat: match heartbeat {
+            None => None,
+            Some(heartbeat) => Some(heartbeat?),
+        },
         life_cycle: life_cycle?,
         setup: setup.into_iter().collect::<Option<_>>()?,
         bytes_before_setup: bytes_before_setup?,
@@ -161,8 +167,10 @@ fn check_frames(description: &Description, [command, reply]: [&Spot<'_>; 2]) {
     let mut settings = Settings::default();
     Setting::ALL.into_iter().for_each(|(_, setting)| settings.set(setting, 1.0));
     let device = FieldDevice { description: description.clone(), settings };
+    let heartbeat = description.heartbeat.as_ref().map(|heartbeat| (reply, &heartbeat.id));
     for highest in [*description.motor_ids.start(), *description.motor_ids.end()] {
-        for (spot, id) in [(command, &description.command.id), (reply, &description.reply.id)] {
+        let frames = [(command, &description.command.id), (reply, &description.reply.id)];
+        for (spot, id) in frames.into_iter().chain(heartbeat) {
             if id.id(highest, 0x7FF).is_none() && id.id(highest, 0).is_none() {
                 spot.report_range(
                     format!("an `id` that has too many bits for motor ID {highest}"),
@@ -177,6 +185,16 @@ fn check_frames(description: &Description, [command, reply]: [&Spot<'_>; 2]) {
             spot.report_range(format!("a frame in which {error}"), "fields that fit it".to_owned());
         }
     }
+}
+
+fn heartbeat(mut section: Section<'_>) -> Option<DescribedHeartbeat> {
+    let id = section.require("id", "its identifier: id = \"32 * motor + 1\"");
+    let id = id.and_then(|entry| expression(&entry, false));
+    let bytes = section.require("bytes", "its length: bytes = 8").and_then(|entry| entry.integer(0..9));
+    let period = section.require("period", "from one to the next: period = \"100 ms\"");
+    let period_ns = period.and_then(|entry| entry.nanoseconds(1e-3..=10.0));
+    section.finish();
+    Some(DescribedHeartbeat { id: id?, bytes: usize::try_from(bytes?).ok()?, period_ns: period_ns? })
 }
 
 fn states(mut section: Section<'_>) -> Option<StateCodes> {

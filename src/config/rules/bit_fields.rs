@@ -30,8 +30,14 @@ pub fn axis<'a>(axis: &Axis, bus: Option<&Bus>, at: impl Fn(&str) -> Spot<'a>) {
         );
     }
     let counts = device.counts_per_turn();
-    if (axis.counts_per_turn / counts - 1.0).abs() > 1e-9 {
-        let allowed = format!("left out: the frames of the drive have {} counts in a turn", Short(counts));
+    if !device.may_count(axis.counts_per_turn) {
+        let counts = Short(counts);
+        let allowed = match device.outruns_counts() {
+            true => format!(
+                "left out: the frames of the drive have {counts} counts in a turn; or less, so that more turns can be counted"
+            ),
+            false => format!("left out: the frames of the drive have {counts} counts in a turn"),
+        };
         at("counts_per_turn").report_range(Short(axis.counts_per_turn).to_string(), allowed);
         return;
     }

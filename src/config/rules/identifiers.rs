@@ -48,7 +48,7 @@ fn show(id: Id) -> String {
 const fn key_of(used: IdUse) -> &'static str {
     match used {
         IdUse::Reply => "master_id",
-        IdUse::Request | IdUse::Setup | IdUse::Node => "node",
+        IdUse::Request | IdUse::Heartbeat | IdUse::Setup | IdUse::Node => "node",
     }
 }
 

@@ -139,6 +139,7 @@ pub struct FieldSimulation {
     offset: f64,
     defects: Defects,
     reply_ns: Option<Nanoseconds>,
+    heartbeat_ns: Option<Nanoseconds>,
     ready_ns: Nanoseconds,
     stepped_ns: Nanoseconds,
 }
@@ -167,6 +168,7 @@ impl FieldSimulation {
             offset: 0.0,
             defects: Defects::default(),
             reply_ns: None,
+            heartbeat_ns: None,
             ready_ns: parameters.power_up_ns,
             stepped_ns: 0,
             parameters,
@@ -189,6 +191,8 @@ impl FieldSimulation {
             ReplyMoment::AfterCommand { .. } => None,
             ReplyMoment::Cyclic { period_ns } => Some(self.ready_ns.saturating_add(period_ns)),
         };
+        let heartbeat = self.parameters.device.description.heartbeat;
+        self.heartbeat_ns = heartbeat.map(|heartbeat| self.ready_ns.saturating_add(heartbeat.period_ns));
     }
 
     /// The position of the shaft as the drive counts it: rad.
@@ -358,7 +362,10 @@ impl FieldSimulation {
         let (forward_torque, wanted) = (command.torque * per_joint, command.velocity / per_joint);
         let forward_torque = if has_limits { 0.0 } else { forward_torque };
         match self.mode {
-            FieldMode::Torque => self.servo.torque(command.torque * per_joint, velocity),
+            FieldMode::Torque => {
+                self.servo.set_torque_limit(peak);
+                self.servo.torque(command.torque * per_joint, velocity)
+            }
             FieldMode::Velocity => {
                 self.servo.set_torque_limit(peak.min(torque_limit));
                 self.servo.velocity(wanted, velocity, forward_torque, STEP_S)
@@ -409,6 +416,15 @@ impl FieldSimulation {
             Some(payload) => Frame::data(self.reply_id, payload).ok(),
             None => Some(if self.defects.is_short { shorter(frame) } else { frame }),
         }
+    }
+
+    /// The heartbeat that is due. What it says is not described: its bytes are zero.
+    fn take_heartbeat(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
+        let due_ns = self.heartbeat_ns.filter(|due_ns| *due_ns <= now_ns)?;
+        let FieldSimulationParameters { device, motor_id, .. } = &self.parameters;
+        let heartbeat = device.description.heartbeat?;
+        self.heartbeat_ns = Some(due_ns.saturating_add(heartbeat.period_ns));
+        Frame::data(device.id(&heartbeat.id, *motor_id), [0; 8].get(..heartbeat.bytes)?).ok()
     }
 
     fn shows_mode(&self) -> bool {
@@ -489,11 +505,14 @@ impl Drive for FieldSimulation {
                 ReplyMoment::Cyclic { period_ns } => Some(due_ns.saturating_add(period_ns)),
             };
         }
+        if let Some(frame) = self.take_heartbeat(now_ns) {
+            mailbox.push(frame);
+        }
     }
 
     fn wake_ns(&self) -> Nanoseconds {
         let step_ns = self.stepped_ns + STEP_NS;
-        self.reply_ns.map_or(step_ns, |due_ns| due_ns.min(step_ns))
+        [self.reply_ns, self.heartbeat_ns].into_iter().flatten().fold(step_ns, Nanoseconds::min)
     }
 
     fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
