@@ -79,8 +79,8 @@ pub use axis::{
     ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, SenderByte, Supervision, TorqueLimits,
 };
 pub use bit_fields::{
-    BesideTarget, BitField, BitRange, ByteOrder, CodeRange, CommandValue, CommandValues, FieldBits,
-    FieldDrive, FieldDriveParameters, FieldFrame, FieldGains, FieldMode, FieldTargets, FieldValue,
+    BesideTarget, BitField, BitRange, ByteOrder, CodeRange, CommandTargets, CommandValue, CommandValues,
+    FieldBits, FieldDrive, FieldDriveParameters, FieldFrame, FieldGains, FieldMode, FieldTargets, FieldValue,
     FrameLayout, LayoutError, Life, LifeCycle, LifeState, LifeStep, LifeWish, LinearScale, MAX_FIELD_BYTES,
     MAX_FIELDS, MAX_SETUP_FRAMES, ModeCodes, Number, OwnFrame, OwnFrames, PositionReference, ReplyError,
     ReplyValue, ReplyValues, RunningMode, SetUpAgain, Setting, StateCodes,

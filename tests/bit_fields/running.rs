@@ -136,7 +136,7 @@ fn begin_move(world: &mut World, target: f64) {
         minimum_duration_s: 0.0,
     }));
     world.run_for(300);
-    assert_eq!(world.phase(), Phase::Moving);
+    assert_eq!(world.phase(), Phase::Moving, "{:?}", world.stops());
 }
 
 #[test]
@@ -266,6 +266,43 @@ fn the_mode_of_a_motor_changes_while_its_joint_is_at_rest_and_moves_nothing() {
         }
         assert_eq!(world.stops(), vec![]);
     }
+}
+
+/// A motor takes the frame of a mode with the numbers of its last command. The limits of position mode are no targets of the next one.
+#[test]
+fn a_motor_that_is_told_its_mode_by_a_frame_gets_no_limit_as_a_target() {
+    let fine = HOLLOW.replace("velocity_full_scale = 200", "velocity_full_scale = 20");
+    let mut world = holding(&format!("{fine}modes = [\"csp\", \"csv\", \"cst\"]\n"));
+    for mode in [CSV, CSP, CST, CSP, CSV, CST] {
+        world.run_for(300);
+        let request = world.request(Request::ChangeMode(ModeChange { modes: [Some(mode); MAX_AXES] }));
+        let mut fastest: f64 = 0.0;
+        while world.run.snapshot().motions.of(request) != Some(MotionState::Finished) {
+            world.run_for(1);
+            fastest = fastest.max(world.observe(0).velocity.abs());
+        }
+        // A target of the velocity limit, or of the torque limit, would be 50 times as much after one cycle.
+        assert!(fastest < 0.03, "{mode:?}: {fastest} rad/s");
+    }
+    assert_eq!(world.stops(), vec![]);
+}
+
+/// A spindle of extended mode turns beyond the range in which its motor reports its position.
+#[test]
+fn a_joint_turns_on_where_the_report_of_its_motor_wraps_around() {
+    let fine = HOLLOW.replace("velocity_full_scale = 200", "velocity_full_scale = 500");
+    let turns = "limits = { position = [\"-3000 turn\", \"3000 turn\"], velocity = 200, acceleration = 500, jerk = 20000, torque = 40 }";
+    let keys = format!(
+        "{fine}extended = true\nmaster_id = 0x64\ncounts_per_turn = 65536\ncurrent_full_scale = 100\n{turns}\n{JOINT}\
+         simulated = {{ initial_position = \"2040 turn\", peak_torque = \"50 Nm\" }}\nfollowing_error = {{ limit = 20, time = \"50 ms\" }}\n"
+    )
+    .replacen("current_full_scale = 4\n", "", 1);
+    let mut world = World::new(one("1 ms", "", &keys, "to = \"2060 turn\""));
+    assert_eq!(world.run_to_the_end(|_| ()), Outcome::Finished, "{:?}", world.stops());
+    let at = world.observe(0).position / std::f64::consts::TAU;
+    assert!((at - 2060.0).abs() < 0.01, "{at}");
+    let reported = world.run.snapshot().axes[0].position / std::f64::consts::TAU;
+    assert!((reported - 2060.0).abs() < 0.01, "{reported}");
 }
 
 /// Streams a point once in ten cycles.

@@ -55,6 +55,8 @@ const POINT_CASES: u64 = 240;
 const MODE_CASES: u64 = 120;
 /// Of storms over drives of bit fields.
 const BIT_FIELD_CASES: u64 = 600;
+/// Of storms over such drives whose modes are changed.
+const BIT_FIELD_MODE_CASES: u64 = 150;
 /// The same on a machine with too little time.
 const OVERLOADED_BIT_FIELD_CASES: u64 = 200;
 /// Of storms over drives that are spoken to outside of the cycle.
@@ -180,6 +182,22 @@ fn the_invariants_hold_for_drives_of_bit_fields_on_a_machine_with_too_little_tim
     let stops =
         play_all("bit fields in overload", OVERLOADED_BIT_FIELD_CASES, Case::of_bit_fields_in_overload);
     assert!(number("TAKT_STORM_CASES").is_some() || stops.contains(Rule::TimingUnfit.key()));
+}
+
+#[test]
+fn the_invariants_hold_where_modes_of_drives_of_bit_fields_are_changed() {
+    let first = number("TAKT_STORM_FIRST").unwrap_or(0);
+    let mut changed_cycles = 0;
+    for seed in first..first + number("TAKT_STORM_CASES").unwrap_or(BIT_FIELD_MODE_CASES) {
+        let mut case = Case { has_mode_changes: true, is_serving: true, ..Case::of_bit_fields(seed) };
+        case.clients = case.clients.max(1);
+        client_mode::let_modes_change(&mut case.config);
+        match play(&case) {
+            Ok(done) => changed_cycles += done.changed_cycles,
+            Err(wrong) => panic!("seed {seed}, with modes: {} {wrong}\n{}", case.config.name, case.text),
+        }
+    }
+    assert!(changed_cycles > 1000, "in another mode than at first, only {changed_cycles} cycles in motion");
 }
 
 #[test]

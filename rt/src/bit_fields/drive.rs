@@ -3,7 +3,9 @@
 use arrayvec::ArrayVec;
 
 use super::frame::{FieldFrame, ReplyError};
-use super::life_cycle::{FieldMode, Life, LifeCycle, LifeState, LifeStep, LifeWish, OwnFrame};
+use super::life_cycle::{
+    CommandTargets, FieldMode, Life, LifeCycle, LifeState, LifeStep, LifeWish, OwnFrame,
+};
 use super::values::{CommandValue, CommandValues, ReplyValue, ReplyValues};
 use crate::cia402::DriveState;
 use crate::frame::Frame;
@@ -67,6 +69,14 @@ impl BesideTarget {
             (Self::Limits { velocity, torque }, LifeWish::Run(FieldMode::Position)) => (velocity, torque),
             (Self::Limits { torque, .. }, LifeWish::Run(FieldMode::Velocity)) => (velocity, torque),
             _ => (velocity, torque),
+        }
+    }
+
+    /// The same at standstill, before the drive is told this mode by a frame of its own.
+    const fn before(self, mode: FieldMode, targets: &FieldTargets) -> (f64, f64) {
+        match (self, mode) {
+            (Self::Limits { torque, .. }, FieldMode::Position | FieldMode::Velocity) => (0.0, torque),
+            _ => (0.0, targets.torque),
         }
     }
 }
@@ -199,14 +209,16 @@ impl FieldDrive {
         {
             return frame;
         }
-        let (run, zero, mode, is_at_rest) = match self.life.step(wish, &by.life_cycle) {
+        let (run, zero, mode, kind) = match self.life.step(wish, &by.life_cycle) {
             LifeStep::Own(frame) => return frame,
-            LifeStep::Command { run, zero, mode, is_at_rest } => (run, zero, mode, is_at_rest),
+            LifeStep::Command { run, zero, mode, targets } => (run, zero, mode, targets),
         };
         let present = self.position(by).unwrap_or(0.0) + self.ways.begin_command();
-        let followed = match is_at_rest {
-            true => FieldTargets { position: present, velocity: 0.0, torque: 0.0, ..*targets },
-            false => *targets,
+        let followed = match kind {
+            CommandTargets::Rest => {
+                FieldTargets { position: present, velocity: 0.0, torque: 0.0, ..*targets }
+            }
+            CommandTargets::SetPoints | CommandTargets::Before(_) => *targets,
         };
         let position = match by.position_reference {
             // The drive knows its position only within its range.
@@ -216,7 +228,10 @@ impl FieldDrive {
                 self.ways.last
             }
         };
-        let (velocity, torque) = by.beside_target.of(wish, &followed);
+        let (velocity, torque) = match kind {
+            CommandTargets::Before(mode) => by.beside_target.before(mode, &followed),
+            _ => by.beside_target.of(wish, &followed),
+        };
         let (stiffness, damping) = match by.gains {
             FieldGains::Fixed { stiffness, damping } => (stiffness, damping),
             FieldGains::Commanded => (followed.stiffness, followed.damping),
@@ -310,7 +325,10 @@ impl FieldDrive {
     /// Whether it may have torque, whatever its last reply shows: it is told to start, or is told to stop and has not shown for long enough
     /// that it has.
     pub const fn may_have_torque(&self) -> bool {
-        matches!(self.state(), LifeState::Starting(_) | LifeState::Running(_) | LifeState::Stopping)
+        matches!(
+            self.state(),
+            LifeState::Starting(_) | LifeState::Running(_) | LifeState::Changing { .. } | LifeState::Stopping
+        )
     }
 
     /// The same in the states of CiA 402, in which every drive is led. A drive that is told to stop may have torque; that it has an error is
@@ -318,12 +336,12 @@ impl FieldDrive {
     ///
     /// | drive | state of CiA 402 |
     /// | --- | --- |
-    /// | it replies with an error, in Starting, Running and Stopping, or with torque | fault reaction active |
+    /// | it replies with an error, in Starting, Running, Changing and Stopping, or with torque | fault reaction active |
     /// | it replies with an error, in any other | fault |
     /// | Stopping | quick stop active |
     /// | Stopped, Telling, Told | ready to switch on |
     /// | Choosing, Aligning, Starting | switched on |
-    /// | Running | operation enabled |
+    /// | Running, Changing | operation enabled |
     pub fn drive_state(&self, by: &FieldDriveParameters) -> DriveState {
         let has_error = self.reported(by, ReplyValue::Error).is_some_and(|error| error != 0.0);
         match self.life.state() {
@@ -335,13 +353,15 @@ impl FieldDrive {
             LifeState::Choosing(_) | LifeState::Aligning(_) | LifeState::Starting(_) => {
                 DriveState::SwitchedOn
             }
-            LifeState::Running(_) => DriveState::OperationEnabled,
+            LifeState::Running(_) | LifeState::Changing { .. } => DriveState::OperationEnabled,
         }
     }
 
     /// The mode that it runs in, by its reply, or by what it has been told where it does not show it.
     pub fn mode(&self, by: &FieldDriveParameters) -> RunningMode {
-        let LifeState::Running(told) = self.life.state() else { return RunningMode::None };
+        let (LifeState::Running(told) | LifeState::Changing { from: told, .. }) = self.life.state() else {
+            return RunningMode::None;
+        };
         match (&by.life_cycle, self.reported(by, ReplyValue::Mode)) {
             (LifeCycle::ByFields { modes }, Some(shown)) => {
                 modes.mode(shown).map_or(RunningMode::Unknown, RunningMode::Known)

@@ -11,6 +11,7 @@
 //! | Aligning | a command without torque, at the actual position | Starting |
 //! | Starting | start, at the actual position | Running, unless the drive shows no torque |
 //! | Running | the set-points | Stopping, if the drive shows no torque |
+//! | Changing | a command that does no harm in the next mode either; the frame of that mode follows | Stopping, if the drive shows no torque |
 //! | Telling | zero, or clear | Told |
 //! | Told | as in Stopped, until something else is wanted | |
 //!
@@ -18,6 +19,9 @@
 //! while it was told to stop.
 //!
 //! Where anything but running is wanted, a drive is stopped first. In every cycle exactly one frame is sent.
+//!
+//! A running drive that is told its mode by a frame of its own takes it with the numbers of its last command, which mean something else in
+//! that mode: the most velocity that it may use for a position becomes a velocity to go at. Hence the state Changing.
 
 use crate::frame::{Frame, Id};
 
@@ -150,6 +154,13 @@ pub enum LifeState {
     Starting(FieldMode),
     /// It follows set-points in this mode.
     Running(FieldMode),
+    /// It runs in a mode, and is about to be told another one by a frame of its own.
+    Changing {
+        /// The mode that it runs in.
+        from: FieldMode,
+        /// The mode that it is told next.
+        to: FieldMode,
+    },
     /// It is told this.
     Telling(Setting),
     /// It has been told this.
@@ -167,11 +178,22 @@ pub enum LifeStep {
         zero: bool,
         /// The field `Mode`.
         mode: u8,
-        /// Whether the targets are those of rest at the actual position, and not the set-points.
-        is_at_rest: bool,
+        /// What its targets are.
+        targets: CommandTargets,
     },
     /// A frame of its own.
     Own(Frame),
+}
+
+/// The targets of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CommandTargets {
+    /// Rest at the actual position.
+    Rest,
+    /// The set-points.
+    SetPoints,
+    /// The set-points at standstill, with numbers that do no harm in this mode either.
+    Before(FieldMode),
 }
 
 /// The life of one drive.
@@ -204,12 +226,14 @@ impl Life {
             (LifeState::Aligning(mode), Some(false) | None) => LifeState::Starting(mode),
             (LifeState::Starting(mode), Some(true) | None) => LifeState::Running(mode),
             // It has taken its torque away by itself.
-            (LifeState::Running(_), Some(false)) => LifeState::Stopping,
+            (LifeState::Running(_) | LifeState::Changing { .. }, Some(false)) => LifeState::Stopping,
             (LifeState::Stopping, Some(true)) => {
                 self.stop_replies = 0;
                 LifeState::Stopping
             }
-            (state @ (LifeState::Starting(_) | LifeState::Running(_)), _) => state,
+            (state @ (LifeState::Starting(_) | LifeState::Running(_) | LifeState::Changing { .. }), _) => {
+                state
+            }
             // It has torque though it is to have none.
             (_, Some(true)) => LifeState::Stopping,
             (LifeState::Telling(setting), _) => LifeState::Told(setting),
@@ -220,7 +244,10 @@ impl Life {
     /// What the drive is sent in this cycle.
     pub fn step(&mut self, wish: LifeWish, by: &LifeCycle) -> LifeStep {
         let before = self.state;
-        self.state = next(before, wish);
+        self.state = match by {
+            LifeCycle::ByFields { .. } => next(before, wish),
+            LifeCycle::ByFrames(_) => before_frame_of_mode(before, next(before, wish)),
+        };
         if before != LifeState::Stopping {
             self.stop_replies = 0;
         }
@@ -238,8 +265,10 @@ fn next(state: LifeState, wish: LifeWish) -> LifeState {
         (LifeState::Choosing(mode), LifeWish::Run(wanted)) if mode == wanted => LifeState::Aligning(mode),
         (LifeState::Aligning(mode), LifeWish::Run(wanted)) if mode == wanted => state,
         (LifeState::Starting(_), LifeWish::Run(_)) => state,
-        (LifeState::Running(_), LifeWish::Run(mode)) => LifeState::Running(mode),
-        (LifeState::Starting(_) | LifeState::Running(_), _) => LifeState::Stopping,
+        (LifeState::Running(_) | LifeState::Changing { .. }, LifeWish::Run(mode)) => LifeState::Running(mode),
+        (LifeState::Starting(_) | LifeState::Running(_) | LifeState::Changing { .. }, _) => {
+            LifeState::Stopping
+        }
         (LifeState::Telling(Setting::Zero), LifeWish::Zero) => state,
         (LifeState::Telling(Setting::Clear), LifeWish::Clear) => state,
         (LifeState::Told(Setting::Zero), LifeWish::Zero) => state,
@@ -248,6 +277,20 @@ fn next(state: LifeState, wish: LifeWish) -> LifeState {
         (_, LifeWish::Run(mode)) => LifeState::Choosing(mode),
         (_, LifeWish::Zero) => LifeState::Telling(Setting::Zero),
         (_, LifeWish::Clear) => LifeState::Telling(Setting::Clear),
+    }
+}
+
+/// The state before a running drive is told another mode by a frame of its own. The torque of torque mode is one to hold the joint with in
+/// each mode.
+fn before_frame_of_mode(before: LifeState, next: LifeState) -> LifeState {
+    match (before, next) {
+        (LifeState::Running(from), LifeState::Running(to)) if from != to && from != FieldMode::Torque => {
+            LifeState::Changing { from, to }
+        }
+        (LifeState::Changing { from, to }, LifeState::Running(wanted)) if wanted != to && wanted != from => {
+            LifeState::Changing { from, to: wanted }
+        }
+        _ => next,
     }
 }
 
@@ -266,14 +309,27 @@ const fn step_by_fields(state: LifeState, modes: &ModeCodes) -> LifeStep {
         run,
         zero: matches!(state, LifeState::Telling(Setting::Zero)),
         mode: code,
-        is_at_rest: !matches!(state, LifeState::Running(_)),
+        targets: targets(state),
+    }
+}
+
+/// The targets of a command in a state.
+const fn targets(state: LifeState) -> CommandTargets {
+    match state {
+        LifeState::Running(_) => CommandTargets::SetPoints,
+        LifeState::Changing { to, .. } => CommandTargets::Before(to),
+        _ => CommandTargets::Rest,
     }
 }
 
 fn step_by_frames(before: LifeState, state: LifeState, frames: &OwnFrames) -> LifeStep {
     let new_mode = match (before, state) {
         (_, LifeState::Choosing(mode)) => Some(mode),
-        (LifeState::Running(old), LifeState::Running(mode)) if old != mode => Some(mode),
+        (LifeState::Running(old) | LifeState::Changing { from: old, .. }, LifeState::Running(mode))
+            if old != mode =>
+        {
+            Some(mode)
+        }
         _ => None,
     };
     let own = match (state, new_mode) {
@@ -287,8 +343,8 @@ fn step_by_frames(before: LifeState, state: LifeState, frames: &OwnFrames) -> Li
         (_, Some(FieldMode::Position)) => frames.position,
         _ => None,
     };
-    let is_at_rest = !matches!(state, LifeState::Running(_));
-    let command = LifeStep::Command { run: !is_at_rest, zero: false, mode: 0, is_at_rest };
+    let targets = targets(state);
+    let command = LifeStep::Command { run: targets != CommandTargets::Rest, zero: false, mode: 0, targets };
     own.map_or(command, |own| LifeStep::Own(Frame::of(own.id, own.payload)))
 }
 
@@ -323,9 +379,16 @@ mod tests {
     fn letters(step: LifeStep) -> std::string::String {
         match step {
             LifeStep::Own(frame) => std::format!("{:02X}", frame.payload()[7]),
-            LifeStep::Command { run, zero, mode, is_at_rest } => {
+            LifeStep::Command { run, zero, mode, targets } => {
                 let (run, zero) = (u8::from(run), u8::from(zero));
-                std::format!("run={run} zero={zero} mode={mode} {}", if is_at_rest { "rest" } else { "set" })
+                let targets = match targets {
+                    CommandTargets::Rest => "rest",
+                    CommandTargets::SetPoints => "set",
+                    CommandTargets::Before(FieldMode::Torque) => "before F9",
+                    CommandTargets::Before(FieldMode::Velocity) => "before FA",
+                    CommandTargets::Before(FieldMode::Position) => "before FB",
+                };
+                std::format!("run={run} zero={zero} mode={mode} {targets}")
             }
         }
     }
@@ -365,10 +428,35 @@ mod tests {
         let (rest, set) = ("run=0 zero=0 mode=0 rest", "run=1 zero=0 mode=0 set");
         assert_eq!(steps[..8], ["FD"; 8]);
         assert_eq!(steps[8..], ["FB", rest, "FC", set, set]);
-        let velocity = LifeWish::Run(FieldMode::Velocity);
-        assert_eq!(answered(&mut life, &by_frames(), false, &[velocity; 2]), ["FA", set]);
         assert_eq!(answered(&mut life, &by_frames(), false, &[LifeWish::Stop; 12]), ["FD"; 12]);
         assert_eq!(life.state(), LifeState::Stopped);
+    }
+
+    #[test]
+    fn a_running_drive_is_told_another_mode_by_a_frame_after_a_command_that_does_no_harm_in_it() {
+        let [torque, velocity] = [FieldMode::Torque, FieldMode::Velocity].map(LifeWish::Run);
+        let set = "run=1 zero=0 mode=0 set";
+        let mut life = Life::default();
+        answered(&mut life, &by_frames(), false, &[RUN; 13]);
+        let mut told = |wishes: &[LifeWish]| answered(&mut life, &by_frames(), false, wishes);
+        assert_eq!(told(&[velocity; 3]), ["run=1 zero=0 mode=0 before FA", "FA", set]);
+        // The wish changes, or is taken back, before the frame has left.
+        let (before_torque, before_position) =
+            ("run=1 zero=0 mode=0 before F9", "run=1 zero=0 mode=0 before FB");
+        assert_eq!(told(&[RUN, torque, torque, torque]), [before_position, before_torque, "F9", set]);
+        // What is told in torque mode does no harm in any other.
+        assert_eq!(told(&[velocity; 2]), ["FA", set]);
+        assert_eq!(told(&[torque, velocity]), [before_torque, set]);
+        assert_eq!(told(&[torque, LifeWish::Stop]), [before_torque, "FD"]);
+        assert_eq!(life.state(), LifeState::Stopping);
+    }
+
+    #[test]
+    fn a_drive_that_is_told_its_mode_in_each_command_changes_it_at_once() {
+        let mut life = Life::default();
+        answered(&mut life, &BY_FIELDS, true, &[RUN; 13]);
+        let velocity = LifeWish::Run(FieldMode::Velocity);
+        assert_eq!(answered(&mut life, &BY_FIELDS, true, &[velocity]), ["run=1 zero=0 mode=1 set"]);
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub use layout::{
     MAX_FIELD_BYTES, MAX_FIELDS, Number,
 };
 pub use life_cycle::{
-    FieldMode, Life, LifeCycle, LifeState, LifeStep, LifeWish, ModeCodes, OwnFrame, OwnFrames, Setting,
+    CommandTargets, FieldMode, Life, LifeCycle, LifeState, LifeStep, LifeWish, ModeCodes, OwnFrame,
+    OwnFrames, Setting,
 };
 pub use values::{CommandValue, CommandValues, FieldValue, ReplyValue, ReplyValues};

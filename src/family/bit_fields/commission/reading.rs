@@ -17,7 +17,7 @@ pub fn state(task: &FieldTask) -> &'static str {
         LifeState::Stopping => "stopping",
         LifeState::Stopped | LifeState::Telling(_) | LifeState::Told(_) => "stopped",
         LifeState::Choosing(_) | LifeState::Aligning(_) | LifeState::Starting(_) => "starting",
-        LifeState::Running(_) => "running",
+        LifeState::Running(_) | LifeState::Changing { .. } => "running",
     }
 }
 
