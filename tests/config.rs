@@ -57,6 +57,21 @@ fn every_configuration_that_comes_with_takt_runs_its_program_to_the_end() {
 }
 
 #[test]
+fn feedback_may_be_missing_for_the_whole_cycles_in_a_time() {
+    let text = fs::read_to_string(config("first.toml")).unwrap();
+    let missed = |period: &str, time: &str| {
+        let axis = format!("[[axis]]\nmissed_feedback_time = \"{time}\"\n");
+        let cycle = format!("[cycle]\nperiod = \"{period}\"\n\n[[bus]]");
+        let text = text.replacen("[[bus]]", &cycle, 1).replacen("[[axis]]\n", &axis, 1);
+        parse(&text).axes[0].missed_feedback_cycles
+    };
+    assert_eq!(missed("1 ms", "50 ms"), 50);
+    assert_eq!(missed("2 ms", "50 ms"), 25);
+    assert_eq!(missed("4 ms", "50 ms"), 12);
+    assert_eq!((missed("3 ms", "3 ms"), missed("1 ms", "1 s")), (1, 1_000));
+}
+
+#[test]
 fn the_three_arms_differ_in_the_line_of_the_mode_alone() {
     let lines = |name: &str| -> Vec<String> {
         let text = fs::read_to_string(config(name)).unwrap();

@@ -225,6 +225,8 @@ cases! {
         "gear_ratio = 1.0" => "gear_ratio = nan", at "gear_ratio": OutOfRange { .. },
         "zero_counts = 0" => "zero_counts = 3000000000", at "zero_counts": OutOfRange { .. },
         "zero_counts = 0" => "missed_feedback_cycles = 0", at "missed": OutOfRange { .. },
+        "zero_counts = 0" => "missed_feedback_time = \"0.9 ms\"", at "missed": OutOfRange { allowed, .. } if allowed == "1 ms to 1 s",
+        "zero_counts = 0" => "missed_feedback_time = \"5 ms\"\nmissed_feedback_cycles = 5", at "missed_feedback_time": Ignored { .. },
         "zero_counts = 0" => "feedback_delay = \"-1 us\"", at "feedback_delay": OutOfRange { .. },
         "velocity = \"100 deg/s\"" => "velocity = 0", at "velocity = 0": OutOfRange { allowed, .. } if allowed.contains("check the unit"),
         "acceleration = \"8 rad/s^2\"" => "acceleration = inf", at "= inf": OutOfRange { .. },

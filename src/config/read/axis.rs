@@ -14,7 +14,7 @@ use super::travel::{counting, travel};
 use super::urdf::{DescribedJoint, Description};
 use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
-use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
+use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, Protocol};
 use crate::config::model::{
     Axis, FeedForward, Feedback, Follow, FrictionShape, Identity, Interface, Joint, Limits, PdoMapping,
     PowerUpState, SimulatedJoint, Travel,
@@ -186,8 +186,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let follow = section
         .get("follow")
         .and_then(|entry| entry.choice(&[("smooth", Follow::Smooth), ("exact", Follow::Exact)]));
-    let missed =
-        section.get("missed_feedback_cycles").and_then(|entry| entry.integer(ranges::MISSED_FEEDBACK_CYCLES));
+    let missed = missed_feedback(&mut section, drive, period_ns);
     let feedback_delay =
         section.get("feedback_delay").and_then(|entry| entry.nanoseconds(ranges::FEEDBACK_DELAY_S));
     let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
@@ -221,9 +220,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             target_tolerance: target_tolerance
                 .unwrap_or_else(|| defaults::target_tolerance(travel, &controls)),
             follow: follow.unwrap_or_default(),
-            missed_feedback_cycles: missed
-                .and_then(|cycles| u16::try_from(cycles).ok())
-                .unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
+            missed_feedback_cycles: missed.unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
             transmission_type,
             mapping,
             feedback,
@@ -249,6 +246,36 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     }
     section.finish();
     ReadAxis { name, quantities: q, limits, axis, place, drive: family_drive, header }
+}
+
+/// For how many cycles of its bus feedback may be missing: the number, or the cycles of a time.
+fn missed_feedback(
+    section: &mut Section<'_>,
+    drive: Option<&DriveFacts>,
+    period_ns: Option<u64>,
+) -> Option<u16> {
+    let cycles = section.get("missed_feedback_cycles");
+    let Some(time) = section.get("missed_feedback_time") else {
+        return cycles?.integer(ranges::MISSED_FEEDBACK_CYCLES).and_then(|cycles| u16::try_from(cycles).ok());
+    };
+    let key = time.spot.key.clone();
+    if cycles.is_some() {
+        let belongs = "both say for how long feedback may be missing: keep one of them";
+        time.report(ProblemKind::Ignored { key, beside: "missed_feedback_cycles", belongs });
+        return None;
+    }
+    let is_off_cycle = |drive: &DriveFacts| matches!(drive.protocol, Protocol::Own(_) | Protocol::SerialLine);
+    if drive.is_some_and(is_off_cycle) {
+        let belongs =
+            "`missed_feedback_cycles` counts the reports of a drive that is spoken to beside the cycle";
+        time.report(ProblemKind::Ignored { key, beside: "drive", belongs });
+        return None;
+    }
+    let period_ns = period_ns?.max(1);
+    let cycle_s = period_ns as f64 / 1e9;
+    let most = (ranges::MISSED_FEEDBACK_CYCLES.end - 1) as f64;
+    let time_ns = time.nanoseconds(cycle_s..=most * period_ns as f64 / 1e9)?;
+    u16::try_from(time_ns / period_ns).ok()
 }
 
 fn bus_index(entry: &Entry<'_>, buses: &[ReadBus<'_>]) -> Option<usize> {
