@@ -12,6 +12,10 @@ use takt::internals::hollow_lines::motor_data::{MotorCommand, MotorMode, MotorRe
 use takt::internals::hollow_lines::pulse_module::{FIRST_BYTE_OF_EXAMPLE, StiffnessSetting};
 use takt::internals::hollow_lines::registers;
 use takt::internals::hollow_lines::transparent::{FRAME_BYTES, FrameReader, TransparentFrame};
+use takt::internals::modbus::frame::{
+    Received, ReceivedRequest, RegisterRange, RegisterValues, Reply, Request, SlaveAddress, evaluate,
+    reply_frame,
+};
 use takt_rt::slcan::{
     BitRate, Command, DataBitRate, HostLine, LineError, LineReader, decode_frame, encode_frame,
 };
@@ -185,6 +189,44 @@ fn the_registers_of_modbus_are_the_bytes_of_can_fd() {
     let written = registers::to_registers(&MotorCommand::default().encode().unwrap());
     assert_eq!(request[2..4], registers::FIRST_ADDRESS.to_be_bytes());
     assert_eq!(request[7..39], written.map(u16::to_be_bytes).concat());
+}
+
+/// Whole frames, with the CRC-16 of the crate against that of the manual.
+#[test]
+fn every_frame_of_the_modbus_bridge_is_written_and_read_as_the_manual_prints_it() {
+    let slave = SlaveAddress::new(1).unwrap();
+    let nothing = registers::to_registers(&MotorCommand::default().encode().unwrap());
+    let negative = MotorReply { position: -81_266_187, current: 8, temperature: 31, ..STANDING };
+    let shown = registers::to_registers(&negative.encode().unwrap());
+    let write = Request::WriteSeveral(RegisterValues::new(registers::FIRST_ADDRESS, &nothing).unwrap());
+    let read = Request::Read(RegisterRange::new(registers::FIRST_ADDRESS, 16).unwrap());
+    let nothing_read: &[u16] = &[];
+    let printed = |id: &str| bytes(&named_row(id).content);
+    let sound = rows_of("modbus-rtu").into_iter().filter(|row| !row.is_misprint);
+    let ids: Vec<String> = sound.map(|row| row.id).collect();
+    let pairs = [
+        (&write, "modbus-write-req-fixed", "modbus-write-rsp", Reply::Written, nothing_read),
+        (
+            &read,
+            "modbus-read-req",
+            "modbus-read-rsp-fixed",
+            Reply::Values(shown.iter().copied().collect()),
+            &shown,
+        ),
+    ];
+    assert_eq!(ids, pairs.iter().flat_map(|(_, asked, replied, ..)| [*asked, *replied]).collect::<Vec<_>>());
+    for (request, asked, replied, reply, values) in pairs {
+        assert_eq!(request.frame(slave), printed(asked), "{asked}");
+        let received = ReceivedRequest { address: 1, request: Ok(request.clone()) };
+        assert_eq!(ReceivedRequest::decode(&printed(asked)), Some(received), "{asked}");
+        assert_eq!(evaluate(request, slave, &printed(replied)), Received::Whole(Ok(reply)), "{replied}");
+        assert_eq!(reply_frame(&printed(asked), Ok(values)), Some(printed(replied)), "{replied}");
+    }
+    for row in rows_of("modbus-rtu").into_iter().filter(|row| row.is_misprint) {
+        let is_request = ReceivedRequest::decode(&bytes(&row.content)).is_some();
+        let is_reply = evaluate(&read, slave, &bytes(&row.content)) == Received::Whole(Ok(Reply::Written));
+        assert!(!is_request && !is_reply, "{}", row.id);
+    }
 }
 
 #[test]

@@ -20,7 +20,8 @@ impl Menu {
         let mut menu = Self::default();
         for line in lines {
             let lower = line.to_lowercase();
-            let item = lower.chars().next().filter(|_| lower[1..].starts_with([')', '.', ':']));
+            let is_item = lower.get(1..).is_some_and(|rest| rest.starts_with([')', '.', ':']));
+            let item = lower.chars().next().filter(|_| is_item);
             let place = PARAMETERS.iter().position(|parameter| Some(parameter.item) == item);
             let number = last_number(line);
             if lower.contains("step_config") {
@@ -59,6 +60,7 @@ fn last_number(line: &str) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     #[test]
     fn a_menu_is_read_whatever_stands_around_its_numbers() {
@@ -74,5 +76,16 @@ mod tests {
         assert_eq!((menu.zero_point, menu.step_config), (Some(12.5), Some(90.0)));
         assert_eq!(menu.others, ["hello"]);
         assert!(!menu.is_complete());
+    }
+
+    proptest! {
+        #[test]
+        fn any_lines_are_read_and_none_is_lost(lines in prop::collection::vec(any::<String>(), 0..20)) {
+            let menu = Menu::of(&lines);
+            prop_assert!(menu.others.iter().all(|line| lines.contains(line)));
+            let (values, others) = (menu.values.iter().flatten().count(), menu.others.len());
+            let named = usize::from(menu.zero_point.is_some()) + usize::from(menu.step_config.is_some());
+            prop_assert!(values + named + others <= lines.len());
+        }
     }
 }
