@@ -206,13 +206,7 @@ fn every_frame_of_the_modbus_bridge_is_written_and_read_as_the_manual_prints_it(
     let ids: Vec<String> = sound.map(|row| row.id).collect();
     let pairs = [
         (&write, "modbus-write-req-fixed", "modbus-write-rsp", Reply::Written, nothing_read),
-        (
-            &read,
-            "modbus-read-req",
-            "modbus-read-rsp-fixed",
-            Reply::Values(shown.iter().copied().collect()),
-            &shown,
-        ),
+        (&read, "modbus-read-req", "modbus-read-rsp-fixed", Reply::Values(shown.to_vec()), &shown),
     ];
     assert_eq!(ids, pairs.iter().flat_map(|(_, asked, replied, ..)| [*asked, *replied]).collect::<Vec<_>>());
     for (request, asked, replied, reply, values) in pairs {
