@@ -228,7 +228,11 @@ pub struct Short(pub f64);
 impl fmt::Display for Short {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = self.0;
-        if !value.is_finite() || value == 0.0 {
+        if value == 0.0 {
+            // Without the sign of −0.
+            return f.write_str("0");
+        }
+        if !value.is_finite() {
             return write!(f, "{value}");
         }
         let magnitude = value.abs().log10().floor();
@@ -417,6 +421,7 @@ mod tests {
 
     #[test]
     fn values_are_shown_as_people_write_them() {
+        assert_eq!(Quantity::ANGLE.show(-0.0), "0 rad (0 deg)");
         assert_eq!(Quantity::DURATION.show(0.00055), "550 µs");
         assert_eq!(Quantity::DURATION.show(0.1), "100 ms");
         assert_eq!(Quantity::ANGLE.show(TAU / 4.0), "1.5708 rad (90 deg)");
