@@ -14,7 +14,7 @@ const read = (...parts) => readFileSync(path.join(...parts), "utf8");
 const panel = path.join(root, "src/panel/page");
 
 const SCRIPTS = {
-  ...Object.fromEntries(["connection", "texts", "frame", "units", "panel", "axes", "motion", "plots"].map((name) => [`${name}.js`, read(panel, `${name}.js`)])),
+  ...Object.fromEntries(["connection", "texts", "frame", "units", "panel", "axes", "motion", "monitor", "plots"].map((name) => [`${name}.js`, read(panel, `${name}.js`)])),
   "takt.mjs": read(moduleFolder, "takt.mjs"),
   "arm.js": read(here, "arm.js"),
   "demo.js": read(here, "demo.js"),
@@ -35,10 +35,10 @@ const put = (html, from, to) => {
   if (!html.includes(from)) throw new Error(`the page of the panel has no ${from}`);
   return html.replace(from, () => to);
 };
-let html = read(panel, "index.html");
+let html = ["top.html", "controller.html", "bottom.html"].map((part) => read(panel, part)).join("");
 html = put(html, '<link rel="icon" href="/icon.svg">', `<link rel="icon" href="${data("image/svg+xml", read(panel, "icon.svg"))}">`);
 html = put(html, '<link rel="stylesheet" href="/panel.css">', `<style>${read(panel, "panel.css")}${read(here, "demo.css")}</style>`);
-html = put(html, '<script type="module" src="/panel.js"></script>', `<script type="importmap">${inScript({ imports })}</script>
+html = put(html, '<script type="module" src="/page.js"></script>', `<script type="importmap">${inScript({ imports })}</script>
 <script type="application/json" id="takt-files">${inScript(files)}</script>
 <script type="module">import "takt/demo.js";</script>`);
 html = put(html, "<main>", '<div class="demo-place"><section class="card demo" id="demo"></section></div>\n<main>');

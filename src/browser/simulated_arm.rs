@@ -117,7 +117,7 @@ impl SimulatedArm {
 
     /// What does not change, as the panel tells it.
     pub fn machine(&self) -> String {
-        text(&MachineView::of(&self.controller.handle()))
+        text(&MachineView::of(&self.controller.handle(), false))
     }
 
     /// The number and the name by which the page is greeted.

@@ -118,7 +118,7 @@ fn show_controller(arguments: &Arguments, name: &str, interrupted: &AtomicBool) 
     let listening = arguments.access.listen(arguments.address)?;
     let lease = client.clone();
     let take_lease: panel::TakeLease = Box::new(move || lease.take_over());
-    let panel = listening.show(client.clone(), Some(take_lease));
+    let panel = listening.show(client.clone(), Some(take_lease), None);
     let is_over = |_: &Panel| {
         client.has_ended().then(|| {
             say!("takt: the controller has ended");

@@ -17,7 +17,8 @@ use crate::controller::session::{self, Session, SessionError, SessionOptions};
 use crate::controller::{Controller, Interrupt, Outcome, Progress, StartFailure};
 use crate::family;
 use crate::faults::{FaultEvents, FaultInjector, Scenario, ScenarioError, ScenarioFault};
-use crate::panel::{Listening, PanelError};
+use crate::monitor::BusDecoder;
+use crate::panel::{FrameSource, Listening, PanelError};
 use crate::remote::now_ns;
 use crate::schedule;
 use crate::serve::{self, ServeError, ServeOptions};
@@ -175,6 +176,7 @@ pub fn run(arguments: Arguments) -> Exit {
             .map(|metrics| -> EachCycle { Box::new(move |cycle| metrics.cycle(cycle)) }),
         fault_injector: fault_injector.clone(),
         if_owned: ownership::if_owned(arguments.take_over),
+        frames: listening.as_ref().map(|_| Arc::default()),
         sources,
     };
     let notify = notices(&bar, Machine::of(&config), metrics.clone());
@@ -256,12 +258,14 @@ fn offered(
 ) -> Result<Session, NoSession> {
     let bar = watcher.bar.clone();
     let watch = move |snapshot: &Snapshot, progress| watcher.watch(snapshot, &progress);
+    let decoders = (0..config.buses.len()).map(|bus| BusDecoder::of(config, bus)).collect();
+    let frames = options.frames.clone().map(|feed| FrameSource { feed, decoders });
     let controller = Controller::start_watched(config.clone(), options, notify, watch)?;
     let server = serve
         .as_ref()
         .map(|(name, options)| serve::serve(controller.handle(), name, options.clone()))
         .transpose();
-    let panel = listening.map(|listening| listening.show(controller.handle(), None)).transpose();
+    let panel = listening.map(|listening| listening.show(controller.handle(), None, frames)).transpose();
     let (_server, panel) = match (server, panel) {
         (Ok(server), Ok(panel)) => (server, panel),
         (Err(error), _) => {

@@ -30,8 +30,8 @@ use crate::link::ownership::{ClaimError, IfOwned, Ownership};
 use crate::link::trace::Trace;
 use crate::sleep_alignment;
 use crate::telemetry::{
-    BlackBoxOptions, EachCycle, Incident, LogSummary, Logger, LoggerOptions, LoggerThread, Machine, Notice,
-    RecordingDestination, RecordingOptions, ShownTiming, WallClock, shown_timing,
+    BlackBoxOptions, EachCycle, FrameFeed, Incident, LogSummary, Logger, LoggerOptions, LoggerThread,
+    Machine, Notice, RecordingDestination, RecordingOptions, ShownTiming, WallClock, shown_timing,
 };
 
 /// The pause between two polls of the controller.
@@ -52,6 +52,8 @@ pub struct SessionOptions {
     pub each_cycle: Option<EachCycle>,
     /// Faults that are injected into the buses.
     pub fault_injector: Option<Arc<FaultInjector>>,
+    /// Also passes the frames of all buses there.
+    pub frames: Option<Arc<FrameFeed>>,
     /// What happens when another process of this host is the master of a bus already.
     pub if_owned: IfOwned,
     /// The files that the configuration was made of. A recording has them, so that it can be replayed.
@@ -208,9 +210,11 @@ fn lead_as_owner(
     let engine = assemble::engine(config)?;
     let lines = Lines::open(config, options.fault_injector.as_deref())?;
     let is_recorded = options.recording.is_some() || config.telemetry.is_recorded;
-    let (ports, traces) = open_ports(config, &lines, options.fault_injector.as_deref(), is_recorded)?;
-    let (mut rt, mut host, log) = channels(&ChannelSizes::of(config));
     let has_black_box = config.telemetry.black_box_ns.is_some();
+    let is_traced =
+        is_recorded || has_black_box || options.frames.is_some() || config.telemetry.is_candump_written;
+    let (ports, traces) = open_ports(config, &lines, options.fault_injector.as_deref(), is_traced)?;
+    let (mut rt, mut host, log) = channels(&ChannelSizes::of(config));
     let (clock_answers, journal) = match is_recorded || has_black_box {
         true => {
             let (answers, clock) = clock_journal();
@@ -247,6 +251,7 @@ fn lead_as_owner(
     let logger = Logger::new(log, logger_options, notify)
         .with_each_cycle(options.each_cycle)
         .with_timing(timing_writer)
+        .with_frames(options.frames)
         .with_journal(journal, again, &options.sources);
     let logger = LoggerThread::start(logger).map_err(SessionError::Logger)?;
     let parts = LoopParts {
@@ -355,12 +360,10 @@ fn open_ports(
     config: &Config,
     lines: &Lines,
     fault_injector: Option<&FaultInjector>,
-    is_recorded: bool,
+    is_traced: bool,
 ) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
-    let is_traced =
-        is_recorded || config.telemetry.is_candump_written || config.telemetry.black_box_ns.is_some();
     for (index, bus) in config.buses.iter().enumerate() {
         let port = match lines.port(index) {
             Some(line) => Port::Line(Box::new(line)),

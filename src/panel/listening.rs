@@ -14,9 +14,19 @@ use super::connections;
 use super::gate::Visited;
 use super::server::{self, Server};
 use crate::command::{CommandError, RunningController};
+use crate::monitor::BusDecoder;
+use crate::telemetry::FrameFeed;
 
 /// Takes over from another process that commands the controller, where there may be one.
 pub type TakeLease = Box<dyn Fn() -> Result<(), CommandError> + Send + Sync>;
+
+/// The frames of a controller of this process, for the monitor.
+pub struct FrameSource {
+    /// Where they come from.
+    pub feed: Arc<FrameFeed>,
+    /// What they mean, in the order of the buses.
+    pub decoders: Vec<BusDecoder>,
+}
 
 /// How the panel is reached.
 #[derive(Clone, Debug)]
@@ -110,7 +120,7 @@ impl Listening {
         Ok(Self { listener, address, access })
     }
 
-    /// Shows a controller from now on. `take_lease` takes it over from another process.
+    /// Shows a controller from now on. `take_lease` takes it over from another process; `frames` are for the monitor.
     ///
     /// # Errors
     /// [`PanelError::Thread`].
@@ -118,8 +128,10 @@ impl Listening {
         self,
         controller: impl RunningController + 'static,
         take_lease: Option<TakeLease>,
+        frames: Option<FrameSource>,
     ) -> Result<Panel, PanelError> {
-        let server = Arc::new(Server::new(Arc::new(controller), self.access, take_lease));
+        let controller = Arc::new(controller);
+        let server = Arc::new(Server::new(controller, self.access, take_lease, frames.is_some()));
         let mut threads = Threads::new(Arc::<Server>::clone(&server), self.address);
         let routes = server::routes(&server);
         let commands = server.commands();
@@ -129,6 +141,10 @@ impl Listening {
             threads.spawn("takt-panel-event", move || own.collect_events())?;
             let own = Arc::clone(&server);
             threads.spawn("takt-panel-command", move || own.carry_out(&commands))?;
+            if let Some(frames) = frames {
+                let own = Arc::clone(&server);
+                threads.spawn("takt-panel-frames", move || own.collect_frames(frames))?;
+            }
             threads.spawn("takt-panel-motion", move || server.lead_motions())
         };
         start().map_err(PanelError::Thread)?;

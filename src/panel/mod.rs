@@ -4,14 +4,15 @@
 //! takt-panel          one thread: connections, states twenty times a second to every page, stops
 //! takt-panel-event    waits for events
 //! takt-panel-command  carries out commands, one after another
+//! takt-panel-frames   tells what frames mean, while the monitor of a page is on
 //! takt-panel-motion   renews what is held, and ends what its page has left
 //! ```
 //!
 //! All of them are ordinary threads beside the real-time one, and call the controller as the own program's threads do, by
 //! [`RunningController`]. A stop is taken on the first thread and waits for nobody.
 //!
-//! In the order to read: `access` (who may ask), `pages` (who is there, who commands), `command` and `motions` (what is asked and how it
-//! ends), `view` (what is shown), `gate` (what both kinds of panel share), `server` (the routes), `connections` (sockets and their bounds).
+//! In the order to read: `access` (who may ask), `pages` (who is there, who commands), `command`, `motions` and `motion` (what is asked and
+//! how it ends), `view` (what is shown), `gate` (what both kinds of panel share), `server` (the routes), `connections` (sockets and their bounds).
 //! Commissioning is `bench`: one thread more, `takt-bench`, which owns the buses.
 //! Without a server, `command`, `motions` and `view` serve a page of the simulated arm (the folder `browser`).
 
@@ -23,9 +24,12 @@ pub(crate) mod command;
 #[cfg(feature = "panel")]
 mod connections;
 #[cfg(feature = "panel")]
+mod frames;
+#[cfg(feature = "panel")]
 mod gate;
 #[cfg(feature = "panel")]
 mod listening;
+mod motion;
 pub(crate) mod motions;
 #[cfg(feature = "panel")]
 mod page;
@@ -39,6 +43,6 @@ pub use access::TOKEN_AT_LEAST;
 #[cfg(feature = "panel")]
 pub use bench::{BenchBus, BenchDrive, BenchLink, Workplace};
 #[cfg(feature = "panel")]
-pub use listening::{Listening, Panel, PanelError, PanelOptions, TakeLease, address};
+pub use listening::{FrameSource, Listening, Panel, PanelError, PanelOptions, TakeLease, address};
 pub use motions::HELD_FOR;
 pub use pages::{PAGES_AT_MOST, PRESENT_FOR};

@@ -9,14 +9,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use takt_rt::{AxisPoint, Nanoseconds, OperationMode, Phase, RequestId, RequestTarget, StopCategory};
+use takt_rt::{Nanoseconds, Phase, RequestTarget, StopCategory};
 
 use super::command::{
-    Command, CommandRefusal, Lasts, Quantity, begin_move, change_mode, not_refused, positions_with,
-    target_of, target_of_axis,
+    Command, CommandRefusal, Lasts, Quantity, begin_move, change_mode, positions_with, target_of,
+    target_of_axis,
 };
+use super::motion::{Kind, Motion, Route, Step, is_meant};
 use super::pages::PageNumber;
-use crate::command::{MotionError, MotionId, MoveOptions, RunningController, WaitError};
+use crate::command::{MoveOptions, RunningController, WaitError};
 
 /// A held key that is not renewed for so long is released.
 pub const HELD_FOR: Duration = Duration::from_millis(250);
@@ -24,45 +25,6 @@ pub const HELD_FOR: Duration = Duration::from_millis(250);
 pub const LOOK: Duration = Duration::from_millis(10);
 /// How long a motion that follows another one waits for its end.
 const AT_REST_WITHIN: Duration = Duration::from_secs(1);
-/// The real-time thread stops a drive in a profile mode whose value is not renewed for so long.
-const VALID_FOR: Duration = Duration::from_millis(300);
-
-/// A motion of a page.
-struct Motion {
-    page: PageNumber,
-    target: RequestTarget,
-    /// The newest stop when it began: a later one ends it.
-    newest_stop: RequestId,
-    kind: Kind,
-}
-
-enum Kind {
-    /// To a target, once.
-    Move(MotionId),
-    /// To and fro.
-    Reciprocate { axis: usize, ends: [Vec<f64>; 2], options: MoveOptions, next: usize, motion: MotionId },
-    /// A velocity or a torque.
-    Drive { axis: usize, value: f64, until: Option<Nanoseconds>, by: Route },
-}
-
-/// How a velocity or a torque reaches the drive.
-enum Route {
-    /// As the target of a profile mode.
-    Profile { quantity: Quantity, newest: MotionId },
-    /// As a stream, in which the other axes of the group stay where they are.
-    Stream { quantity: Quantity, place: usize, points: Vec<AxisPoint> },
-}
-
-/// What has become of a motion.
-enum Step {
-    GoesOn,
-    /// It has ended by itself, or somebody else has ended it.
-    Over,
-    /// It is to be brought to rest.
-    Rest,
-    /// It cannot go on, for this reason, and is to be brought to rest.
-    Failed(CommandRefusal),
-}
 
 /// A problem of a motion that its page has not asked about.
 #[derive(Clone, Debug)]
@@ -90,14 +52,6 @@ pub struct Motions {
 struct Kept {
     motions: Vec<Motion>,
     has_ended: bool,
-}
-
-/// Whether a group is one of a target.
-fn is_meant(target: RequestTarget, group: usize) -> bool {
-    match target {
-        RequestTarget::All => true,
-        RequestTarget::Group(meant) => usize::from(meant) == group,
-    }
 }
 
 /// A panic of another holder of a lock leaves these lists consistent.
@@ -244,10 +198,18 @@ impl Motions {
     fn release_where(&self, is_meant: impl Fn(&Motion) -> bool) -> Result<(), CommandRefusal> {
         let released: Vec<Motion> =
             locked(&self.kept).motions.extract_if(.., |motion| is_meant(motion)).collect();
-        released.iter().try_for_each(|motion| match motion.zero(&*self.controller) {
+        let ended = released.iter().try_for_each(|motion| match motion.zero(&*self.controller) {
             Some(zero) => zero.map(drop),
             None => self.rest(motion.target),
-        })
+        });
+        self.list_moving(&locked(&self.kept));
+        ended
+    }
+
+    /// What is kept is all that moves.
+    fn list_moving(&self, kept: &Kept) {
+        let moving = kept.motions.iter().filter(|motion| !motion.is_profile());
+        *locked(&self.moving) = moving.map(|motion| (motion.page, motion.target)).collect();
     }
 
     /// Stops what is repeated, and waits until the real-time thread has taken that: a motion that follows begins after it.
@@ -263,7 +225,10 @@ impl Motions {
     }
 
     fn disable(&self, target: RequestTarget) -> Result<(), CommandRefusal> {
-        locked(&self.kept).motions.retain(|motion| target != RequestTarget::All && motion.target != target);
+        let mut kept = locked(&self.kept);
+        kept.motions.retain(|motion| target != RequestTarget::All && motion.target != target);
+        self.list_moving(&kept);
+        drop(kept);
         Ok(self.controller.begin_disable(target)?)
     }
 
@@ -274,8 +239,9 @@ impl Motions {
             locked(&self.moving).push((motion.page, motion.target));
         }
         if self.stops() != stops || kept.has_ended {
-            self.controller.request_stop(motion.target, StopCategory::Two)?;
-            return Err(CommandRefusal::Discarded);
+            let stopped = self.controller.request_stop(motion.target, StopCategory::Two);
+            self.list_moving(&kept);
+            return stopped.map_err(CommandRefusal::from).and(Err(CommandRefusal::Discarded));
         }
         kept.motions.retain(|other| other.target != motion.target);
         kept.motions.push(motion);
@@ -322,67 +288,10 @@ impl Motions {
     ) -> Result<(), CommandRefusal> {
         let target = target_of_axis(axis, self.controller.machine())?;
         let newest_stop = self.controller.newest_stop(target);
-        let by = self.route(axis, target, quantity, value)?;
+        let by = Route::begin(&*self.controller, axis, target, quantity, value)?;
         let until = (lasts == Lasts::Held).then(|| self.until(HELD_FOR));
         let kind = Kind::Drive { axis, value, until, by };
         self.keep(Motion { page, target, newest_stop, kind }, stops)
-    }
-
-    /// Begins a velocity or torque in the way that the mode of the axis needs.
-    fn route(
-        &self,
-        axis: usize,
-        target: RequestTarget,
-        quantity: Quantity,
-        value: f64,
-    ) -> Result<Route, CommandRefusal> {
-        let controller = &*self.controller;
-        let state = controller.state();
-        let mode = state.axes().get(axis).and_then(|axis| OperationMode::from_number(axis.mode_set));
-        let wrong = || CommandRefusal::WrongMode {
-            axis: controller.machine().axis_name(u8::try_from(axis).unwrap_or(u8::MAX)),
-            mode: mode.map_or("no mode", OperationMode::name),
-            quantity: match quantity {
-                Quantity::Velocity => "velocity",
-                Quantity::Torque => "torque",
-            },
-        };
-        match (mode, quantity) {
-            (Some(OperationMode::ProfileVelocity), Quantity::Velocity) => {
-                let newest = not_refused(controller, controller.velocity(axis, value, VALID_FOR)?)?;
-                Ok(Route::Profile { quantity, newest })
-            }
-            (Some(OperationMode::ProfileTorque), Quantity::Torque) => {
-                let newest = not_refused(controller, controller.torque(axis, value, VALID_FOR)?)?;
-                Ok(Route::Profile { quantity, newest })
-            }
-            (
-                Some(
-                    OperationMode::ProfileVelocity
-                    | OperationMode::ProfileTorque
-                    | OperationMode::ProfilePosition,
-                ),
-                _,
-            )
-            | (None, _) => Err(wrong()),
-            (Some(mode), Quantity::Torque) if mode != OperationMode::CyclicSynchronousTorque => Err(wrong()),
-            (Some(_), _) => {
-                let axes = controller.axes_of(target);
-                let rest = |number: &usize| {
-                    AxisPoint::position(state.axes().get(*number).map_or(0.0, |axis| axis.position_set))
-                };
-                let points: Vec<AxisPoint> = axes.iter().map(rest).collect();
-                let place = axes.iter().position(|number| *number == axis).ok_or_else(wrong)?;
-                controller.begin_streaming(target)?;
-                let mut route = Route::Stream { quantity, place, points };
-                // A value that is refused moves nothing, and leaves no stream behind.
-                if let Err(error) = route.send(controller, target, axis, value) {
-                    controller.request_stop(target, StopCategory::Two)?;
-                    return Err(error);
-                }
-                Ok(route)
-            }
-        }
     }
 
     fn renew(&self, page: PageNumber, axis: usize, value: f64) -> Result<(), CommandRefusal> {
@@ -436,9 +345,7 @@ impl Motions {
             let step = if may_move(motion.page) { motion.step(&*self.controller) } else { Step::Rest };
             self.is_kept(motion, step, tell)
         });
-        let moving = kept.motions.iter().filter(|motion| !motion.is_profile());
-        let moving = moving.map(|motion| (motion.page, motion.target)).collect();
-        *locked(&self.moving) = moving;
+        self.list_moving(&kept);
     }
 
     fn is_kept(&self, motion: &Motion, step: Step, tell: &impl Fn(Problem)) -> bool {
@@ -457,118 +364,5 @@ impl Motions {
             tell(Problem { page: motion.page, refusal });
         }
         false
-    }
-}
-
-impl Motion {
-    /// The axis of what goes on until it is released.
-    const fn repeated_axis(&self) -> Option<usize> {
-        match &self.kind {
-            Kind::Move(_) => None,
-            Kind::Reciprocate { axis, .. } | Kind::Drive { axis, .. } => Some(*axis),
-        }
-    }
-
-    const fn is_profile(&self) -> bool {
-        matches!(self.kind, Kind::Drive { by: Route::Profile { .. }, .. })
-    }
-
-    /// Lets the value of a profile mode go to zero, where the drive holds or has no torque; `None` for other motions, which are stopped.
-    fn zero(&self, controller: &dyn RunningController) -> Option<Result<MotionId, CommandRefusal>> {
-        let Kind::Drive { axis, by: Route::Profile { quantity, .. }, .. } = &self.kind else { return None };
-        let zero = match quantity {
-            Quantity::Velocity => controller.velocity(*axis, 0.0, VALID_FOR),
-            Quantity::Torque => controller.torque(*axis, 0.0, VALID_FOR),
-        };
-        Some(zero.map_err(CommandRefusal::from))
-    }
-
-    fn step(&mut self, controller: &dyn RunningController) -> Step {
-        if controller.newest_stop(self.target) != self.newest_stop {
-            // Of another process' stop one hears late: what was renewed since then must end as well.
-            return if self.repeated_axis().is_some() { Step::Rest } else { Step::Over };
-        }
-        let step = match &mut self.kind {
-            Kind::Move(motion) => match controller.result_of(*motion) {
-                None => Step::GoesOn,
-                Some(_) => Step::Over,
-            },
-            Kind::Reciprocate { ends, options, next, motion, .. } => match controller.result_of(*motion) {
-                None => Step::GoesOn,
-                Some(Ok(())) => match controller.begin_move(self.target, &ends[*next % 2], *options) {
-                    Ok(begun) => {
-                        (*motion, *next) = (begun, *next + 1);
-                        Step::GoesOn
-                    }
-                    Err(error) => Step::Failed(error.into()),
-                },
-                Some(Err(_)) => Step::Over,
-            },
-            Kind::Drive { until: Some(until), .. } if controller.now_ns() >= *until => Step::Rest,
-            Kind::Drive { axis, value, by, .. } => by.step(controller, self.target, *axis, *value),
-        };
-        // A stop that came in between must not be followed by a new value.
-        match step {
-            Step::GoesOn if controller.newest_stop(self.target) != self.newest_stop => Step::Rest,
-            step => step,
-        }
-    }
-}
-
-impl Route {
-    fn step(
-        &mut self,
-        controller: &dyn RunningController,
-        target: RequestTarget,
-        axis: usize,
-        value: f64,
-    ) -> Step {
-        match self {
-            Self::Profile { newest, .. } => {
-                if let Some(Err(error)) = controller.result_of(*newest) {
-                    let is_told = matches!(error, MotionError::Refused(_));
-                    return if is_told { Step::Failed(error.into()) } else { Step::Over };
-                }
-            }
-            Self::Stream { .. } => {
-                let state = controller.state();
-                let mut groups =
-                    state.groups().iter().enumerate().filter(|(group, _)| is_meant(target, *group));
-                if !groups.any(|(_, group)| group.phase == Phase::Streaming) {
-                    return Step::Over;
-                }
-            }
-        }
-        match self.send(controller, target, axis, value) {
-            Ok(()) => Step::GoesOn,
-            Err(error) => Step::Failed(error),
-        }
-    }
-
-    fn send(
-        &mut self,
-        controller: &dyn RunningController,
-        target: RequestTarget,
-        axis: usize,
-        value: f64,
-    ) -> Result<(), CommandRefusal> {
-        match self {
-            Self::Profile { quantity: Quantity::Velocity, newest } => {
-                *newest = controller.velocity(axis, value, VALID_FOR)?;
-            }
-            Self::Profile { quantity: Quantity::Torque, newest } => {
-                *newest = controller.torque(axis, value, VALID_FOR)?;
-            }
-            Self::Stream { quantity, place, points } => {
-                if let Some(point) = points.get_mut(*place) {
-                    *point = match quantity {
-                        Quantity::Velocity => AxisPoint::Velocity(value),
-                        Quantity::Torque => AxisPoint::Torque(value),
-                    };
-                }
-                controller.push_point(target, controller.now_ns(), points)?;
-            }
-        }
-        Ok(())
     }
 }

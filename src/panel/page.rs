@@ -16,27 +16,42 @@ macro_rules! file {
     };
 }
 
+/// The page itself: what is in the middle, and what all pages have around it.
+macro_rules! html {
+    ($middle:literal) => {
+        File {
+            path: "/",
+            media_type: "text/html; charset=utf-8",
+            text: concat!(
+                include_str!("page/top.html"),
+                include_str!(concat!("page/", $middle)),
+                include_str!("page/bottom.html")
+            ),
+        }
+    };
+}
+
 /// What the pages of a running controller and of commissioning share.
-const SHARED: [File; 6] = [
+const SHARED: [File; 8] = [
     file!("/panel.css", "panel.css", "text/css; charset=utf-8"),
     file!("/connection.js", "connection.js", "text/javascript; charset=utf-8"),
     file!("/texts.js", "texts.js", "text/javascript; charset=utf-8"),
     file!("/frame.js", "frame.js", "text/javascript; charset=utf-8"),
     file!("/units.js", "units.js", "text/javascript; charset=utf-8"),
+    file!("/monitor.js", "monitor.js", "text/javascript; charset=utf-8"),
+    file!("/plots.js", "plots.js", "text/javascript; charset=utf-8"),
     file!("/icon.svg", "icon.svg", "image/svg+xml"),
 ];
-const CONTROLLER: [File; 5] = [
-    file!("/", "index.html", "text/html; charset=utf-8"),
-    file!("/panel.js", "panel.js", "text/javascript; charset=utf-8"),
+const CONTROLLER: [File; 4] = [
+    html!("controller.html"),
+    file!("/page.js", "panel.js", "text/javascript; charset=utf-8"),
     file!("/axes.js", "axes.js", "text/javascript; charset=utf-8"),
     file!("/motion.js", "motion.js", "text/javascript; charset=utf-8"),
-    file!("/plots.js", "plots.js", "text/javascript; charset=utf-8"),
 ];
-const BENCH: [File; 4] = [
-    file!("/", "bench.html", "text/html; charset=utf-8"),
-    file!("/bench.js", "bench.js", "text/javascript; charset=utf-8"),
+const BENCH: [File; 3] = [
+    html!("bench.html"),
+    file!("/page.js", "bench.js", "text/javascript; charset=utf-8"),
     file!("/tasks.js", "tasks.js", "text/javascript; charset=utf-8"),
-    file!("/monitor.js", "monitor.js", "text/javascript; charset=utf-8"),
 ];
 
 /// The page of a running controller.
@@ -100,15 +115,15 @@ mod tests {
         let texts = texts();
         let mut wanted: Vec<String> = vec![];
         let pages = [file("/"), text_of(of_bench(), "/")];
-        for (page, attribute) in pages
-            .into_iter()
-            .flat_map(|page| ["data-text=\"", "data-label=\""].map(|attribute| (page, attribute)))
-        {
+        for (page, attribute) in pages.into_iter().flat_map(|page| {
+            ["data-text=\"", "data-label=\"", "data-hint=\""].map(|attribute| (page, attribute))
+        }) {
             let found = page.split(attribute).skip(1).filter_map(|rest| rest.split_once('"'));
             wanted.extend(found.map(|(key, _)| key.to_owned()));
         }
-        let scripts = ["/panel.js", "/axes.js", "/motion.js", "/plots.js", "/frame.js"].map(file);
-        let of_bench = ["/bench.js", "/tasks.js", "/monitor.js"].map(|path| text_of(of_bench(), path));
+        let scripts =
+            ["/page.js", "/axes.js", "/motion.js", "/plots.js", "/frame.js", "/monitor.js"].map(file);
+        let of_bench = ["/page.js", "/tasks.js"].map(|path| text_of(of_bench(), path));
         for script in scripts.into_iter().chain(of_bench) {
             let calls = script
                 .split(" text(\"")

@@ -18,18 +18,22 @@ use tokio::sync::oneshot;
 
 use super::access::Access;
 use super::command::{Command, CommandRefusal, target_of};
+use super::frames::{FrameView, Frames, Wanted};
 use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, locked, message, page_key};
-use super::listening::TakeLease;
+use super::listening::{FrameSource, TakeLease};
 use super::motions::{Motions, Problem};
 use super::page::{self, File};
 use super::pages::{Asked, PageNumber, PageRefusal};
 use super::view::{EventView, MachineView, Viewer, time_ms};
 use crate::command::{RunningController, WaitError};
+use crate::telemetry::OnBus;
 
 /// Commands that may wait for the controller.
 const COMMANDS_WAITING: usize = 16;
 /// How often a thread that waits makes sure that the panel goes on.
 const LOOK: Duration = Duration::from_millis(100);
+/// So long after a page has asked for frames, they are not collected any more.
+const FRAMES_FOR: Duration = Duration::from_secs(2);
 
 /// What the threads of the panel share.
 pub struct Server {
@@ -38,6 +42,10 @@ pub struct Server {
     take_lease: Option<TakeLease>,
     motions: Motions,
     viewer: Mutex<Viewer>,
+    has_frames: bool,
+    frames: Mutex<Frames>,
+    /// When a page has asked for frames.
+    frames_asked: Mutex<Option<Instant>>,
     commands: SyncSender<Work>,
     commands_out: Mutex<Option<Receiver<Work>>>,
 }
@@ -91,6 +99,7 @@ impl Server {
         controller: Arc<dyn RunningController>,
         access: Access,
         take_lease: Option<TakeLease>,
+        has_frames: bool,
     ) -> Self {
         let (commands, commands_out) = sync_channel(COMMANDS_WAITING);
         Self {
@@ -99,6 +108,9 @@ impl Server {
             controller,
             take_lease,
             viewer: Mutex::default(),
+            has_frames,
+            frames: Mutex::default(),
+            frames_asked: Mutex::default(),
             commands,
             commands_out: Mutex::new(Some(commands_out)),
         }
@@ -130,6 +142,37 @@ impl Server {
                 let count = now_missed - missed;
                 self.gate.tell(None, |number| message("event", &EventView::missed(number, count, time_ms())));
                 missed = now_missed;
+            }
+        }
+    }
+
+    fn are_frames_wanted(&self) -> bool {
+        locked(&self.frames_asked).is_some_and(|asked| asked.elapsed() < FRAMES_FOR) && !self.gate.has_ended()
+    }
+
+    /// Keeps frames with their meaning, while pages ask for them, until the panel ends.
+    pub fn collect_frames(&self, source: FrameSource) {
+        let FrameSource { feed, mut decoders } = source;
+        while !self.gate.has_ended() {
+            if !self.are_frames_wanted() {
+                std::thread::sleep(LOOK);
+                continue;
+            }
+            let reader = feed.reader();
+            while self.are_frames_wanted() {
+                let Ok(OnBus { bus, what }) = reader.wait(LOOK) else { continue };
+                let words = decoders.get_mut(bus).map(|decoder| decoder.decode(&what.frame).line());
+                let age_ns = self.controller.now_ns().saturating_sub(what.at_ns);
+                let mut frames = locked(&self.frames);
+                frames.lose(reader.take_lost());
+                frames.push(FrameView {
+                    number: 0,
+                    time: time_ms() as f64 * 1e-3 - age_ns as f64 * 1e-9,
+                    bus,
+                    direction: if what.is_sent { '>' } else { '<' },
+                    frame: format!("{:?}", what.frame),
+                    words: words.unwrap_or_default(),
+                });
             }
         }
     }
@@ -176,6 +219,7 @@ impl Server {
 pub fn routes(server: &Arc<Server>) -> Router {
     let own = Router::new()
         .route("/api/machine", get(machine))
+        .route("/api/frames", post(frames))
         .route("/api/lease", post(lease))
         .route("/api/command", post(command))
         .route("/api/stop", post(stop));
@@ -183,7 +227,14 @@ pub fn routes(server: &Arc<Server>) -> Router {
 }
 
 async fn machine(State(server): State<Arc<Server>>) -> Response {
-    json_response(StatusCode::OK, &MachineView::of(&*server.controller))
+    json_response(StatusCode::OK, &MachineView::of(&*server.controller, server.has_frames))
+}
+
+async fn frames(State(server): State<Arc<Server>>, request: Request) -> Result<Response, Problematic> {
+    let (_, wanted) = body::<Wanted>(request).await?;
+    *locked(&server.frames_asked) = Some(Instant::now());
+    let view = locked(&server.frames).wanted(&wanted);
+    Ok(json_response(StatusCode::OK, &view))
 }
 
 /// Takes the controller over from another process.

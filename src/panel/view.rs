@@ -17,6 +17,8 @@ pub struct MachineView {
     name: String,
     cycle_ns: u64,
     version: &'static str,
+    /// Whether there is a monitor of the buses.
+    has_frames: bool,
     axes: Vec<AxisDescriptionView>,
     groups: Vec<GroupDescriptionView>,
     buses: Vec<BusDescriptionView>,
@@ -51,7 +53,7 @@ struct BusDescriptionView {
 
 impl MachineView {
     /// Of a controller.
-    pub fn of(controller: &dyn RunningController) -> Self {
+    pub fn of(controller: &dyn RunningController, has_frames: bool) -> Self {
         let machine = controller.machine();
         let axes = machine.axes.iter().enumerate().map(|(number, axis)| {
             let limits = controller.axis_properties(number).map(|axis| axis.limits);
@@ -83,6 +85,7 @@ impl MachineView {
             name: machine.name.clone(),
             cycle_ns: machine.cycle_ns,
             version: env!("CARGO_PKG_VERSION"),
+            has_frames,
             axes: axes.collect(),
             groups: match machine.groups.is_empty() {
                 true => all(),

@@ -13,6 +13,7 @@ use super::black_box::{BlackBox, BlackBoxOptions, Incident, reason};
 use super::bus_load::BusLoad;
 use super::candump::CandumpLog;
 use super::destination::RecordingDestination;
+use super::frame_feed::FrameFeed;
 use super::history::OnBus;
 use super::journal_keeper::JournalKeeper;
 use super::listener::{Listener, Notify};
@@ -113,6 +114,7 @@ pub struct Logger {
     each_cycle: Option<EachCycle>,
     timing: Option<ShownTimingWriter>,
     traces: Vec<Trace>,
+    frames: Option<Arc<FrameFeed>>,
     /// In the order of the traces.
     loads: Vec<Option<BusLoad>>,
     journal: Option<JournalKeeper>,
@@ -152,6 +154,7 @@ impl Logger {
             each_cycle: None,
             timing: None,
             traces,
+            frames: None,
             loads,
             journal: None,
             recorded: (Vec::new(), 0),
@@ -179,6 +182,12 @@ impl Logger {
     #[must_use]
     pub(crate) fn with_each_cycle(self, each_cycle: Option<EachCycle>) -> Self {
         Self { each_cycle, ..self }
+    }
+
+    /// Also passes the frames of the buses there.
+    #[must_use]
+    pub(crate) fn with_frames(self, frames: Option<Arc<FrameFeed>>) -> Self {
+        Self { frames, ..self }
     }
 
     /// Also keeps this black box.
@@ -335,6 +344,8 @@ impl Logger {
 
     fn drain_traces(&mut self) {
         let mut healths = Vec::new();
+        let feed = self.frames.as_ref().filter(|feed| feed.is_read());
+        let mut read = Vec::new();
         for (bus, trace) in self.traces.iter_mut().enumerate() {
             while let Some(traced) = trace.take_any() {
                 if let Some(journal) = &mut self.journal {
@@ -350,11 +361,15 @@ impl Logger {
                 if let Some(log) = &mut self.candump {
                     log.add(&frame);
                 }
+                read.extend(feed.map(|_| frame));
             }
             while let Some(what) = trace.take_health() {
                 let load = self.loads.get_mut(bus).and_then(Option::as_mut);
                 healths.push(OnBus { bus, what: load.map_or(what, |load| load.change(&what)) });
             }
+        }
+        if let Some(feed) = feed {
+            feed.pass(&read);
         }
         self.write_health(&healths);
         if let Some(log) = &mut self.candump

@@ -18,6 +18,7 @@ mod cdr;
 mod compression;
 mod destination;
 mod files_in_memory;
+mod frame_feed;
 mod history;
 mod journal_history;
 mod journal_keeper;
@@ -52,6 +53,9 @@ pub use cdr::{CdrDecoder, CdrEncoder};
 pub use destination::RecordingDestination;
 #[cfg(feature = "browser")]
 pub(crate) use files_in_memory::FilesInMemory;
+pub use frame_feed::FrameFeed;
+#[cfg(feature = "panel")]
+pub(crate) use history::OnBus;
 pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub(crate) use loop_timing::{LOOP_TIMING_WORDS, ShownTiming, newest_timing, shown_timing};

@@ -1,8 +1,16 @@
 //! Commissioning by the panel: the program `takt panel CONFIG` with simulated drives, as pages meet it.
 
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::path::Path;
 use std::process::{Child, ChildStderr, Command, Stdio};
+use std::sync::atomic::Ordering;
+use std::thread;
+use std::time::{Duration, Instant};
 
-use super::*;
+use serde_json::{Value, json};
+
+use crate::open_page::*;
 
 /// The program, and where it listens.
 struct Bench {
@@ -51,7 +59,8 @@ impl Bench {
     fn frames(&self) -> Vec<String> {
         let (mut all, mut seen) = (vec![], 0);
         loop {
-            let (_, _, value) = get(self.address, &format!("/api/frames/{seen}"), "X-Takt-Panel: 1\r\n");
+            let wanted = json!({ "after": seen }).to_string();
+            let (_, _, value) = post(self.address, "/api/frames", "", &wanted);
             let frames = value["frames"].as_array().unwrap();
             let Some(last) = frames.last() else { return all };
             seen = last["number"].as_u64().unwrap();
@@ -353,8 +362,10 @@ fn who_does_not_command_asks_too_often_or_comes_from_elsewhere_does_nothing() {
         post(bench.address, "/api/command", &format!("{own}Origin: http://evil.example\r\n"), &body).0,
         403
     );
-    assert_eq!(get(bench.address, "/api/frames/0", "").0, 403);
-    assert_eq!(get(bench.address, "/api/frames/-1", "X-Takt-Panel: 1\r\n").0, 400);
+    let address = bench.address;
+    let no_header = format!("POST /api/frames HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n");
+    assert_eq!(exchange(address, &no_header).0, 403);
+    assert_eq!(post(address, "/api/frames", "", r#"{"after": -1}"#).0, 400);
     page.is_refused(&json!({ "do": "scan", "bus": 0, "from": 1, "to": 200 }), 400, "malformed");
     let answers: Vec<u16> = (0..60)
         .map(|_| page.command(&json!({ "do": "add", "bus": 9, "node": 1, "family": "x" })).0)

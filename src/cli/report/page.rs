@@ -72,7 +72,7 @@ fn head(page: &mut String, report: &RecordingReport) {
     let _ = writeln!(
         page,
         "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" content=\"width=device-width, \
-         initial-scale=1\"><title>{machine}: {kind}</title><style>\n{STYLE}</style></head><body>\n<h1>{machine}</h1>"
+         initial-scale=1\"><title>{machine}: {kind}</title><style>\n{STYLE}</style></head><body><main>\n<h1>{machine}</h1>"
     );
     let begins = report.begins.as_deref().unwrap_or("an unknown time");
     let _ = writeln!(
@@ -257,7 +257,7 @@ fn foot(page: &mut String, report: &RecordingReport) {
     let _ = writeln!(
         page,
         "<p class=\"faint\">{}, written by takt {}. Of many cycles in one column of a curve, the lowest and the highest are drawn; --from \
-         and --to show a part.</p>\n</body></html>",
+         and --to show a part.</p>\n</main></body></html>",
         escaped(&file),
         escaped(&report.version)
     );

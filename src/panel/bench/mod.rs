@@ -10,7 +10,6 @@
 //! interrupted as by Ctrl-C (in control, then without torque), and a drive that was left with torque is disabled.
 
 mod asked;
-mod frames;
 mod interruption;
 mod told;
 mod worker;
@@ -21,7 +20,7 @@ use std::time::Instant;
 
 use axum::Router;
 use axum::body::Bytes;
-use axum::extract::{Path, Request, State};
+use axum::extract::{Request, State};
 use axum::http::StatusCode;
 use axum::response::Response;
 use axum::routing::{get, post};
@@ -30,13 +29,13 @@ use serde_json::json;
 
 use super::access::Access;
 use super::command::CommandRefusal;
+use super::frames::{Frames, Wanted};
 use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, locked, message, page_key};
 use super::motions::HELD_FOR;
 use super::page::{self, File};
 use super::pages::{Asked, PageNumber};
 use super::view::EventView;
 use asked::{Ask, AskedTask};
-use frames::Frames;
 use told::Told;
 
 pub use worker::{BenchBus, BenchDrive, BenchLink, Worker, Workplace};
@@ -196,7 +195,7 @@ impl Bench {
 pub fn routes(bench: &Arc<Bench>) -> Router {
     let own = Router::new()
         .route("/api/machine", get(machine))
-        .route("/api/frames/{after}", get(frames_after))
+        .route("/api/frames", post(frames))
         .route("/api/command", post(command))
         .route("/api/stop", post(stop));
     gate::routes(bench, own)
@@ -206,9 +205,10 @@ async fn machine(State(bench): State<Arc<Bench>>) -> Response {
     json_response(StatusCode::OK, &bench.told().machine())
 }
 
-async fn frames_after(State(bench): State<Arc<Bench>>, Path(after): Path<u64>) -> Response {
-    let view = locked(&bench.frames).after(after);
-    json_response(StatusCode::OK, &view)
+async fn frames(State(bench): State<Arc<Bench>>, request: Request) -> Result<Response, Problematic> {
+    let (_, wanted) = body::<Wanted>(request).await?;
+    let view = locked(&bench.frames).wanted(&wanted);
+    Ok(json_response(StatusCode::OK, &view))
 }
 
 /// A command with its number.

@@ -3,6 +3,7 @@
 import { Connection } from "./connection.js";
 import { askToken, find, forgetEvents, link, say, sayProblem, showCommander, showEvent, sure, wireCommand, wireStop } from "./frame.js";
 import { Monitor } from "./monitor.js";
+import { Plots } from "./plots.js";
 import { Tasks } from "./tasks.js";
 import { element, fill, isChinese, put, switchLanguage, text, textOr } from "./texts.js";
 import { isInDegrees, parse, position, shown, switchUnit, torque, velocity } from "./units.js";
@@ -12,6 +13,9 @@ let state = null;
 let chosen = null;
 let result = null;
 let isDescribing = false;
+// Of the readings of the chosen drive.
+let plots = null;
+let plottedMs = null;
 
 const connection = new Connection({
   open(description) {
@@ -34,7 +38,7 @@ const connection = new Connection({
   },
   token: () => askToken(() => connection),
 });
-const monitor = new Monitor(find("frames"), find("frames-lost"), () => connection);
+const monitor = new Monitor(() => connection, true);
 const tasks = new Tasks(find("motion"), ask, say);
 
 // Sends a command; whether it was taken.
@@ -168,12 +172,18 @@ function choose(number) {
   chosen = number;
   if (isOther) result = null;
   tasks.choose(number, drive());
+  drawPlots(isOther ? null : plots);
   if (isOther) {
     find("cycle").value = "";
     showResult();
     if (state?.watched !== null && state?.watched !== undefined) watch();
   }
   show();
+}
+
+function drawPlots(before) {
+  plots = drive() ? new Plots(find("plots"), { axes: [drive()] }, before) : null;
+  find("plots").hidden = true;
 }
 
 // Why the chosen drive cannot be moved now; null if it can.
@@ -203,10 +213,16 @@ function show() {
   showDrives();
 }
 
+// A step of the procedure, where it says more than what is done.
+function stepWords(step) {
+  const words = ["", "run", "watch"].includes(step) ? "" : textOr(`step_${step.replaceAll(" ", "_").toLowerCase()}`, step);
+  return words && ` – ${words}`;
+}
+
 function showRunning() {
   const running = state?.running ?? null;
   const who = running === null || running.drive === null ? machine.buses[running?.bus ?? 0]?.name : machine.drives[running.drive]?.name;
-  put(find("running"), running === null ? "" : `${who}: ${text(`action_${running.action}`)}${running.step ? ` – ${running.step}` : ""}`);
+  put(find("running"), running === null ? "" : `${who}: ${text(`action_${running.action}`)}${stepWords(running.step)}`);
   const progress = find("progress");
   progress.hidden = !running || running.of === 0;
   if (!progress.hidden) progress.firstElementChild.style.width = `${Math.min(100, (100 * running.done) / running.of)}%`;
@@ -218,6 +234,14 @@ function showReading() {
   find("watch").dataset.text = isWatched ? "readings_end" : "readings";
   put(find("watch"), text(find("watch").dataset.text));
   const reading = state?.reading?.drive === chosen ? state.reading : null;
+  if (reading && plots && reading.time_ms !== plottedMs) {
+    plottedMs = reading.time_ms;
+    const position_ = drive().unit === "counts" ? reading.position_counts : reading.position;
+    // The clock of readings is that of what is done with the drive, which begins anew.
+    plots.take({ time_ms: Date.now(), axes: [{ ...reading, position: position_, position_set: null, velocity_set: null, following_error: null }] });
+    find("plots").hidden = false;
+    plots.show(0);
+  }
   if (reading) tasks.position = drive().unit === "counts" ? reading.position_counts : reading.position;
   const unit = drive() ?? { unit: "rad" };
   const rows = reading === null ? [] : [
@@ -271,6 +295,7 @@ async function showOutcome(outcome) {
   }
   const words = [outcome.failure, outcome.advice && text("try_this", outcome.advice)].filter(Boolean).join(". ");
   result = { words: text(`ended_${outcome.ended}`, name, action, words), outcome };
+  if (["failed", "refused"].includes(outcome.ended)) say(result.words);
   const cycle = outcome.items.find(({ key }) => key === "value" || key === "1006:00");
   if (outcome.action === "cycle" && cycle && outcome.drive === chosen) find("cycle").value = cycle.text.replace(/[^\d].*$/, "");
   showResult();
@@ -282,7 +307,7 @@ function showResult() {
   find("result").replaceChildren(
     element("h3", { class: outcome.ended }, words),
     ...outcome.notes.map((note) => element("p", { class: "soft" }, note)),
-    ...(outcome.items.length ? [element("dl", { class: "report" }, ...outcome.items.map(({ label, text: value }) => element("div", {}, element("dt", {}, label), element("dd", {}, value))))] : []),
+    ...(outcome.items.length ? [element("dl", { class: "report" }, ...outcome.items.map(({ label, text: value }) => element("div", {}, element("dt", {}, textOr(`label_${label.replaceAll(" ", "_").toLowerCase()}`, label)), element("dd", {}, value))))] : []),
   );
 }
 
@@ -314,16 +339,6 @@ find("send").addEventListener("click", () => {
     ask({ do: "send", bus: Number(find("send-bus").value), frame: find("send-frame").value.trim(), count, period_ms });
   } else say(text("not_a_number", `${find("send-count").value}, ${find("send-period").value}`));
 });
-find("monitor-pause").addEventListener("click", (event) => {
-  const isPaused = event.target.getAttribute("aria-pressed") !== "true";
-  event.target.setAttribute("aria-pressed", isPaused);
-  event.target.dataset.text = isPaused ? "resume" : "pause";
-  put(event.target, text(event.target.dataset.text));
-  monitor.isPaused = isPaused;
-});
-find("monitor-clear").addEventListener("click", () => monitor.clear());
-find("monitor-export").addEventListener("click", () => monitor.export());
-find("monitor-filter").addEventListener("input", (event) => (monitor.filter = event.target.value));
 find("clear-events").addEventListener("click", () => find("events").replaceChildren());
 find("unit").addEventListener("click", () => {
   switchUnit();

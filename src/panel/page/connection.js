@@ -150,9 +150,10 @@ export class Connection {
     return this.machine;
   }
 
-  // The frames after one with this number.
-  async frames(after) {
-    const answer = await fetch(`/api/frames/${after}`, { headers: this.#headers() });
+  // The frames after one with this number that have `filter` in them.
+  async frames(after, filter) {
+    const headers = this.#headers({ "Content-Type": "application/json" });
+    const answer = await fetch("/api/frames", { method: "POST", headers, body: JSON.stringify({ after, filter }) });
     return answer.ok ? answer.json() : null;
   }
 

@@ -1,5 +1,6 @@
-// The monitor: the frames of the buses with their meaning, with pause, clear and export.
+// The monitor: the frames of the buses with their meaning, with pause, clear, filter and export.
 
+import { find } from "./frame.js";
 import { element, put, text } from "./texts.js";
 
 const ASK_EVERY_MS = 250;
@@ -14,14 +15,36 @@ export class Monitor {
   #frames = [];
   #seen = 0;
   #lost = 0;
+  #isOn = false;
   #isPaused = false;
   #filter = "";
 
-  constructor(list, lostPlace, connection) {
-    this.#list = list;
-    this.#lostPlace = lostPlace;
+  // `isOn`: from the beginning. The buses of a running controller are so busy that it is asked for.
+  constructor(connection, isOn) {
+    this.#list = find("frames");
+    this.#lostPlace = find("frames-lost");
     this.#connection = connection;
+    this.#switch(isOn);
+    find("monitor-on").addEventListener("click", () => this.#switch(!this.#isOn));
+    find("monitor-pause").addEventListener("click", () => {
+      this.#isPaused = !this.#isPaused;
+      toggled(find("monitor-pause"), this.#isPaused, ["pause", "resume"]);
+      if (!this.#isPaused) this.#show();
+    });
+    find("monitor-clear").addEventListener("click", () => this.clear());
+    find("monitor-export").addEventListener("click", () => this.#export());
+    find("monitor-filter").addEventListener("input", (event) => {
+      this.#filter = event.target.value.trim().toLowerCase();
+      this.#show();
+    });
     this.#ask();
+  }
+
+  #switch(isOn) {
+    this.#isOn = isOn;
+    // What comes while it is off is no loss.
+    this.#seen = 0;
+    toggled(find("monitor-on"), isOn, ["monitor_on", "monitor_off"]);
   }
 
   // A new connection counts frames anew.
@@ -32,16 +55,6 @@ export class Monitor {
     this.#lost = 0;
   }
 
-  set isPaused(isPaused) {
-    this.#isPaused = isPaused;
-    if (!isPaused) this.#show();
-  }
-
-  set filter(filter) {
-    this.#filter = filter.trim().toLowerCase();
-    this.#show();
-  }
-
   clear() {
     this.#frames = [];
     this.#lost = 0;
@@ -50,17 +63,17 @@ export class Monitor {
 
   async #ask() {
     for (;;) {
-      if (this.#connection().isOpen && !document.hidden) await this.#read().catch(() => {});
+      if (this.#isOn && this.#connection().isOpen && !document.hidden) await this.#read().catch(() => {});
       await new Promise((later) => setTimeout(later, ASK_EVERY_MS));
     }
   }
 
   async #read() {
-    const answer = await this.#connection().frames(this.#seen);
-    if (!answer || answer.frames.length === 0) return;
+    const answer = await this.#connection().frames(this.#seen, this.#filter);
+    if (!answer || answer.last === this.#seen) return;
     // What came before the page was opened is no loss.
     if (this.#seen > 0) this.#lost += answer.lost;
-    this.#seen = answer.frames.at(-1).number;
+    this.#seen = answer.last;
     this.#frames.push(...answer.frames);
     this.#frames.splice(0, this.#frames.length - KEPT);
     if (!this.#isPaused) this.#show();
@@ -86,7 +99,7 @@ export class Monitor {
   }
 
   // A candump log of what is shown.
-  export() {
+  #export() {
     const lines = this.#chosen().map(({ time, bus, direction, frame }) => {
       const name = (this.#busNames[bus] ?? "can").replace(/\s/g, "_");
       return `(${time.toFixed(6)}) ${name} ${frame} ${direction === ">" ? "T" : "R"}\n`;
@@ -95,6 +108,13 @@ export class Monitor {
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
   }
+}
+
+// A button that is pressed or not, with a text for each.
+function toggled(button, isPressed, texts) {
+  button.setAttribute("aria-pressed", isPressed);
+  button.dataset.text = texts[isPressed ? 1 : 0];
+  put(button, text(button.dataset.text));
 }
 
 function clock(seconds) {

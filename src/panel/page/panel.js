@@ -3,6 +3,7 @@
 import { Axes, Groups } from "./axes.js";
 import { Connection } from "./connection.js";
 import { askToken, find, forgetEvents, isTyping, link, say, sayProblem as sayIt, showCommander, showEvent, wireCommand, wireStop } from "./frame.js";
+import { Monitor } from "./monitor.js";
 import { Motion } from "./motion.js";
 import { Histogram, Plots } from "./plots.js";
 import { element, fill, isChinese, put, switchLanguage, text, textOr } from "./texts.js";
@@ -26,6 +27,8 @@ const connection = new Connection({
   open(description) {
     const isOther = machine === null || JSON.stringify(machine) !== JSON.stringify(description);
     machine = description;
+    find("monitor").hidden = !machine.has_frames;
+    monitor.begin(machine.buses.map(({ name }) => name), isOther);
     forgetEvents();
     if (isOther) draw();
     link("live");
@@ -42,6 +45,8 @@ const connection = new Connection({
   },
   token: () => askToken(() => connection),
 });
+
+const monitor = new Monitor(() => connection, false);
 
 // Sends a command; whether it was taken.
 async function command(what) {
@@ -173,13 +178,15 @@ function showFaults() {
   if (key === faultsShown) return;
   faultsShown = key;
   const banner = ({ stop, number, phase }) => {
-    const cure = stop.cure ?? textOr(`cure_${stop.rule}`, "");
+    // What takt says itself is in English.
+    const own = textOr(`cure_${stop.rule}`, "");
+    const cure = isChinese() && own ? own : stop.cure ?? own;
     const clear = element("button", { type: "button", class: "primary", onclick: () => act("clear_fault", number) }, text("clear_fault"));
     clear.disabled = !commands() || phase === "stopping";
     return element(
       "div",
       { class: "banner fault" },
-      element("h3", {}, text("fault_of", textOr(`rule_${stop.rule}`, stop.rule))),
+      element("h2", {}, text("fault_of", textOr(`rule_${stop.rule}`, stop.rule))),
       element("div", { class: "buttons" }, clear),
       element("p", {}, stop.words),
       element("p", { class: "cure" }, cure ? text("try_this", cure) : ""),

@@ -48,7 +48,7 @@ export class Plots {
     this.#plots = KINDS.map((kind) => {
       const canvas = element("canvas", { role: "img", "aria-label": text(kind) });
       const now = element("b", { class: "number" });
-      const item = element("div", { class: "plot" }, element("p", { class: "soft legend" }, text(kind), now, ...(kind === "position" ? [element("i", {}, text("actual")), element("i", { class: "set" }, text("set_point"))] : [])), canvas);
+      const item = element("div", { class: "plot" }, element("p", { class: "soft legend" }, text(kind), now, ...(kind === "position" && machine.axes.some((axis) => axis.group !== undefined) ? [element("i", {}, text("actual")), element("i", { class: "set" }, text("set_point"))] : [])), canvas);
       return { kind, canvas, now, item };
     });
     place.replaceChildren(...this.#plots.map((plot) => plot.item));
@@ -84,7 +84,7 @@ export class Plots {
     for (const { kind, canvas, now, item } of this.#plots) {
       const samples = this.#samples[chosen];
       const last = samples.at(-1)?.[kind][0] ?? null;
-      const isKnown = kind !== "torque" || last !== null;
+      const isKnown = last !== null;
       item.hidden = !isKnown;
       if (!isKnown || samples.length < 2) continue;
       const words = format[kind](last, axis);

@@ -70,9 +70,10 @@ export class Tasks {
     this.draw();
   }
 
-  #field(name, label, symbol, initial) {
+  // `usual`: it may be empty.
+  #field(name, label, symbol, initial, usual = null) {
     const key = `${this.#number} ${name}`;
-    const input = element("input", { id: `field-${name}`, type: "text", inputmode: "decimal", autocomplete: "off", value: this.#kept.get(key) ?? initial });
+    const input = element("input", { id: `field-${name}`, type: "text", inputmode: "decimal", autocomplete: "off", value: this.#kept.get(key) ?? initial, placeholder: usual && text(usual) });
     input.addEventListener("input", () => {
       input.removeAttribute("aria-invalid");
       this.#kept.set(key, input.value);
@@ -103,8 +104,8 @@ export class Tasks {
 
   #profile() {
     const { factor, symbol } = unitOf(this.#drive);
-    const velocity = this.#field("speed", "speed_or_usual", symbol && `${symbol}/s`, "");
-    const acceleration = this.#field("acceleration", "acceleration_or_usual", symbol && `${symbol}/s²`, "");
+    const velocity = this.#field("speed", "speed", symbol && `${symbol}/s`, "", "usual");
+    const acceleration = this.#field("acceleration", "acceleration", symbol && `${symbol}/s²`, "", "usual");
     const read = () => {
       const speed = this.#read(velocity, factor, true, 0, this.#drive.velocity);
       const ramp = speed === undefined ? undefined : this.#read(acceleration, factor, true, 0, this.#drive.acceleration);
@@ -161,7 +162,7 @@ export class Tasks {
 
   _reciprocating() {
     const [target, profile] = [this.#target(), this.#profile()];
-    const [times, dwell] = [this.#field("times", "times", "", "2"), this.#field("dwell", "dwell", "", "0")];
+    const [times, dwell] = [this.#field("times", "times", "", "2", "until_end"), this.#field("dwell", "dwell", "", "0")];
     const start = () => {
       const to = target.read();
       const count = to === undefined ? undefined : this.#read(times, 1, true, 1, 1e6);
@@ -185,7 +186,7 @@ export class Tasks {
     const { factor, symbol, digits } = unitOf(this.#drive);
     const usual = this.#drive.velocity === null ? "" : (this.#drive.velocity * factor * 0.1).toFixed(digits);
     const speed = this.#field("velocity", "speed", symbol && `${symbol}/s`, usual);
-    const acceleration = this.#field("ramp", "acceleration_or_usual", symbol && `${symbol}/s²`, "");
+    const acceleration = this.#field("ramp", "acceleration", symbol && `${symbol}/s²`, "", "usual");
     const read = (sign) => {
       const value = this.#read(speed, factor, false, 0, this.#drive.velocity);
       const ramp = value === undefined ? undefined : this.#read(acceleration, factor, true, 0, this.#drive.acceleration);
@@ -199,7 +200,7 @@ export class Tasks {
     const { factor, symbol, force } = unitOf(this.#drive);
     const usual = this.#drive.torque === null ? "" : (this.#drive.torque * 0.05).toFixed(2);
     const torque = this.#field("torque", "torque", force, usual);
-    const above = this.#field("above", "max_velocity", symbol && `${symbol}/s`, "");
+    const above = this.#field("above", "max_velocity", symbol && `${symbol}/s`, "", "usual");
     const read = (sign) => {
       const value = this.#read(torque, 1, false, 0, this.#drive.torque);
       const most = value === undefined ? undefined : this.#read(above, factor, true, 0, this.#drive.velocity);
@@ -210,7 +211,7 @@ export class Tasks {
   }
 
   _home() {
-    const method = this.#field("method", "home_method", "", "");
+    const method = this.#field("method", "home_method", "", "", "usual");
     const start = () => {
       const number = this.#read(method, 1, true, -128, 127);
       if (number !== undefined) this.#task({ kind: "home", method: number === null ? null : Math.round(number) });

@@ -4,9 +4,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use takt_rt::Frame;
 
+use super::super::super::frames::FrameView;
 use super::super::super::gate::locked;
 use super::super::Bench;
-use super::super::frames::FrameView;
 use crate::commission::ProcedureEvent;
 use crate::commission::bus_session::SessionEvent;
 use crate::commission::line_session::LineEvent;
