@@ -23,6 +23,8 @@ use access::Objects;
 /// Longest time between two advances.
 const IDLE_NS: Nanoseconds = 1_000_000;
 const NEVER: Nanoseconds = Nanoseconds::MAX;
+/// The identifiers of nothing but PDOs and SYNC: those of NMT, emergency messages, SDO and error control are others (CiA 301, 7.3.5).
+const PDO_IDS: std::ops::RangeInclusive<u32> = 0x180..=0x57F;
 
 /// How long a device takes for what.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +58,9 @@ pub struct CanopenNode {
     has_pdo_error: bool,
     save_ns: Nanoseconds,
     pdos_ready_ns: Nanoseconds,
+    /// When something is due, and when the node is to look for it.
+    due_ns: Nanoseconds,
+    wake_ns: Nanoseconds,
 }
 
 impl CanopenNode {
@@ -80,6 +85,8 @@ impl CanopenNode {
             has_pdo_error: false,
             save_ns: NEVER,
             pdos_ready_ns: 0,
+            due_ns: 0,
+            wake_ns: 0,
         }
     }
 
@@ -94,18 +101,48 @@ impl CanopenNode {
         self.save_ns = NEVER;
     }
 
-    /// The time of the next action, after `now_ns`.
-    pub fn wake_ns(&self, now_ns: Nanoseconds) -> Nanoseconds {
+    /// Finds out anew when it acts next, after everything that it does at `now_ns`.
+    pub fn schedule(&mut self, now_ns: Nanoseconds) {
         let has_message = self.errors.is_pending() && self.network.has_services();
         let due_ns = [
-            now_ns + IDLE_NS,
             self.network.due_ns(),
             self.sdo.due_ns().unwrap_or(NEVER),
             self.pdos.due_ns(),
             self.save_ns,
             if has_message { now_ns } else { NEVER },
         ];
-        due_ns.into_iter().min().unwrap_or(NEVER).max(now_ns + 1)
+        self.due_ns = due_ns.into_iter().min().unwrap_or(NEVER);
+        self.await_next(now_ns);
+    }
+
+    /// The next look at what is due is after `now_ns`.
+    fn await_next(&mut self, now_ns: Nanoseconds) {
+        self.wake_ns = self.due_ns.min(now_ns + IDLE_NS).max(now_ns + 1);
+    }
+
+    /// The time of the next action.
+    pub fn wake_ns(&self) -> Nanoseconds {
+        self.wake_ns
+    }
+
+    /// It is to act right after `now_ns`.
+    pub fn wake_after(&mut self, now_ns: Nanoseconds) {
+        (self.due_ns, self.wake_ns) = (now_ns, now_ns + 1);
+    }
+
+    /// Whether a frame is a PDO of other nodes, as most frames on a bus are. Then nothing has to be done about it, and this is all that it
+    /// costs.
+    pub fn passes_by(&mut self, now_ns: Nanoseconds, frame: &Frame) -> bool {
+        let id = frame.id();
+        let passes_by = PDO_IDS.contains(&id.value())
+            && !id.is_extended()
+            && frame.kind() == FrameKind::Data
+            && !self.pdos.takes(id)
+            && id.value() != self.network.sync_id(&self.dictionary);
+        if passes_by {
+            self.await_next(now_ns);
+        }
+        passes_by
     }
 
     /// Stops the services that the NMT state does not allow.

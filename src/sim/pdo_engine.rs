@@ -270,6 +270,11 @@ impl PdoEngine {
         self.due_ns = sampled.chain(deadlines).fold(NEVER, Nanoseconds::min);
     }
 
+    /// Whether this is the identifier of an RPDO.
+    pub fn takes(&self, id: Id) -> bool {
+        self.inbound.iter().any(|inbound| inbound.pdo.id == Some(id))
+    }
+
     /// Receives a frame in NMT operational. A synchronous RPDO waits for SYNC, the others act at once.
     pub fn receive(
         &mut self,

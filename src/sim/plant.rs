@@ -79,13 +79,23 @@ pub struct Joint {
     /// External torque: contact.
     load_torque: f64,
     gravity: Gravity,
+    /// A position, and the torque of gravity there: a joint is often where it was.
+    weight: (f64, f64),
     stops: Option<EndStops>,
 }
 
 impl Joint {
     /// A joint at rest.
     pub fn new(parameters: JointParameters, position: f64) -> Self {
-        Self { parameters, position, velocity: 0.0, load_torque: 0.0, gravity: Gravity::None, stops: None }
+        Self {
+            parameters,
+            position,
+            velocity: 0.0,
+            load_torque: 0.0,
+            gravity: Gravity::None,
+            weight: (position, 0.0),
+            stops: None,
+        }
     }
 
     /// The same joint with end stops, which stop it without rebound.
@@ -111,6 +121,16 @@ impl Joint {
     /// From now on gravity loads the joint so.
     pub fn set_gravity(&mut self, gravity: Gravity) {
         self.gravity = gravity;
+        self.weight = (self.position, gravity.torque(self.position));
+    }
+
+    /// The torque of gravity where the joint is.
+    #[inline]
+    fn gravity_torque(&mut self) -> f64 {
+        if self.weight.0 != self.position {
+            self.weight = (self.position, self.gravity.torque(self.position));
+        }
+        self.weight.1
     }
 
     /// Stops at once, like a joint that hits an obstacle.
@@ -127,7 +147,7 @@ impl Joint {
     pub fn step(&mut self, duration_s: f64, motor_torque: f64, is_braked: bool) {
         let brake = if is_braked { self.parameters.brake_torque } else { 0.0 };
         let friction = self.coulomb_friction() + brake;
-        let torque = motor_torque + self.load_torque + self.gravity.torque(self.position);
+        let torque = motor_torque + self.load_torque + self.gravity_torque();
         let mut left_s = duration_s;
         if self.velocity != 0.0 {
             let ended = self.accelerated(torque - friction.copysign(self.velocity), left_s);

@@ -6,6 +6,7 @@ mod device;
 mod lengths;
 mod motion;
 mod network;
+mod passing_frames;
 mod port;
 mod process_data;
 mod profiles;

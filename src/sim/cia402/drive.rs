@@ -37,7 +37,6 @@ pub struct Cia402Drive {
     /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
     now_ns: Nanoseconds,
-    wake_ns: Nanoseconds,
 }
 
 impl Cia402Drive {
@@ -72,7 +71,6 @@ impl Cia402Drive {
             injected: None,
             stepped_ns: 0,
             now_ns: 0,
-            wake_ns: 0,
         })
     }
 
@@ -253,9 +251,12 @@ impl Drive for Cia402Drive {
 
     fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
+        if self.canopen.passes_by(now_ns, frame) {
+            return;
+        }
         self.run_loops(now_ns);
         self.receive_frame(now_ns, frame, mailbox);
-        self.wake_ns = self.canopen.wake_ns(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
@@ -265,11 +266,11 @@ impl Drive for Cia402Drive {
             self.fail(0, DeviceError::Fault(fault));
         }
         self.advance_node(now_ns, mailbox);
-        self.wake_ns = self.canopen.wake_ns(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     fn wake_ns(&self) -> Nanoseconds {
-        self.wake_ns
+        self.canopen.wake_ns()
     }
 
     /// The first axis.
@@ -280,23 +281,25 @@ impl Drive for Cia402Drive {
     /// In the first axis.
     fn inject_fault(&mut self, fault: DriveFault) {
         self.injected = Some(fault);
-        self.wake_ns = self.now_ns + 1;
+        self.canopen.wake_after(self.now_ns);
     }
 
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_loops(now_ns);
         mailbox.clear();
         self.restart(now_ns);
-        self.wake_ns = self.canopen.wake_ns(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     /// On the joint of the first axis.
     fn set_gravity(&mut self, gravity: Gravity) {
+        self.run_loops(self.now_ns);
         self.axes[0].joint.set_gravity(gravity);
     }
 
     /// On the joint of the first axis.
     fn set_load_torque(&mut self, torque: f64) {
+        self.run_loops(self.now_ns);
         self.axes[0].joint.set_load_torque(torque);
     }
 
@@ -325,7 +328,7 @@ impl Drive for Cia402Drive {
             }
             _ => {}
         }
-        self.wake_ns = self.now_ns + 1;
+        self.canopen.wake_after(self.now_ns);
         Ok(())
     }
 }

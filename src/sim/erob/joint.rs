@@ -70,7 +70,6 @@ pub struct ErobJoint {
     /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
     now_ns: Nanoseconds,
-    wake_ns: Nanoseconds,
 }
 
 impl ErobJoint {
@@ -112,7 +111,6 @@ impl ErobJoint {
             target_before: 0,
             stepped_ns: 0,
             now_ns: 0,
-            wake_ns: 0,
         };
         if !parameters.has_battery {
             module.lose_turns();
@@ -229,9 +227,12 @@ impl Drive for ErobJoint {
 
     fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
+        if self.canopen.passes_by(now_ns, frame) {
+            return;
+        }
         self.run_loops(now_ns);
         self.receive_frame(now_ns, frame, mailbox);
-        self.wake_ns = self.canopen.wake_ns(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
@@ -242,11 +243,11 @@ impl Drive for ErobJoint {
             self.fail(DeviceError::Fault(fault));
         }
         self.advance_node(now_ns, mailbox);
-        self.wake_ns = self.canopen.wake_ns(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     fn wake_ns(&self) -> Nanoseconds {
-        self.wake_ns
+        self.canopen.wake_ns()
     }
 
     fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
@@ -267,21 +268,23 @@ impl Drive for ErobJoint {
 
     fn inject_fault(&mut self, fault: DriveFault) {
         self.injected = Some(fault);
-        self.wake_ns = self.now_ns + 1;
+        self.canopen.wake_after(self.now_ns);
     }
 
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_loops(now_ns);
         mailbox.clear();
         self.restart(now_ns);
-        self.wake_ns = self.canopen.wake_ns(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     fn set_gravity(&mut self, gravity: Gravity) {
+        self.run_loops(self.now_ns);
         self.joint.set_gravity(gravity);
     }
 
     fn set_load_torque(&mut self, torque: f64) {
+        self.run_loops(self.now_ns);
         self.joint.set_load_torque(torque);
     }
 
@@ -310,7 +313,7 @@ impl Drive for ErobJoint {
             }
             _ => {}
         }
-        self.wake_ns = self.now_ns + 1;
+        self.canopen.wake_after(self.now_ns);
         Ok(())
     }
 }
