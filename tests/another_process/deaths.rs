@@ -75,6 +75,96 @@ fn command_without_end() {
     }
 }
 
+/// A client sees its memory only, and that of the controller it cannot write to: nothing but a system call of its has an effect elsewhere. So one
+/// that is killed before or after each of its system calls has been killed at every instruction, as far as a controller can tell.
+#[test]
+fn a_client_that_is_killed_before_or_after_any_of_its_system_calls_leaves_a_controller_that_takes_commands() {
+    let served = Served::start("single-erob.toml");
+    let watching = served.connect();
+    let (mut kills, mut has_ended) = (0, false);
+    while !has_ended {
+        let mut traced = Traced::start("deaths::command_in_every_way", &served.name());
+        has_ended = !(0..kills).all(|_| traced.run_to_next_boundary());
+        traced.kill();
+        within_limits(&watching);
+        let next = served.connect();
+        next.take_over().unwrap();
+        insist(&next, || next.take_lease());
+        let stop = served.controller.state().groups[0].stop;
+        assert!(stop.is_none_or(|stop| stop.rule() == takt::Rule::Requested), "{kills}: {stop:?}");
+        kills += 1;
+    }
+    assert!(kills > 60, "{kills}");
+    let last = served.connect();
+    last.take_over().unwrap();
+    last.stop(StopCategory::Two).unwrap();
+    insist(&last, || last.take_lease());
+    last.next_cycle(LONG).unwrap();
+    last.next_cycle(LONG).unwrap();
+    last.wait_for(Phase::Holding, LONG).unwrap();
+    let motion = insist(&last, || last.move_to(&[0.0]));
+    assert_eq!(last.wait(motion, LONG), Ok(()));
+}
+
+#[test]
+#[ignore = "it is the other process of another test"]
+fn command_in_every_way() {
+    // SAFETY: both have numbers alone, and this process is there to be traced.
+    unsafe {
+        libc::ptrace(libc::PTRACE_TRACEME, 0, 0, 0);
+        libc::raise(libc::SIGSTOP);
+    }
+    let client = connect(&env::var(NAME).unwrap()).unwrap();
+    // It may be killed after any of them, and the next one begins where that has left the controller.
+    let _ = client.take_over();
+    let _ = client.stop(StopCategory::Two);
+    let _ = client.move_to(&[0.01]);
+    let point = TrajectoryPoint { time_s: 3.0, positions: vec![0.02], ..TrajectoryPoint::default() };
+    let _ = client.execute(&[point]);
+    let _ = client.begin_stream();
+    let _ = client.stream().push_now(&[0.0]);
+    let _ = client.stream().push_chunk(ClientStream::now_ns(), Duration::from_millis(5), &[[0.0]; 20]);
+    let _ = client.release();
+}
+
+/// A process one of whose threads is stopped before and after each of its system calls.
+struct Traced {
+    process: Other,
+    thread: libc::pid_t,
+}
+
+impl Traced {
+    fn start(test: &str, name: &str) -> Self {
+        let mut traced = Self { process: other_process(test, name), thread: -1 };
+        traced.thread = traced.next_stop().expect("it stops itself");
+        traced
+    }
+
+    /// Waits until the thread has stopped; `None` if it has ended. Only this thread waits for it.
+    fn next_stop(&self) -> Option<libc::pid_t> {
+        let mut status = 0;
+        // SAFETY: `status` is a local variable.
+        let stopped =
+            unsafe { libc::waitpid(self.thread, &raw mut status, libc::__WALL | libc::__WNOTHREAD) };
+        assert!(stopped > 0);
+        libc::WIFSTOPPED(status).then_some(stopped)
+    }
+
+    /// Lets it run into its next system call, or out of one. Returns `false` if it has ended instead.
+    fn run_to_next_boundary(&self) -> bool {
+        // SAFETY: it is a thread that this one traces, and that has stopped.
+        assert_eq!(unsafe { libc::ptrace(libc::PTRACE_SYSCALL, self.thread, 0, 0) }, 0);
+        self.next_stop().is_some()
+    }
+
+    fn kill(&mut self) {
+        self.process.0.kill().unwrap();
+        // SAFETY: a traced thread is there until its tracer has seen its end, unless it has seen it.
+        unsafe { libc::waitpid(self.thread, std::ptr::null_mut(), libc::__WALL | libc::__WNOTHREAD) };
+        self.process.0.wait().unwrap();
+    }
+}
+
 /// `takt run --serve`, as a user starts it.
 fn takt_serves(folder: &TempDir) -> Other {
     let child = Command::new(env!("CARGO_BIN_EXE_takt"))
@@ -109,7 +199,12 @@ fn every_call_returns_when_the_process_of_the_controller_is_killed_and_a_new_one
         let client = connected(&folder);
         thread::scope(|scope| {
             let commanding = scope.spawn(|| {
-                client.begin_stream().unwrap();
+                // It may be killed before it has answered.
+                match client.begin_stream() {
+                    Ok(()) => {}
+                    Err(CommandError::Ended) => return StreamError::Ended,
+                    Err(error) => panic!("{error}"),
+                }
                 loop {
                     match client.stream().push_now(&[0.0; 6]) {
                         Ok(()) | Err(StreamError::Full) => {}
