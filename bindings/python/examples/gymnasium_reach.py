@@ -13,9 +13,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 import takt
+from numpy.typing import NDArray
+
+Numbers = NDArray[np.float32]
 
 
-class ReachEnv(gymnasium.Env):
+class ReachEnv(gymnasium.Env[Numbers, Numbers]):
     """An action is a velocity for each joint, as a fraction of its limit. An observation is the positions and velocities of the joints and
     the pose that is to be reached."""
 
@@ -26,7 +29,7 @@ class ReachEnv(gymnasium.Env):
         self._dt = 1.0 / rate_hz
         self._steps = round(seconds * rate_hz)
         self._tolerance = tolerance
-        self._sim: takt.Simulation | None = None
+        self._episode: tuple[takt.Simulation, takt.Stream] | None = None
         with takt.simulate(config) as sim:
             axes = sim.axes
         self._low = np.array([axis.position_min for axis in axes])
@@ -34,38 +37,42 @@ class ReachEnv(gymnasium.Env):
         self._fastest = np.array([axis.velocity for axis in axes])
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (len(axes),), np.float32)
         # A joint may be a little beyond its limits while it settles.
-        pose = np.concatenate([self._low, -2 * self._fastest, self._low]) - 0.1
-        top = np.concatenate([self._high, 2 * self._fastest, self._high]) + 0.1
-        self.observation_space = gymnasium.spaces.Box(pose.astype(np.float32), top.astype(np.float32), dtype=np.float32)
+        lowest = np.concatenate([self._low, -2 * self._fastest, self._low]) - 0.1
+        highest = np.concatenate([self._high, 2 * self._fastest, self._high]) + 0.1
+        self._box = gymnasium.spaces.Box(lowest.astype(np.float32), highest.astype(np.float32), dtype=np.float32)
+        self.observation_space = self._box
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None):
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Numbers, dict[str, Any]]:
         super().reset(seed=seed)
         self.close()
         # A new arm: the same seed gives the same episode bit for bit.
-        self._sim = takt.simulate(self._config)
+        sim = takt.simulate(self._config)
         middle, reach = (self._low + self._high) / 2, (self._high - self._low) / 2
         self._goal = middle + 0.5 * reach * self.np_random.uniform(-1, 1, len(middle))
-        self._stream = self._sim.follow()
-        self._target = self._sim.state.position_set
+        self._target = sim.state.position_set
         self._step = 0
-        return self._observation(), {}
+        self._episode = sim, sim.follow()
+        return self._observation(sim.state), {}
 
-    def step(self, action: np.ndarray):
+    def step(self, action: Numbers) -> tuple[Numbers, float, bool, bool, dict[str, Any]]:
+        if self._episode is None:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        sim, stream = self._episode
         speed = np.clip(np.asarray(action, dtype=float), -1, 1) * 0.9 * self._fastest
         self._target = np.clip(self._target + speed * self._dt, self._low, self._high)
-        self._stream.push(self._target)
-        self._sim.run(self._dt)
+        stream.push(self._target)
+        sim.run(self._dt)
         self._step += 1
-        distance = float(np.abs(self._sim.state.position - self._goal).max())
+        state = sim.state
+        distance = float(np.abs(state.position - self._goal).max())
         reached = distance < self._tolerance
-        return self._observation(), -distance, reached, self._step >= self._steps, {"distance": distance}
+        return self._observation(state), -distance, reached, self._step >= self._steps, {"distance": distance}
 
     def close(self) -> None:
-        if self._sim is not None:
-            self._sim.close()
-            self._sim = None
+        if self._episode is not None:
+            self._episode[0].close()
+            self._episode = None
 
-    def _observation(self) -> np.ndarray:
-        state = self._sim.state
+    def _observation(self, state: takt.State) -> Numbers:
         observation = np.concatenate([state.position, state.velocity, self._goal]).astype(np.float32)
-        return np.clip(observation, self.observation_space.low, self.observation_space.high)
+        return np.clip(observation, self._box.low, self._box.high)

@@ -175,7 +175,7 @@ impl Arm {
     #[pyo3(signature = (at_most=600.0))]
     fn record(&self, py: Python<'_>, at_most: f64) -> PyResult<Recording> {
         let period_ns = u128::from(self.link.controller(py)?.period_ns().max(1));
-        let cycles = duration("at_most", at_most)?.as_nanos().div_ceil(period_ns);
+        let cycles = duration(py, "at_most", at_most)?.as_nanos().div_ceil(period_ns);
         let cycles = usize::try_from(cycles).unwrap_or(usize::MAX);
         self.recorder.begin(py, self.link.clone(), (0..self.axes).collect(), cycles)
     }
@@ -228,7 +228,7 @@ impl Arm {
     /// Lets other processes observe and command the controller by a name.
     #[pyo3(signature = (name, *, mode=0o600, lease=1.0))]
     fn serve(&self, py: Python<'_>, name: &str, mode: u32, lease: f64) -> PyResult<Server> {
-        let options = ServeOptions::default().with_mode(mode).with_lease(duration("lease", lease)?);
+        let options = ServeOptions::default().with_mode(mode).with_lease(duration(py, "lease", lease)?);
         let handle = self.link.own(py, "serves it")?.clone();
         Server::start(py, handle, name, options)
     }
@@ -238,6 +238,18 @@ impl Arm {
         let controller = self.link.controller(py)?;
         let released = py.detach(|| controller.release());
         released.map_err(|error| raise_command(py, &self.link.axis_names(), &error))
+    }
+
+    fn __repr__(slf: PyRef<'_, Self>) -> String {
+        let (axes, group) = (slf.link.axis_names().join(", "), slf.as_super());
+        match slf.link.usable() {
+            None => format!("<closed arm of {axes}>"),
+            Some(controller) => {
+                let (name, phase) = group.shown(controller);
+                let words = if controller.has_ended() { "ended" } else { phase };
+                format!("<arm {name:?}, {words}: {axes}>")
+            }
+        }
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {

@@ -1,11 +1,13 @@
 //! Arrays of numpy, in and out. They cross the border as bytes, by `numpy.ascontiguousarray` and `numpy.frombuffer`: a copy of a few
 //! hundred bytes, and no dependence on the version of numpy.
 
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyByteArray, PyBytes, PyTuple};
+
+use crate::error::raise_argument;
 
 /// The functions and types of numpy that are called, found once.
 struct Numpy {
@@ -47,10 +49,16 @@ impl Table {
 }
 
 /// Anything that numpy takes for an array of numbers, with its shape.
-fn numbers(value: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
+fn numbers(what: &str, value: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
     let py = value.py();
     let numpy = numpy(py)?;
-    let array = numpy.ascontiguousarray.bind(py).call1((value, &numpy.number))?;
+    let array = numpy.ascontiguousarray.bind(py).call1((value, &numpy.number));
+    let array = array.map_err(|error| {
+        let is_of_the_value =
+            error.is_instance_of::<PyValueError>(py) || error.is_instance_of::<PyTypeError>(py);
+        // Numpy does not know which of the arguments it is.
+        if is_of_the_value { raise_argument(py, &format!("{what}: {}", error.value(py))) } else { error }
+    })?;
     let shape = array.getattr(intern!(py, "shape"))?;
     let shape = shape.cast::<PyTuple>()?.iter().map(|length| length.extract()).collect::<PyResult<_>>()?;
     let bytes = array.call_method0(intern!(py, "tobytes"))?;
@@ -61,11 +69,12 @@ fn numbers(value: &Bound<'_, PyAny>) -> PyResult<(Vec<usize>, Vec<f64>)> {
 
 /// A number for each axis. How many there are is checked by whoever takes them.
 pub fn vector(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
-    match numbers(value)? {
+    match numbers(what, value)? {
         (shape, values) if shape.len() == 1 => Ok(values),
-        (shape, _) => Err(PyValueError::new_err(format!(
-            "{what} is one number for each axis, and has the shape {shape:?}"
-        ))),
+        (shape, _) => {
+            let words = format!("{what} is one number for each axis, and has the shape {}", shown(&shape));
+            Err(raise_argument(value.py(), &words))
+        }
     }
 }
 
@@ -75,19 +84,37 @@ pub fn vector_or_one(what: &str, value: &Bound<'_, PyAny>, axes: usize) -> PyRes
         values if values.len() == axes => Ok(values),
         values => match values[..] {
             [one] => Ok(vec![one; axes]),
-            _ => Err(PyValueError::new_err(format!("{what} has {} values for {axes} axes", values.len()))),
+            _ => {
+                let words = format!("{what} has {} values for {axes} axes", values.len());
+                Err(raise_argument(value.py(), &words))
+            }
         },
     }
 }
 
 /// A row for each point, with a number for each axis.
 pub fn table(what: &str, value: &Bound<'_, PyAny>) -> PyResult<Table> {
-    let (shape, values) = numbers(value)?;
+    let (shape, values) = numbers(what, value)?;
     match shape[..] {
         [rows, columns] => Ok(Table { rows, columns, values }),
-        _ => Err(PyValueError::new_err(format!(
-            "{what} has a row for each point and a column for each axis; it has the shape {shape:?}"
-        ))),
+        _ => {
+            let words = format!(
+                "{what} has a row for each point and a column for each axis, and was given with the shape {}",
+                shown(&shape)
+            );
+            Err(raise_argument(value.py(), &words))
+        }
+    }
+}
+
+/// A shape, as Python shows it.
+fn shown(shape: &[usize]) -> String {
+    match shape {
+        [length] => format!("({length},)"),
+        shape => {
+            let lengths: Vec<String> = shape.iter().map(usize::to_string).collect();
+            format!("({})", lengths.join(", "))
+        }
     }
 }
 

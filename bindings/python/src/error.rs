@@ -76,6 +76,11 @@ pub fn raise_start(py: Python<'_>, error: &StartFailure) -> PyErr {
     raise(py, "StartError", format!("{error:?}").trim_end(), &[])
 }
 
+/// A command does not fit.
+pub fn raise_argument(py: Python<'_>, words: &str) -> PyErr {
+    raise(py, "ArgumentError", words, &[])
+}
+
 /// The controller has ended.
 pub fn raise_ended(py: Python<'_>) -> PyErr {
     raise(py, "EndedError", &WaitError::Ended.to_string(), &[])
@@ -105,7 +110,7 @@ pub fn raise_command(py: Python<'_>, axes: &[&str], error: &CommandError) -> PyE
         | CommandError::NoSuchGroup { .. }
         | CommandError::SeveralGroups { .. }
         | CommandError::Question(_)
-        | CommandError::Rate(_) => raise(py, "ArgumentError", &words, &[]),
+        | CommandError::Rate(_) => raise_argument(py, &words),
         CommandError::Refused(refused) => raise_refused(py, refused),
         CommandError::Lease(error) => raise_lease(py, *error),
         CommandError::NoReply { .. } => raise_timeout(py, &words),
@@ -179,7 +184,7 @@ pub fn raise_stream(py: Python<'_>, axes: &[&str], error: &StreamError) -> PyErr
             let name = axes.get(*axis).map(|name| (*name).to_owned());
             raise(py, "StreamError", &words, &[("point", (*point).into()), ("axis", name.into())])
         }
-        StreamError::Count { .. } => raise(py, "ArgumentError", &words, &[]),
+        StreamError::Count { .. } => raise_argument(py, &words),
         StreamError::Lease(error) => raise_lease(py, *error),
         StreamError::NoReply { .. } => raise_timeout(py, &words),
         StreamError::Ended => raise_ended(py),

@@ -8,7 +8,7 @@ use takt::{EventKind, EventSource, WaitError};
 
 use crate::error::raise_ended;
 use crate::link::{Link, seconds};
-use crate::waiting::until;
+use crate::waiting::{Interrupted, until_interrupted};
 
 /// Something that happened.
 #[pyclass(module = "takt", frozen, get_all)]
@@ -86,7 +86,9 @@ impl Events {
     /// The next one; `None` when the controller has ended.
     fn next(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<Event>> {
         let late = WaitError::NotInTime.to_string();
-        until(py, &self.link, timeout, &late, |controller, at_most| {
+        // Who watches a controller of another process does not stop it by looking away.
+        let interrupted = if self.link.is_own() { Interrupted::Stop } else { Interrupted::GoOn };
+        until_interrupted(py, &self.link, timeout, &late, interrupted, |controller, at_most| {
             let mut events = self.events.lock().unwrap_or_else(PoisonError::into_inner);
             match events.wait(at_most) {
                 Ok(event) => Some(Some(Event::of(controller.machine(), &event))),
@@ -127,5 +129,9 @@ impl Events {
 
     fn __next__(&self, py: Python<'_>) -> PyResult<Option<Event>> {
         self.next(py, None)
+    }
+
+    fn __repr__(&self) -> &'static str {
+        "<events: iterate to wait for each, poll() for those that have come>"
     }
 }

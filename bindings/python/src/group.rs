@@ -17,7 +17,7 @@ use crate::link::{Link, duration};
 use crate::motion::Motion;
 use crate::state::State;
 use crate::stream::Stream;
-use crate::waiting::{stop_and_wait, until};
+use crate::waiting::{longest, stop_and_wait, until};
 
 /// An axis, as the configuration has it. rad, rad/s, rad/s², rad/s³ and N·m; m and N of a linear axis.
 #[pyclass(module = "takt", frozen, get_all)]
@@ -66,6 +66,11 @@ impl Group {
         let target = controller.group_named(name).map_err(|error| self.command_error(py, &error))?;
         let axes = controller.axes_of(target).into();
         Ok(Self { link: self.link.clone(), target, name: name.to_owned(), axes })
+    }
+
+    /// Its name, and what its axes are doing, for the text of an object.
+    pub fn shown(&self, controller: &dyn RunningController) -> (&str, &'static str) {
+        (&self.name, State::of(&self.link, controller, &self.axes, self.target).phase())
     }
 
     fn axis_names(&self) -> Vec<&str> {
@@ -183,6 +188,7 @@ impl Group {
         wait: bool,
         timeout: Option<f64>,
     ) -> PyResult<Motion> {
+        longest(py, timeout)?;
         let target = array::vector("q", q)?;
         let options = MoveOptions {
             velocity_scale: speed,
@@ -202,6 +208,7 @@ impl Group {
         wait: bool,
         timeout: Option<f64>,
     ) -> PyResult<Motion> {
+        longest(py, timeout)?;
         let waypoints: Vec<Vec<f64>> =
             array::table("waypoints", waypoints)?.rows().map(<[f64]>::to_vec).collect();
         let id = self.command(py, |arm, whose| arm.begin_through(whose, &waypoints))?;
@@ -221,6 +228,7 @@ impl Group {
         wait: bool,
         timeout: Option<f64>,
     ) -> PyResult<Motion> {
+        longest(py, timeout)?;
         let times = array::vector("times", times)?;
         let positions = array::table("q", q)?;
         let velocities = qd.map(|qd| array::table("qd", qd)).transpose()?;
@@ -284,6 +292,7 @@ impl Group {
     #[pyo3(signature = (timeout=30.0))]
     fn enable(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
         let controller = self.link.controller(py)?;
+        longest(py, timeout)?;
         let is_enabled = controller.wait_for_phase(self.target, Phase::Holding, Duration::ZERO).is_ok();
         if is_enabled && controller.fault_in(self.target).is_none() {
             return Ok(());
@@ -295,6 +304,7 @@ impl Group {
     /// Brings the axes to rest and disables them, and waits for that.
     #[pyo3(signature = (timeout=30.0))]
     fn disable(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
+        longest(py, timeout)?;
         self.command(py, |arm, whose| arm.begin_disable(whose))?;
         self.wait_for_phase(py, Phase::Disabled, timeout, "the axes have not been disabled in time")
     }
@@ -313,6 +323,7 @@ impl Group {
         axis: Option<&Bound<'_, PyAny>>,
         timeout: Option<f64>,
     ) -> PyResult<()> {
+        longest(py, timeout)?;
         let mode = operation_mode(py, mode)?;
         let id = match axis {
             None => self.command(py, |arm, whose| arm.begin_mode_change(whose, mode))?,
@@ -362,7 +373,7 @@ impl Group {
         drive: impl FnOnce(&dyn RunningController, usize, Duration) -> Result<MotionId, CommandError> + Send,
     ) -> PyResult<Motion> {
         let axis = self.axis_number(py, axis)?;
-        let valid_for = duration("valid_for", valid_for)?;
+        let valid_for = duration(py, "valid_for", valid_for)?;
         let id = self.command(py, |arm, _| drive(arm, axis, valid_for))?;
         Ok(Motion::new(self.link.clone(), id))
     }

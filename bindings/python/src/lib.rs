@@ -40,6 +40,11 @@ mod waiting;
 /// The compiled part of the package `takt`.
 #[pyo3::pymodule]
 mod _takt {
+    /// The version of the package.
+    #[pymodule_export]
+    #[expect(non_upper_case_globals, reason = "Python calls it so")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+
     #[pymodule_export]
     use crate::arm::{Arm, connect};
     #[pymodule_export]

@@ -5,11 +5,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use takt::{Client, Handle, RunningController};
 
-use crate::error::raise;
+use crate::error::{raise, raise_argument};
 
 /// How many forks are between the process that has loaded the package and this one. Python says of each, since to ask the operating system
 /// for the number of the process in every call takes longer than most of the calls.
@@ -65,6 +64,12 @@ impl Link {
         Ok(&*self.controller)
     }
 
+    /// The controller, for what says nothing where there is none: the text of an object.
+    pub fn usable(&self) -> Option<&dyn RunningController> {
+        let is_usable = self.is_of_this_process() && !self.is_closed.load(Ordering::Acquire);
+        is_usable.then_some(&*self.controller)
+    }
+
     /// The same, for a thread of its own.
     pub fn shared(&self, py: Python<'_>) -> PyResult<Arc<dyn RunningController>> {
         self.controller(py)?;
@@ -115,9 +120,9 @@ impl Link {
 }
 
 /// A time of the program, in seconds.
-pub fn duration(what: &str, seconds: f64) -> PyResult<Duration> {
+pub fn duration(py: Python<'_>, what: &str, seconds: f64) -> PyResult<Duration> {
     Duration::try_from_secs_f64(seconds).map_err(|_| {
-        PyValueError::new_err(format!("{what} is a number of seconds from 0 on, and is {seconds}"))
+        raise_argument(py, &format!("{what} is a number of seconds from 0 on, and was given as {seconds}"))
     })
 }
 

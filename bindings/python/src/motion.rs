@@ -74,11 +74,12 @@ impl Motion {
         Ok(progress.map(|progress| (progress.path_s, progress.of_s, progress.rate)))
     }
 
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(match self.link.controller(py)?.result_of(self.id) {
-            None => "<motion under way>".to_owned(),
-            Some(Ok(())) => "<motion at its target>".to_owned(),
-            Some(Err(error)) => format!("<motion: {error}>"),
-        })
+    fn __repr__(&self) -> String {
+        match self.link.usable().map(|controller| controller.result_of(self.id)) {
+            None => "<motion of a closed arm>".to_owned(),
+            Some(None) => "<motion under way>".to_owned(),
+            Some(Some(Ok(()))) => "<motion at its target>".to_owned(),
+            Some(Some(Err(error))) => format!("<motion: {error}>"),
+        }
     }
 }

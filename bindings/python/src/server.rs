@@ -1,6 +1,6 @@
 //! Serving a controller to other processes.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -10,13 +10,20 @@ use crate::error::raise;
 
 /// Lets other processes observe and command a controller, until it is closed.
 #[pyclass(module = "takt", frozen)]
-pub struct Server(Mutex<Option<takt::Server>>);
+pub struct Server {
+    server: Mutex<Option<takt::Server>>,
+    name: String,
+}
 
 impl Server {
     pub fn start(py: Python<'_>, handle: Handle, name: &str, options: ServeOptions) -> PyResult<Self> {
         let server = py.detach(|| takt::serve(handle, name, options));
         let server = server.map_err(|error| raise(py, "ArgumentError", &error.to_string(), &[]))?;
-        Ok(Self(Mutex::new(Some(server))))
+        Ok(Self { server: Mutex::new(Some(server)), name: name.to_owned() })
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<takt::Server>> {
+        self.server.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -24,7 +31,7 @@ impl Server {
 impl Server {
     /// Ends it: the calls of the clients say that the controller has ended. The controller goes on.
     fn close(&self, py: Python<'_>) {
-        py.detach(|| drop(self.0.lock().unwrap_or_else(PoisonError::into_inner).take()));
+        py.detach(|| drop(self.lock().take()));
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {
@@ -34,5 +41,10 @@ impl Server {
     #[pyo3(signature = (*_exception))]
     fn __exit__(&self, py: Python<'_>, _exception: &Bound<'_, PyTuple>) {
         self.close(py);
+    }
+
+    fn __repr__(&self) -> String {
+        let state = if self.lock().is_some() { "served" } else { "closed" };
+        format!("<controller {state} as {:?}>", self.name)
     }
 }

@@ -61,7 +61,7 @@ impl Simulation {
 
     /// Lets a time pass, rounded up to whole cycles.
     fn run(slf: PyRef<'_, Self>, py: Python<'_>, seconds: f64) -> PyResult<()> {
-        let time = duration("seconds", seconds)?;
+        let time = duration(py, "seconds", seconds)?;
         let period_ns = slf.as_super().as_super().link.controller(py)?.period_ns().max(1);
         let cycles = u64::try_from(time.as_nanos().div_ceil(period_ns.into()));
         let cycles =

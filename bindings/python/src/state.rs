@@ -181,7 +181,7 @@ impl State {
 
     /// What the axes are doing: "holding", "moving", …; where groups do different things, what the first does.
     #[getter]
-    fn phase(&self) -> &'static str {
+    pub fn phase(&self) -> &'static str {
         self.phases.first().map_or("passive", |(_, phase)| phase_words(*phase))
     }
 

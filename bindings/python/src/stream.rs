@@ -12,7 +12,9 @@ use takt::{
 };
 
 use crate::array::{self, Table};
-use crate::error::{raise, raise_command, raise_ended, raise_motion, raise_stopped, raise_stream};
+use crate::error::{
+    raise, raise_argument, raise_command, raise_ended, raise_motion, raise_stopped, raise_stream,
+};
 use crate::link::{Link, duration, seconds};
 use crate::waiting::{stop_and_wait, until};
 
@@ -55,6 +57,7 @@ impl Given<'_, '_> {
     /// `rows` reads a value for each axis, in each of one or more points.
     fn read(
         &self,
+        py: Python<'_>,
         axes: usize,
         rows: impl Fn(&str, &Bound<'_, PyAny>) -> PyResult<Table>,
     ) -> PyResult<Parts> {
@@ -68,12 +71,16 @@ impl Given<'_, '_> {
         let parts = [("q", &q), ("qd", &qd), ("qdd", &qdd), ("torque", &torque)];
         let count = parts.iter().find_map(|(_, table)| table.as_ref()).map_or(0, |table| table.rows);
         for (what, table) in parts {
-            if let Some(table) = table.as_ref().filter(|table| (table.rows, table.columns) != (count, axes)) {
-                return Err(pyo3::exceptions::PyValueError::new_err(format!(
-                    "{what} has the shape ({}, {}) for {count} points of {axes} axes",
-                    table.rows, table.columns
-                )));
-            }
+            let words = match table {
+                Some(Table { rows: 1, columns, .. }) if count == 1 && *columns != axes => {
+                    format!("{what} has {columns} values for {axes} axes")
+                }
+                Some(Table { rows, columns, .. }) if (*rows, *columns) != (count, axes) => {
+                    format!("{what} has the shape ({rows}, {columns}) for {count} points of {axes} axes")
+                }
+                _ => continue,
+            };
+            return Err(raise_argument(py, &words));
         }
         Ok(Parts { rows: count, q, qd, qdd, torque, kp: gains("kp", self.kp)?, kd: gains("kd", self.kd)? })
     }
@@ -109,7 +116,7 @@ impl Parts {
         (0..self.rows).map(row).collect::<Option<_>>().filter(|_| self.rows > 0).ok_or_else(|| {
             let words =
                 "a point has positions, with or without the rest; or velocities alone; or torques alone";
-            raise(py, "ArgumentError", words, &[])
+            raise_argument(py, words)
         })
     }
 }
@@ -139,10 +146,16 @@ impl Stream {
     }
 
     /// A stamp in nanoseconds of the controller's clock.
-    fn stamp(&self, controller: &dyn RunningController, t: Option<f64>) -> PyResult<u64> {
+    fn stamp(
+        &self,
+        py: Python<'_>,
+        controller: &dyn RunningController,
+        what: &str,
+        t: Option<f64>,
+    ) -> PyResult<u64> {
         match t {
             None => Ok(controller.now_ns()),
-            Some(t) => Ok(duration("t", t)?.as_nanos() as u64),
+            Some(t) => Ok(u64::try_from(duration(py, what, t)?.as_nanos()).unwrap_or(u64::MAX)),
         }
     }
 
@@ -181,10 +194,10 @@ impl Stream {
             let values = array::vector(what, given)?;
             Ok(Table { rows: 1, columns: values.len(), values })
         };
-        let parts = Given { q, qd, qdd, torque, kp, kd }.read(self.axes.len(), row)?;
+        let parts = Given { q, qd, qdd, torque, kp, kd }.read(py, self.axes.len(), row)?;
         let points = parts.points(py, self.axes.len())?;
         self.check_followed(py, controller)?;
-        let at_ns = self.stamp(controller, t)?;
+        let at_ns = self.stamp(py, controller, "t", t)?;
         let handed = py
             .detach(|| points.iter().try_for_each(|point| controller.push_point(self.target, at_ns, point)));
         self.handed(py, handed)
@@ -207,11 +220,11 @@ impl Stream {
         kd: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let controller = self.link.controller(py)?;
-        let interval = duration("dt", dt)?;
-        let parts = Given { q, qd, qdd, torque, kp, kd }.read(self.axes.len(), array::table)?;
+        let interval = duration(py, "dt", dt)?;
+        let parts = Given { q, qd, qdd, torque, kp, kd }.read(py, self.axes.len(), array::table)?;
         let points = parts.points(py, self.axes.len())?;
         self.check_followed(py, controller)?;
-        let from_ns = self.stamp(controller, t0)?;
+        let from_ns = self.stamp(py, controller, "t0", t0)?;
         let handed = py.detach(|| controller.push_chunk(self.target, from_ns, interval, &points));
         self.handed(py, handed)
     }
@@ -286,14 +299,10 @@ impl Stream {
         Ok(())
     }
 
-    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        let controller = self.link.controller(py)?;
+    fn __repr__(&self) -> String {
+        let Some(controller) = self.link.usable() else { return "<stream of a closed arm>".to_owned() };
         let report = controller.stream_report(self.target);
-        let age = Duration::from_nanos(report.counts.lag_ns);
-        Ok(format!(
-            "<stream {}, {age:?} behind, at {:.3} s>",
-            report.state.name(),
-            seconds(controller.now_ns())
-        ))
+        let lag = Duration::from_nanos(report.counts.lag_ns);
+        format!("<stream {}, {lag:?} behind the stamps>", report.state.name())
     }
 }

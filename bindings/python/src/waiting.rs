@@ -12,6 +12,20 @@ use crate::link::{Link, duration};
 /// The longest time from a signal to its Python handler.
 const SLICE: Duration = Duration::from_millis(50);
 
+/// The longest time of a wait. Calls that command before they wait ask first, so that they change nothing when it is none.
+pub fn longest(py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<Duration>> {
+    timeout.map(|seconds| duration(py, "timeout", seconds)).transpose()
+}
+
+/// What becomes of the axes when a signal's handler raises in a wait, as that of Ctrl-C does.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Interrupted {
+    /// They stop (category 2).
+    Stop,
+    /// They go on: whoever waits has only observed them.
+    GoOn,
+}
+
 /// Tries until `attempt` gives something, which waits for no longer than it is told to. `words` say what has not happened in `timeout`
 /// seconds of the arm's time.
 ///
@@ -21,10 +35,22 @@ pub fn until<T: Send>(
     link: &Link,
     timeout: Option<f64>,
     words: &str,
+    attempt: impl FnMut(&dyn RunningController, Duration) -> Option<T> + Send,
+) -> PyResult<T> {
+    until_interrupted(py, link, timeout, words, Interrupted::Stop, attempt)
+}
+
+/// As [`until`], for a wait whose interruption has this effect.
+pub fn until_interrupted<T: Send>(
+    py: Python<'_>,
+    link: &Link,
+    timeout: Option<f64>,
+    words: &str,
+    interrupted: Interrupted,
     mut attempt: impl FnMut(&dyn RunningController, Duration) -> Option<T> + Send,
 ) -> PyResult<T> {
     let controller = link.controller(py)?;
-    let timeout = timeout.map(|seconds| duration("timeout", seconds)).transpose()?;
+    let timeout = longest(py, timeout)?;
     let begun_ns = controller.now_ns();
     loop {
         let passed = Duration::from_nanos(controller.now_ns().saturating_sub(begun_ns));
@@ -33,7 +59,10 @@ pub fn until<T: Send>(
         if let Some(found) = py.detach(|| attempt(controller, slice)) {
             return Ok(found);
         }
-        look_for_signals(py, controller)?;
+        match interrupted {
+            Interrupted::Stop => look_for_signals(py, controller)?,
+            Interrupted::GoOn => py.check_signals()?,
+        }
         if left.is_some_and(|left| left <= slice) {
             return Err(raise_timeout(py, words));
         }

@@ -55,6 +55,26 @@ def test_another_number_of_values_is_refused_in_words(sim):
         sim.move([[0.0] * 6])
 
 
+def test_what_is_no_array_of_numbers_is_refused_by_the_name_of_the_argument(sim):
+    with sim.follow() as stream:
+        for words, call in {
+            "q: could not convert string to float": lambda: sim.move(["up"] * 6),
+            "q: float.* not 'dict'": lambda: sim.move({}),
+            r"q is one number for each axis, and has the shape \(2, 6\)": lambda: sim.move([HOME, HOME]),
+            r"times .* has the shape \(1, 2\)": lambda: sim.execute([[1.0, 2.0]], [HOME, HOME]),
+            r"q has a row for each point .* the shape \(6,\)": lambda: sim.execute([1.0], HOME),
+            "qd: .*inhomogeneous": lambda: sim.execute([1.0, 2.0], [HOME, HOME], [HOME, HOME[:5]]),
+            "timeout is a number of seconds from 0 on, and was given as -1": lambda: sim.move(HOME, timeout=-1),
+            "dt is a number of seconds from 0 on, and was given as NaN": lambda: stream.push_chunk(None, np.nan, [HOME]),
+            "q has 2 values for 6 axes": lambda: stream.push([0.0, 0.0]),
+            r"q has the shape \(3, 2\) for 3 points of 6 axes": lambda: stream.push_chunk(None, 0.1, np.zeros((3, 2))),
+        }.items():
+            with pytest.raises(takt.ArgumentError, match=words):
+                call()
+        sim.step(2)
+        assert stream.state == "awaited", "nothing has changed"
+
+
 def test_a_motion_that_was_replaced_says_so(sim):
     first = sim.move(HOME, wait=False)
     sim.step(5)

@@ -1,6 +1,7 @@
 """A controller of another process, commanded by the calls of an own one."""
 
 import os
+import signal
 import subprocess
 import sys
 
@@ -139,6 +140,25 @@ def test_what_is_refused_says_the_same_as_of_an_own_arm(arm):
     with pytest.raises(takt.OwnerError):
         arm.serve("other")
     assert not hasattr(arm, "step"), "its time is real"
+
+
+def test_ctrl_c_of_who_watches_does_not_stop_the_arm_of_another_process(served, arm):
+    motion = arm.move(HOME + 0.5, speed=0.02, wait=False)
+    program = f"""
+import os, signal, threading, takt
+events = takt.connect({served.name!r}).events()
+threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+try:
+    for event in events:
+        pass
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    listening = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, preexec_fn=listening)
+    assert done.stdout == "interrupted\n", done.stderr
+    assert not motion.is_done and arm.state.phase == "moving"
+    arm.stop()
 
 
 def test_the_death_of_the_process_is_told_by_every_call(served, arm):

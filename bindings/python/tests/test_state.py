@@ -155,3 +155,36 @@ def test_who_waits_lets_the_other_threads_of_the_program_go_on(arm):
     arm.stop()
     waiting.join()
     assert seen[0].kind == "stop"
+
+
+def test_every_object_shows_itself_as_a_notebook_does(tmp_path):
+    sim = takt.simulate(ROOT / "configs" / "first.toml")
+    (axis,), group = sim.axes, sim.name
+    assert repr(sim) == f'<arm "{group}", holding: {axis.name}>'
+    assert repr(axis).startswith(f'Axis("{axis.name}", position ')
+    events, motion = sim.events(), sim.move([0.1], wait=False)
+    assert repr(motion) == "<motion under way>"
+    assert "poll()" in repr(events)
+    motion.wait()
+    assert repr(motion) == "<motion at its target>"
+    assert repr(sim.state).startswith("<state of slot ") and f"{axis.name} +0.1000" in repr(sim.state)
+    assert repr(events.poll()[0]).endswith(" s: holding → moving>")
+    with sim.record() as recording, sim.follow() as stream:
+        sim.step(3)
+        assert repr(stream).startswith("<stream awaited, ")
+    assert repr(recording) == f"<recording of {len(recording)} cycles>"
+    with sim.serve(str(tmp_path / "arm")) as server:
+        assert repr(server).startswith("<controller served as ")
+        with takt.connect(str(tmp_path / "arm")) as client:
+            of_client = client.events()
+        assert repr(client) == f"<closed arm of {axis.name}>" and "events" in repr(of_client)
+    assert repr(server).startswith("<controller closed as ")
+    sim.close()
+    assert repr(sim) == f'<arm "{group}", ended: {axis.name}>'
+    assert "ms old" in repr(sim.state)
+
+
+def test_the_package_says_its_version():
+    from importlib.metadata import version
+
+    assert takt.__version__ == version("takt")

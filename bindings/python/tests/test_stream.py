@@ -100,7 +100,7 @@ def test_parts_that_do_not_belong_together_are_refused(sim):
         for wrong in [{}, {"qd": HOME, "torque": HOME}, {"qdd": HOME}]:
             with pytest.raises(takt.ArgumentError, match="a point has positions"):
                 stream.push(**wrong)
-        with pytest.raises(ValueError, match=r"qd has the shape \(1, 2\) for 1 points of 6 axes"):
+        with pytest.raises(ValueError, match="qd has 2 values for 6 axes"):
             stream.push(HOME, [0.0, 0.0])
 
 

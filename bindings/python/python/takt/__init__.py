@@ -13,7 +13,7 @@ import atexit as _atexit
 import os as _os
 
 from . import _takt
-from ._takt import Arm, Axis, Event, Events, Group, Motion, Recording, Server, Simulation, State, Stream, connect, simulate
+from ._takt import __version__, Arm, Axis, Event, Events, Group, Motion, Recording, Server, Simulation, State, Stream, connect, simulate
 from .errors import (
     ArgumentError,
     CommandError,
@@ -65,6 +65,7 @@ __all__ = [
     "StreamError",
     "TimeoutError",
     "TrajectoryError",
+    "__version__",
     "connect",
     "simulate",
 ]

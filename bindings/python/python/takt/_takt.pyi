@@ -18,6 +18,7 @@ __all__ = [
     "Axis",
     "Group",
     "Motion",
+    "__version__",
     "_after_fork",
     "_close_all",
     "Recording",
@@ -28,6 +29,8 @@ __all__ = [
     "State",
     "Stream",
 ]
+
+__version__: str
 
 _Floats: TypeAlias = NDArray[np.float64]
 _Config: TypeAlias = str | PathLike[str] | dict[str, Any]
