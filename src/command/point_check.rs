@@ -9,7 +9,7 @@ use crate::config::{Axis, Control};
 #[non_exhaustive]
 pub enum PointRefusal {
     /// A number is infinite or none.
-    #[error("a number is not finite: {value:?}")]
+    #[error("the {} and must be a finite number", not_finite(.value))]
     NotFinite {
         /// What is given.
         value: AxisPoint,
@@ -62,19 +62,28 @@ pub enum PointRefusal {
 /// The largest number of a point. What is computed from numbers up to it stays finite.
 const LARGEST: f64 = 1e9;
 
-/// The numbers of a point.
-fn numbers(point: &AxisPoint) -> impl Iterator<Item = f64> {
+/// The numbers of a point, and what they are.
+fn numbers(point: &AxisPoint) -> impl Iterator<Item = (&'static str, f64)> {
     let (motion, others) = match *point {
-        AxisPoint::Position { motion, torque } => (Some(motion), [torque, 0.0, 0.0]),
+        AxisPoint::Position { motion, torque } => (Some(motion), [("torque", torque), ("", 0.0), ("", 0.0)]),
         AxisPoint::Impedance { motion, stiffness, damping, torque } => {
-            (Some(motion), [torque, stiffness, damping])
+            (Some(motion), [("torque", torque), ("stiffness", stiffness), ("damping", damping)])
         }
-        AxisPoint::Velocity(number) | AxisPoint::Torque(number) => (None, [number, 0.0, 0.0]),
+        AxisPoint::Velocity(velocity) => (None, [("velocity", velocity), ("", 0.0), ("", 0.0)]),
+        AxisPoint::Torque(torque) => (None, [("torque", torque), ("", 0.0), ("", 0.0)]),
     };
     let of_motion = motion.into_iter().flat_map(|motion| {
-        [Some(motion.position), motion.velocity, motion.acceleration].into_iter().flatten()
+        let velocity = motion.velocity.map(|velocity| ("velocity", velocity));
+        let acceleration = motion.acceleration.map(|acceleration| ("acceleration", acceleration));
+        [Some(("position", motion.position)), velocity, acceleration].into_iter().flatten()
     });
     of_motion.chain(others)
+}
+
+/// The first number of a point that is infinite or none, in words.
+fn not_finite(point: &AxisPoint) -> String {
+    let first = numbers(point).find(|(_, number)| !number.is_finite());
+    first.map_or_else(|| "point is given".to_owned(), |(name, number)| format!("{name} is {number},"))
 }
 
 /// Checks that an axis takes a point while it is commanded so: in the mode that it starts in, or in one that it has been changed to.
@@ -86,7 +95,7 @@ pub fn check_point(axis: &Axis, control: &Control, point: &AxisPoint) -> Result<
     if !point.is_finite() {
         return Err(PointRefusal::NotFinite { value: *point });
     }
-    if let Some(number) = numbers(point).find(|number| number.abs() > LARGEST) {
+    if let Some((_, number)) = numbers(point).find(|(_, number)| number.abs() > LARGEST) {
         return Err(PointRefusal::TooLarge { number, largest: LARGEST });
     }
     let has_torque_loop = matches!(control, Control::Torque { .. });
@@ -180,7 +189,11 @@ mod tests {
         assert_eq!(refusal(soft.with_impedance(1601.0, 1.0)), stiffness);
         let damping = PointRefusal::Damping { damping: -1.0, limit: 80.0 };
         assert_eq!(refusal(soft.with_impedance(1.0, -1.0)), damping);
-        assert!(matches!(refusal(f64::NAN.into()), PointRefusal::NotFinite { .. }));
+        assert_eq!(refusal(f64::NAN.into()).to_string(), "the position is NaN, and must be a finite number");
+        assert_eq!(
+            refusal(AxisPoint::moving(0.0, f64::INFINITY)).to_string(),
+            "the velocity is inf, and must be a finite number"
+        );
         for huge in [
             f64::MAX.into(),
             AxisPoint::moving(0.0, -1e300),

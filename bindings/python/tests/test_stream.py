@@ -95,6 +95,12 @@ def test_an_impedance_is_followed_where_the_torque_loop_is_here():
         assert sim.state.position[0] == pytest.approx(0.1, abs=0.02)
 
 
+def test_a_number_that_is_none_is_refused_by_its_point_and_axis(sim):
+    with sim.follow() as stream, pytest.raises(takt.StreamError, match="joint2: the position is NaN") as refused:
+        stream.push(np.where(np.arange(6) == 1, np.nan, HOME))
+    assert (refused.value.point, refused.value.axis) == (0, "joint2")
+
+
 def test_parts_that_do_not_belong_together_are_refused(sim):
     with sim.follow() as stream:
         for wrong in [{}, {"qd": HOME, "torque": HOME}, {"qdd": HOME}]:
