@@ -367,7 +367,8 @@ pub const TORQUE_VELOCITY_LIMIT: Entry = set(0x0204, "torque-mode velocity limit
 pub const TORQUE_SENSOR: Entry =
     read(0x020D, "torque sensor value", Unit::MillinewtonMetres).with_note("of models with a torque sensor");
 /// Module serial counter.
-pub const SERIAL_COUNTER: Entry = read_sub(0x0232, 1, "module serial counter");
+pub const SERIAL_COUNTER: Entry =
+    read_sub(0x0232, 1, "module serial counter").with_note("as all of index 0232 from firmware X5061715X on");
 /// Module model information A.
 pub const MODEL_A: Entry = read_sub(0x0232, 2, "module model information A");
 /// Module model information B.

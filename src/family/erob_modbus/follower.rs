@@ -11,18 +11,20 @@
 //! reference and a correction of the position. When the set-points are stale, the joint is stopped and disabled. The drive is enabled only
 //! while its group is. It watches its master (register 0x0002) from before it is enabled until it is disabled.
 
+mod seen;
+
 use takt_rt::{DriveState, Nanoseconds, OffCycleReport};
 
 use super::fault_code::FaultCode;
 use super::register::Register;
 use super::registers;
 use crate::family::erob::following::{self, LOST_NS, STALE_NS};
-use crate::family::erob::module::ReachedStatus;
 use crate::family::erob::{AGAIN_NS, ENABLING_NS, STANDING};
 use crate::family::{OffCycleTarget, OffCycleWish};
 use crate::modbus::exception::ExceptionCode;
 use crate::modbus::frame::{RegisterRange, RegisterValues, Request, Values};
 use crate::modbus::master::{Answer, RequestError, RequestFailure};
+use seen::{Reading, Seen};
 
 /// A joint that does not come to rest in this time is disabled all the same.
 const STOPPING_NS: Nanoseconds = 2_000_000_000;
@@ -87,34 +89,6 @@ enum Purpose {
     Read(Reading),
 }
 
-/// The registers of one read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Reading {
-    /// Whether it is at its target, and where it is: 0x0063 to 0x0069.
-    Place,
-    /// Velocity and current: 0x006C to 0x0075.
-    Speed,
-    /// Fault and motion: 0x0060 and 0x0061.
-    Fault,
-    /// The continuous current, for which the torque is known: 0x00B0 and 0x00B1.
-    Rating,
-    /// 0x0078
-    Temperature,
-}
-
-impl Reading {
-    fn range(self) -> Option<RegisterRange> {
-        let (first, count) = match self {
-            Self::Fault => (registers::FAULT_CODE, 2),
-            Self::Place => (registers::REACHED_STATUS, 7),
-            Self::Speed => (registers::DEMANDED_VELOCITY, 10),
-            Self::Rating => (registers::CONTINUOUS_CURRENT, 2),
-            Self::Temperature => (registers::TEMPERATURE, 1),
-        };
-        RegisterRange::new(first.address, count)
-    }
-}
-
 /// The requests of a round, in their order.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Turn {
@@ -124,23 +98,6 @@ enum Turn {
     Place,
     /// Another reading than the position.
     Other,
-}
-
-/// What the drive has said.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Seen {
-    /// counts
-    position: f64,
-    at_ns: Nanoseconds,
-    /// counts/s
-    velocity: f64,
-    speed_at_ns: Nanoseconds,
-    milliamperes: f64,
-    continuous_milliamperes: Option<f64>,
-    /// °C
-    temperature: Option<f32>,
-    fault: u16,
-    is_motor_off: bool,
 }
 
 /// Leads one drive.
@@ -155,9 +112,6 @@ pub struct Follower {
     /// Counts the readings other than that of the position.
     others: usize,
     seen: Seen,
-    /// What has been read since the beginning: the fault and the velocity must be, before anything is reported.
-    is_fault_known: bool,
-    is_speed_known: bool,
     /// The drive has lost its torque, and has not said why: that is read before it is reported.
     asks_why: bool,
     is_clearing_wished: bool,
@@ -178,19 +132,7 @@ impl Follower {
             under_way: None,
             turn: Turn::Write,
             others: 0,
-            seen: Seen {
-                position: 0.0,
-                at_ns: 0,
-                velocity: 0.0,
-                speed_at_ns: 0,
-                milliamperes: 0.0,
-                continuous_milliamperes: None,
-                temperature: None,
-                fault: 0,
-                is_motor_off: true,
-            },
-            is_fault_known: false,
-            is_speed_known: false,
+            seen: Seen::NOTHING,
             asks_why: false,
             is_clearing_wished: false,
             clear_from_ns: 0,
@@ -236,9 +178,9 @@ impl Follower {
         let needs_rating =
             self.parameters.rated_torque.is_some() && self.seen.continuous_milliamperes.is_none();
         self.others = self.others.wrapping_add(1);
-        if self.asks_why || !self.is_fault_known {
+        if self.asks_why || !self.seen.is_fault_known {
             Reading::Fault
-        } else if !self.is_speed_known {
+        } else if !self.seen.is_speed_known {
             Reading::Speed
         } else if needs_rating && self.others.is_multiple_of(8) {
             Reading::Rating
@@ -270,7 +212,7 @@ impl Follower {
             Life::Off
                 if target.wish == OffCycleWish::Enable
                     && !is_stale
-                    && self.is_known()
+                    && self.seen.is_whole()
                     && self.seen.fault == 0
                     && self.refusal.is_none() =>
             {
@@ -309,10 +251,6 @@ impl Follower {
             // It does not wait for the rest of the round.
             self.turn = Turn::Write;
         }
-    }
-
-    fn is_known(&self) -> bool {
-        self.is_fault_known && self.is_speed_known && self.seen.at_ns > 0
     }
 
     /// The writes before enabling. The one that the drive watches its master by is the last.
@@ -471,41 +409,16 @@ impl Follower {
         reading: Reading,
         values: &Values,
     ) -> Option<OffCycleReport> {
-        let first = reading.range()?.start();
-        let number = |register: &Register| {
-            let at = usize::from(register.address - first);
-            let words = values.get(at..at + usize::from(register.number.words()))?;
-            register.decode(words).map(|value| value as f64)
-        };
+        self.seen.take(now_ns, reading, values)?;
         match reading {
-            Reading::Fault => {
-                self.seen.fault = values.first().copied()?;
-                self.is_fault_known = true;
-                return std::mem::take(&mut self.asks_why).then(|| self.report());
-            }
-            Reading::Speed => {
-                self.seen.velocity = number(&registers::ACTUAL_VELOCITY)?;
-                self.seen.milliamperes = number(&registers::MOTOR_CURRENT)?;
-                self.seen.speed_at_ns = now_ns;
-                self.is_speed_known = true;
-            }
-            Reading::Rating => {
-                self.seen.continuous_milliamperes = Some(number(&registers::CONTINUOUS_CURRENT)?);
-            }
-            Reading::Temperature => {
-                self.seen.temperature = Some(number(&registers::TEMPERATURE)? as f32);
-            }
+            Reading::Fault => std::mem::take(&mut self.asks_why).then(|| self.report()),
             Reading::Place => {
-                let reached = ReachedStatus::from(values.first().copied()?);
-                self.seen.is_motor_off = reached == ReachedStatus::MotorOff;
-                self.seen.position = number(&registers::ACTUAL_POSITION)?;
-                self.seen.at_ns = now_ns;
                 let has_torque = matches!(self.life, Life::Following | Life::Stopping { .. });
                 self.asks_why |= has_torque && self.seen.is_motor_off && self.seen.fault == 0;
-                return (self.is_known() && !self.asks_why).then(|| self.report());
+                (self.seen.is_whole() && !self.asks_why).then(|| self.report())
             }
+            Reading::Speed | Reading::Rating | Reading::Temperature => None,
         }
-        None
     }
 
     fn report(&self) -> OffCycleReport {
