@@ -270,7 +270,7 @@ fn takt_sim_puts_drives_on_a_line_that_takt_drive_opens() {
     }
 }
 
-/// The simulated turntable on a line, behind a pseudo-terminal.
+/// A program at the other end of a line, which ends with its test: the simulated turntable behind a pseudo-terminal, or a slave.
 struct Hosted(Child);
 
 impl Hosted {
@@ -419,9 +419,10 @@ fn the_master_reads_and_writes_a_slave_of_pymodbus() {
     thread::scope(|scope| {
         scope.spawn(|| relay(&mut ends, &is_over));
         let _over = Over(&is_over);
-        let mut server = python("modbus_slave.py", &paths[0]).stdout(Stdio::piped()).spawn().unwrap();
+        let mut server = python("modbus_slave.py", &paths[0]);
+        let mut server = Hosted(server.stdout(Stdio::piped()).spawn().unwrap());
         let mut said = String::new();
-        BufReader::new(server.stdout.take().unwrap()).read_line(&mut said).unwrap();
+        BufReader::new(server.0.stdout.take().unwrap()).read_line(&mut said).unwrap();
         assert_eq!(said, "ready\n");
         let mut line = ModbusLine::open(&paths[1].display().to_string(), &SETTINGS).unwrap();
         let mut master = Master::new(TIMING);
@@ -441,8 +442,7 @@ fn the_master_reads_and_writes_a_slave_of_pymodbus() {
         let refusal = ask(read(1_000, 1)).unwrap_err().failure;
         assert_eq!(refusal, RequestFailure::Refused(ExceptionCode::ILLEGAL_ADDRESS));
         let other = ask_it(8, read(0, 1));
-        server.kill().unwrap();
-        server.wait().unwrap();
+        drop(server);
         // A server that knows of no such device says so, or is silent.
         assert!(other.is_err(), "{other:?}");
     });
