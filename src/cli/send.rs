@@ -7,12 +7,12 @@ use std::time::Duration;
 
 use clap::Args;
 use takt_rt::linux::MonotonicClock;
-use takt_rt::{BusPort, BusState, Clock, Frame, Nanoseconds, ReceiveBatch};
+use takt_rt::{BusPort, BusState, Clock, Frame, Nanoseconds, ReceiveBatch, Received};
 
 use crate::bus_log::Direction;
 use crate::bus_log::frame_text::{self, FrameTextError};
 use crate::config::{Config, Interface, Quantity};
-use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
+use crate::link::ownership::{BusClaim, ClaimError, IfOwned, MasterTraffic, Ownership};
 use crate::link::{InterfaceSettings, LinkPort, RealInterface, SocketCanOptions, open_interface};
 use crate::monitor::{BusDecoder, Decoded};
 use crate::printable::printable;
@@ -115,7 +115,7 @@ fn send(arguments: &Arguments) -> Result<Exit, UsageError> {
         true => None,
         false => {
             let claimed = Ownership::claim(vec![bus.claim.clone()], IfOwned::Refuse);
-            Some(claimed.map_err(|error| format!("{error}, or add --force: the drives may move then"))?)
+            Some(claimed.map_err(|error| refused(&error))?)
         }
     };
     let mut port = open(&bus)?;
@@ -141,6 +141,16 @@ fn send(arguments: &Arguments) -> Result<Exit, UsageError> {
         return Ok(Exit::Stopped);
     }
     Ok(shown.exit(is_stopped()))
+}
+
+/// Why nothing is sent. Only another master is overruled by --force.
+fn refused(error: &ClaimError) -> String {
+    match error {
+        ClaimError::Held { .. } | ClaimError::OtherMaster { .. } => {
+            format!("{error}, or add --force: the drives may move then")
+        }
+        _ => error.to_string(),
+    }
 }
 
 /// Names what is wrong with the text of a frame, and points at it.
@@ -267,10 +277,11 @@ fn send_all(
         shown.printed.print();
     }
     // Whoever closes a socket at once takes away what still waits in it.
-    confirm(port, clock, is_stopped)?;
+    let heard = confirm(port, clock, is_stopped)?;
     if let Some(wait) = arguments.wait {
         let wait_ns = Nanoseconds::try_from(wait.as_nanos()).unwrap_or(Nanoseconds::MAX);
         let end_ns = clock.now_ns().saturating_add(wait_ns);
+        heard.iter().for_each(|received| shown.add_received(received, decoder));
         listen(port, clock, decoder, shown, end_ns, is_stopped);
     }
     Ok(())
@@ -296,21 +307,28 @@ fn hand_over(
     }
 }
 
-/// Waits until every frame was on the bus.
+/// Waits until every frame was on the bus, which a port tells of what it has read. Returns what was received meanwhile.
 fn confirm(
     port: &mut LinkPort,
     clock: &mut MonotonicClock,
     is_stopped: &impl Fn() -> bool,
-) -> Result<(), String> {
+) -> Result<Vec<Received>, String> {
     let end_ns = clock.now_ns().saturating_add(SENDING_NS);
+    let mut heard = vec![];
     loop {
         let now_ns = clock.now_ns();
+        let mut batch = ReceiveBatch::new();
+        port.receive(now_ns, &mut batch);
+        heard.extend(batch.iter().copied());
         let waiting = port.unconfirmed(now_ns);
         if waiting == 0 || is_stopped() {
-            return Ok(());
+            return Ok(heard);
         }
         if now_ns >= end_ns {
-            return Err(format!("{waiting} frames were not seen on the bus: {}", cure(port)));
+            return Err(match waiting {
+                1 => format!("a frame was not seen on the bus: {}", cure(port)),
+                _ => format!("{waiting} frames were not seen on the bus: {}", cure(port)),
+            });
         }
         thread::sleep(Duration::from_nanos(POLL_NS));
     }
@@ -342,9 +360,7 @@ fn listen(
         let now_ns = clock.now_ns();
         let mut batch = ReceiveBatch::new();
         port.receive(now_ns, &mut batch);
-        for received in &batch {
-            shown.add(received.at_ns, Direction::Received, &received.frame, &decoder.decode(&received.frame));
-        }
+        batch.iter().for_each(|received| shown.add_received(received, decoder));
         shown.printed.print();
         if now_ns >= end_ns || is_stopped() || shown.printed.has_no_reader() {
             return;
@@ -389,6 +405,11 @@ impl Shown {
             true => line.json(&mut self.printed.text),
             false => self.style.line(&line, &mut self.printed.text),
         }
+    }
+
+    fn add_received(&mut self, received: &Received, decoder: &mut BusDecoder) {
+        let frame = &received.frame;
+        self.add(received.at_ns, Direction::Received, frame, &decoder.decode(frame));
     }
 
     fn exit(&self, is_interrupted: bool) -> Exit {

@@ -49,12 +49,29 @@ sleep 0.2
 sleep 0.2
 kill $listener; wait $listener 2>/dev/null
 awk '{ split($3, f, "#"); is_read = f[2] ~ /^[4678]/ }
-    f[1] ~ /^(000|080|[2345][0-7].)$/ || (f[1] ~ /^6[0-3].$/ && !is_read) || (f[1] ~ /^6[4-7].$/ && length(f[2]) > 8)' "$wire" > "$printed"
+    f[1] ~ /^(000|080|[2345][0-7].)$/ || (f[1] ~ /^(6[0-3].|640)$/ && !is_read) || (f[1] ~ /^6[4-7][0-9A-F]$/ && f[1] != "640" && length(f[2]) > 8)' "$wire" > "$printed"
 if [ ! -s "$printed" ] && [ "$(wc -l < "$wire")" -gt 128 ]; then
     passes "scan: $(wc -l < "$wire") frames, all of them reads and their answers"
 else
     fails "scan: of $(wc -l < "$wire") frames these are no reads"
 fi
+
+# In narrow and wide terminals, without colours, and into a pipe that nobody reads to its end.
+for columns in 60 80 200; do
+    for arguments in "scan --bus vcan1 --to 4" "send 602#4000100000000000 --bus vcan1 --wait 0.2" "monitor --bus vcan1 --stats --duration 1"; do
+        COLUMNS=$columns NO_COLOR=1 timeout 60 "$TAKT" $arguments > "$printed" 2>&1; ended=$?
+        width=$(LC_ALL=C.UTF-8 wc -L < "$printed")
+        if [ $ended = 0 ] && [ -s "$printed" ] && [ "$width" -le $columns ] && ! grep -q $'\e' "$printed"; then
+            passes "in $columns columns: ${arguments%% *}, $width at most"
+        else
+            fails "in $columns columns: ${arguments%% *}, exit $ended, $width at most"
+        fi
+    done
+done
+for arguments in "scan --bus vcan1 --to 4" "scan --bus vcan1 --to 4 --json" "check configs/single-erob.toml" "send 080# --bus vcan1 --count 3"; do
+    timeout 60 "$TAKT" $arguments 2> "$printed" | head -n 1 > /dev/null; ended=${PIPESTATUS[0]}
+    if [ $ended = 0 ] && ! grep -q panicked "$printed"; then passes "into a closed pipe: $arguments"; else fails "into a closed pipe: $arguments, exit $ended"; fi
+done
 
 "$TAKT" run configs/single-erob.toml --bus can=vcan0 --duration 20 > "$OUT/tools-run.txt" 2>&1 & run=$!
 until [ "$(candump -L -T 500 -n 20 vcan0,201:7FF | wc -l)" = 20 ]; do kill -0 $run || break; done
