@@ -1,19 +1,25 @@
 //! `takt run` beside a service manager and a scraper.
 
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixDatagram;
+use std::path::PathBuf;
 use std::process::{Child, ChildStderr, Command, Stdio};
-use std::time::Duration;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
+use takt::internals::sim::pseudo_terminal::PseudoTerminal;
 use tempfile::TempDir;
 
 /// A run is ended when its test ends, however it does.
 struct Run {
     child: Child,
     stderr: BufReader<ChildStderr>,
+    /// By which it is served.
+    name: PathBuf,
     _folder: TempDir,
 }
 
@@ -33,7 +39,7 @@ impl Run {
             .spawn()
             .unwrap();
         let stderr = BufReader::new(child.stderr.take().unwrap());
-        Self { child, stderr, _folder: folder }
+        Self { child, stderr, name, _folder: folder }
     }
 
     fn signal(&self, signal: Signal) {
@@ -179,4 +185,41 @@ fn the_view_in_the_terminal_needs_a_terminal() {
         Command::new(env!("CARGO_BIN_EXE_takt")).args(["top", "arm"]).stdin(Stdio::null()).output().unwrap();
     let stderr = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.code() == Some(2) && stderr.contains("needs a terminal"), "{stderr}");
+}
+
+#[test]
+fn the_view_ends_when_its_terminal_is_closed() {
+    let mut run = Run::start(&[], &[]);
+    run.line_with("served by the name");
+    let mut terminal = PseudoTerminal::open().unwrap();
+    let end = || File::options().read(true).write(true).open(terminal.path()).unwrap();
+    let mut view = Command::new(env!("CARGO_BIN_EXE_takt"))
+        .arg("top")
+        .arg(&run.name)
+        .env("TERM", "xterm")
+        .stdin(end())
+        .stdout(end())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let (mut shown, mut bytes) = (vec![], [0; 4096]);
+    // It has changed to a screen of its own.
+    while !shown.windows(8).any(|sequence| sequence == b"\x1b[?1049h") {
+        assert_eq!(view.try_wait().unwrap(), None);
+        terminal.wait(100_000_000);
+        if let Ok(count) = terminal.read(&mut bytes) {
+            shown.extend_from_slice(&bytes[..count]);
+        }
+    }
+    drop(terminal);
+    let closed = Instant::now();
+    let ended = loop {
+        match view.try_wait().unwrap() {
+            None if closed.elapsed() < Duration::from_secs(60) => thread::sleep(Duration::from_millis(10)),
+            ended => break ended,
+        }
+    };
+    // Nothing of it is left behind, whatever has become of it.
+    let _ = view.kill();
+    assert_eq!(ended.map(|status| status.code()), Some(Some(1)), "it goes on without a terminal");
 }

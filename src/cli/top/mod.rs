@@ -35,10 +35,16 @@ pub struct Arguments {
     list: bool,
 }
 
+const NONE_SERVED: &str =
+    "no controller is served on this computer; serve one with: takt run CONFIG --serve NAME";
+
 /// Shows it until `q` is pressed. The exit code is 2 without a terminal, or without a controller.
 pub fn run(arguments: &Arguments) -> Exit {
     if arguments.list {
         let names = Listener::names_in_use();
+        if names.is_empty() {
+            say!("takt: {NONE_SERVED}");
+        }
         return super::print::text(
             &names.iter().map(|name| format!("{name}\n")).collect::<String>(),
             Exit::Done,
@@ -68,10 +74,7 @@ fn named(name: Option<&str>) -> Result<String, String> {
 
 fn only(mut names: Vec<String>) -> Result<String, String> {
     match (names.pop(), names.len()) {
-        (None, _) => {
-            Err("no controller is served on this computer; serve one with: takt run CONFIG --serve NAME"
-                .to_owned())
-        }
+        (None, _) => Err(NONE_SERVED.to_owned()),
         (Some(name), 0) => Ok(name),
         (Some(last), _) => {
             names.push(last);

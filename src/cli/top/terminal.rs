@@ -4,11 +4,14 @@
 //! is paused holds up no key.
 
 use std::io;
+use std::os::fd::AsFd;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, Receiver, SyncSender, TrySendError};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
+use nix::errno::Errno;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use ratatui::crossterm::event::{
     self, Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers,
 };
@@ -68,9 +71,13 @@ pub fn show(name: &str, client: Client) -> Exit {
             Err(error) => break Err(error),
         }
     };
-    ratatui::restore();
+    // A terminal that is closed cannot be restored.
+    let _ = ratatui::try_restore();
     view.end();
     result.unwrap_or_else(|error| {
+        if interrupted.load(Ordering::Relaxed) {
+            return Exit::Interrupted;
+        }
         say!("takt: the terminal can no longer be used: {error}");
         Exit::Stopped
     })
@@ -137,9 +144,14 @@ impl View {
     fn keys(&mut self) -> io::Result<bool> {
         let begun = Instant::now();
         loop {
-            let left = FRAME.saturating_sub(begun.elapsed());
-            if left.is_zero() || !event::poll(left)? {
-                break;
+            verify_open()?;
+            if !event::poll(Duration::ZERO)? {
+                let left = FRAME.saturating_sub(begun.elapsed());
+                if left.is_zero() {
+                    break;
+                }
+                wait_for_key(left)?;
+                continue;
             }
             let TerminalEvent::Key(key) = event::read()? else { break };
             let Some(key) = known(key) else { continue };
@@ -181,6 +193,29 @@ impl View {
         }
         self.asker.end();
     }
+}
+
+/// # Errors
+/// The terminal is closed. crossterm would read its end for ever.
+fn verify_open() -> io::Result<()> {
+    wait_for_key(Duration::ZERO)
+}
+
+/// Waits until there is something to read, or the window has another size, or the time is over.
+///
+/// # Errors
+/// The terminal is closed.
+fn wait_for_key(wait: Duration) -> io::Result<()> {
+    let stdin = io::stdin();
+    let mut terminal = [PollFd::new(stdin.as_fd(), PollFlags::POLLIN)];
+    let wait = PollTimeout::try_from(wait).unwrap_or(PollTimeout::ZERO);
+    match poll(&mut terminal, wait) {
+        Ok(_) | Err(Errno::EINTR) => {}
+        Err(errno) => return Err(errno.into()),
+    }
+    let closed = PollFlags::POLLHUP | PollFlags::POLLERR | PollFlags::POLLNVAL;
+    let is_closed = terminal.iter().filter_map(PollFd::revents).any(|events| events.intersects(closed));
+    if is_closed { Err(io::ErrorKind::UnexpectedEof.into()) } else { Ok(()) }
 }
 
 /// A key, if it means anything.

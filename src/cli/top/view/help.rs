@@ -8,8 +8,8 @@ use ratatui::widgets::{Paragraph, Widget, Wrap};
 use super::Palette;
 
 const KEYS: [(&str, &str); 14] = [
-    ("SPACE", "stop all axes: decelerated, held under power (category 2); no lease needed"),
-    ("x", "stop all axes: decelerated, then power removed (category 1); no lease needed"),
+    ("SPACE", "stop all axes, held under power (category 2); needs no lease"),
+    ("x", "stop all axes, then remove the power (category 1); needs no lease"),
     ("↑ ↓  k j", "select an axis"),
     ("t", "take the lease, to command"),
     ("T", "take the lease from whoever has it (asks)"),

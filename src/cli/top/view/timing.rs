@@ -7,11 +7,13 @@ use super::times::duration;
 use crate::cli::top::model::Model;
 use crate::telemetry::{TIME_BOUNDS_NS, TimeCounts};
 
-/// The columns of all lines.
-pub const COLUMNS: u16 = 58;
+/// The columns of all lines: the name, the histogram, and three numbers.
+pub const COLUMNS: u16 = (NAME + TIME_BOUNDS_NS.len() + 1 + 3 * NUMBER) as u16;
 const EIGHTHS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 /// The columns before the histogram.
 const NAME: usize = 9;
+/// The columns of a number, with the space before it.
+const NUMBER: usize = 9;
 
 /// The lines: a heading with a scale, and a line for each time.
 pub fn lines(model: &Model, palette: Palette) -> Vec<Line<'static>> {
@@ -58,6 +60,10 @@ fn scale() -> String {
     {
         let end = TIME_BOUNDS_NS.iter().position(|bound| *bound == ns).unwrap_or(0);
         let begin = (end + 1).saturating_sub(label.chars().count());
+        // Where there is no room for both, the first of two stands.
+        if begin > 0 && scale.get(begin - 1).is_none_or(|before| *before != ' ') {
+            continue;
+        }
         scale.iter_mut().skip(begin).zip(label.chars()).for_each(|(place, letter)| *place = letter);
     }
     scale.into_iter().collect()
