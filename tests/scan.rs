@@ -407,6 +407,25 @@ fn motors_that_answer_commands_alone_are_asked_only_with_consent_and_by_what_sto
 }
 
 #[test]
+fn motors_in_mit_mode_are_found_by_their_replies_to_the_question_whatever_identifier_these_have() {
+    let configured =
+        Config::load(format!("{}/configs/damiao-arm.toml", env!("CARGO_MANIFEST_DIR")).as_ref()).unwrap();
+    let unasked = scan(&usual(), &mut SimulatedBus::new(&configured, 0));
+    assert!(unasked.found.devices.is_empty(), "{:#?}", unasked.found);
+    let what = BusScan { may_take_torque: true, ..usual() };
+    let outcome = scan(&what, &mut SimulatedBus::new(&configured, 0));
+    assert_eq!(outcome.nodes(), [Some(1), Some(2), Some(3)], "{:#?}", outcome.found);
+    for (node, reply) in [(1, "0x011"), (2, "0x012"), (3, "0x013")] {
+        let remarks = &outcome.node(node).remarks;
+        assert!(remarks.iter().any(|remark| remark.contains(reply)), "{remarks:?}");
+        assert!(
+            remarks.iter().any(|remark| remark.contains("a motor in MIT mode answers alike")),
+            "{remarks:?}"
+        );
+    }
+}
+
+#[test]
 fn motors_on_can_fd_are_asked_only_where_the_bus_carries_it() {
     let fd_bus = || {
         let text = BUS.replace("name = \"can\"\n", "name = \"can\"\ndata_bit_rate = \"5 Mbit/s\"\n")
@@ -487,27 +506,27 @@ fn the_configuration_of_what_was_found_is_whole_but_for_what_only_the_owner_know
     };
     for axis in [EROB, YZ_AIM, OWN] {
         let found = scan(&usual(), &mut bus(&[axis])).found.devices;
-        let text = starting_configuration(&[(place("sim"), found)]);
+        let text = starting_configuration(&[(place("sim"), found)], None);
         let config = Config::parse("found.toml", &text).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
         config.validate().unwrap_or_else(|error| panic!("{error:?}\n{text}"));
         assert!(text.contains("# YOURS"), "{text}");
     }
     let motors = scan(&BusScan { may_take_torque: true, ..usual() }, &mut bus(&[MOTOR])).found.devices;
-    let text = starting_configuration(&[(place("sim"), motors)]);
+    let text = starting_configuration(&[(place("sim"), motors)], None);
     Config::parse("found.toml", &text)
         .unwrap_or_else(|error| panic!("{error:?}\n{text}"))
         .validate()
         .unwrap();
     let (found, _) = scan_slaves(slaves(115_200), modbus_drives(&[3]).as_mut(), |_| {});
     let line = PlaceOfScan { bit_rate: 115_200, ..place("serial:/dev/ttyUSB0") };
-    let text = starting_configuration(&[(line, found.devices)]);
+    let text = starting_configuration(&[(line, found.devices)], None);
     Config::parse("found.toml", &text)
         .unwrap_or_else(|error| panic!("{error:?}\n{text}"))
         .validate()
         .unwrap();
     // Its data sheet is the owner's: one line is wrong until it is there.
     let found = scan(&usual(), &mut bus(&[BY_SHEET])).found.devices;
-    let text = starting_configuration(&[(place("sim"), found)]);
+    let text = starting_configuration(&[(place("sim"), found)], None);
     let error = format!("{:?}", Config::parse("found.toml", &text).unwrap_err());
     assert!(
         text.contains("eds = \"node-12.eds\"  # YOURS") && error.contains("node-12.eds"),

@@ -13,11 +13,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Args;
 use takt_rt::Nanoseconds;
 
-use crate::config::{Interface, Quantity};
-use crate::family::scan::{PlaceOfScan, Scanned, starting_configuration};
+use crate::config::{Config, Interface, Quantity};
+use crate::family::scan::{PlaceOfScan, Scanned, can_drive, starting_configuration};
 use crate::family::{self, cia402};
 use crate::link::RealInterface;
+use crate::schedule::{self, BusSchedule, Remedy};
 
+use super::columns::paragraph;
 use super::exit::Exit;
 use super::interruption;
 use super::print;
@@ -85,12 +87,11 @@ fn only_with_consent() -> String {
     let protocols = family::all().into_iter().flat_map(|family| family.own_protocols());
     let asked: Vec<String> = protocols
         .filter_map(|protocol| Some(format!("  {}: {}", protocol.name(), protocol.consequence()?)))
+        .map(|line| paragraph(&line, 4))
         .collect();
-    format!(
-        "Without --stop-motors these are only listened for, because no request leaves them alone:\n{}\nThey answer a master and \
-         nobody else, so that nothing is heard of them on a silent bus.",
-        asked.join("\n")
-    )
+    let before = "Motors of these protocols are only listened for without --stop-motors, because each request changes what they do:";
+    let behind = "Such a motor answers its master alone, so that nothing is heard of it on a silent bus.";
+    format!("{}\n{}\n{}", paragraph(before, 0), asked.join("\n"), paragraph(behind, 0))
 }
 
 fn bit_rate(text: &str) -> Result<u32, String> {
@@ -193,7 +194,27 @@ fn finish(arguments: &Arguments, buses: Vec<ScannedBus>, wanted: usize) -> Exit 
         say!("note: {remark}");
     }
     let found: Vec<_> = buses.into_iter().map(|bus| (bus.place, bus.found.devices)).collect();
-    print::text(&starting_configuration(&found), exit)
+    if !found.iter().any(|(_, devices)| can_drive(devices)) {
+        say!("takt: no drive was found that an axis could be written for");
+        return exit.and_failed();
+    }
+    let text = starting_configuration(&found, None);
+    match longer_period(&text) {
+        None => print::text(&text, exit),
+        longer => print::text(&starting_configuration(&found, longer), exit),
+    }
+}
+
+/// The period at which every bus of a configuration carries its traffic, if its own is too short for that.
+fn longer_period(text: &str) -> Option<Nanoseconds> {
+    // What lacks a data sheet cannot be read yet.
+    let config = Config::parse("takt scan", text).ok()?;
+    let longer = |remedy: &Remedy| match remedy {
+        Remedy::LongerPeriod { period_ns } => Some(*period_ns),
+        _ => None,
+    };
+    let of_bus = |bus: BusSchedule| bus.remedies.iter().find_map(longer);
+    schedule::analyse(&config).into_iter().filter(|bus| !bus.fits()).filter_map(of_bus).max()
 }
 
 /// A data sheet of the person's own.

@@ -110,6 +110,9 @@ pub fn text(buses: &[ScannedBus], is_interrupted: bool) -> String {
             (false, false) => text.push_str(&table(devices)),
         }
         text.push_str(&notes(&bus.found));
+        if devices.is_empty() && bus.found.remarks.is_empty() && !is_interrupted {
+            text.push_str(&format!("{}\n", paragraph(&format!("try: {}", of_silence(&bus.name)), 5)));
+        }
     }
     if is_interrupted {
         text.push_str("interrupted: this is what had been found\n");
@@ -117,6 +120,19 @@ pub fn text(buses: &[ScannedBus], is_interrupted: bool) -> String {
         text.push_str("`takt scan … --config` writes a configuration for them.\n");
     }
     text
+}
+
+/// What to look at where nothing was found.
+fn of_silence(bus: &str) -> &'static str {
+    match bus.starts_with("serial:") {
+        true => {
+            "are the drives powered, is the bit rate right (--line-rate), are A and B the right way round?"
+        }
+        false => {
+            "are the drives powered, is the bus terminated, is the bit rate right (--bit-rate), are the node IDs in the range \
+             (--from, --to)? Motors that answer nothing but commands need --stop-motors, which takes their torque"
+        }
+    }
 }
 
 /// How many answered in which protocol, where there are several.

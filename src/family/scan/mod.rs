@@ -34,7 +34,7 @@ pub use line::{LineScan, scan_line};
 pub use own_protocol::{OwnProtocol, Reading};
 pub use reading::reply_to_reading;
 pub use session::{ScanClient, ScanSession};
-pub use starting::{PlaceOfScan, StartingKeys, starting_configuration};
+pub use starting::{PlaceOfScan, StartingKeys, can_drive, starting_configuration};
 
 /// What a scan has found.
 #[derive(Clone, Debug, Default)]

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use takt_rt::Nanoseconds;
+
 use super::device::{Answered, FoundDevice};
 use crate::family;
 
@@ -32,7 +34,12 @@ const LIMITS: &str = "limits = { position = [\"-90 deg\", \"90 deg\"], velocity 
                       \"1 Nm\" }  # YOURS: what the joint may do";
 
 /// The text of a configuration with an axis for each drive that was found. What nobody but the owner of the machine can know is marked.
-pub fn starting_configuration(found: &[(PlaceOfScan, Vec<FoundDevice>)]) -> String {
+///
+/// With `longer_period_ns` the cycle has this period.
+pub fn starting_configuration(
+    found: &[(PlaceOfScan, Vec<FoundDevice>)],
+    longer_period_ns: Option<Nanoseconds>,
+) -> String {
     let mut text = String::new();
     // Writing to a String cannot fail.
     let mut line = |written: &str| _ = writeln!(text, "{written}");
@@ -42,7 +49,8 @@ pub fn starting_configuration(found: &[(PlaceOfScan, Vec<FoundDevice>)]) -> Stri
     line("# `takt check FILE`, and `takt run FILE --bus NAME=sim` before anything moves.");
     let axes: Vec<Vec<(&FoundDevice, StartingKeys)>> =
         found.iter().map(|(_, devices)| driven(devices)).collect();
-    let period = axes.iter().flatten().find_map(|(_, keys)| keys.cycle_period);
+    let of_drive = axes.iter().flatten().find_map(|(_, keys)| keys.cycle_period).map(str::to_owned);
+    let period = longer_period_ns.map(|ns| format!("{} us", ns / 1000)).or(of_drive);
     line("name = \"my-machine\"");
     if let Some(period) = period {
         line(&format!("\n[cycle]\nperiod = {period:?}"));
@@ -74,6 +82,11 @@ pub fn starting_configuration(found: &[(PlaceOfScan, Vec<FoundDevice>)]) -> Stri
         }
     }
     text
+}
+
+/// Whether there can be an axis for one of the devices.
+pub fn can_drive(devices: &[FoundDevice]) -> bool {
+    !driven(devices).is_empty()
 }
 
 /// The devices for which there can be an axis, with its keys. Those of a running controller have one there. Two with the same node ID cannot be told apart: the first of them.
