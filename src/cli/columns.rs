@@ -22,7 +22,8 @@ pub fn paragraph(text: &str, indentation: usize) -> String {
     }
 }
 
-fn broken(text: &str, indentation: usize, columns: usize) -> String {
+/// The same for so many columns.
+pub fn broken(text: &str, indentation: usize, columns: usize) -> String {
     let indentation = " ".repeat(indentation);
     let options = textwrap::Options::new(columns).subsequent_indent(&indentation).break_words(false);
     // A number stays with its unit.

@@ -1,14 +1,16 @@
 //! `takt completions`: the subcommands and options of takt for a shell that completes words.
 
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
 use super::exit::Exit;
-use super::{CommandLine, print};
+use super::{command, print};
 
 /// Print what a shell needs to complete the words of takt
 ///
-/// For bash: `takt completions bash > ~/.local/share/bash-completion/completions/takt`.
+/// bash: `takt completions bash > ~/.local/share/bash-completion/completions/takt`;
+/// zsh: `takt completions zsh > FOLDER/_takt`, where FOLDER is one of those in `$fpath`;
+/// fish: `takt completions fish > ~/.config/fish/completions/takt.fish`.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct Arguments {
     /// The shell
@@ -18,6 +20,6 @@ pub struct Arguments {
 /// Prints the script for the shell.
 pub fn run(arguments: Arguments) -> Exit {
     let mut script = vec![];
-    clap_complete::generate(arguments.shell, &mut CommandLine::command(), "takt", &mut script);
+    clap_complete::generate(arguments.shell, &mut command(), "takt", &mut script);
     print::text(&String::from_utf8_lossy(&script), Exit::Done)
 }

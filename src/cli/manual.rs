@@ -3,9 +3,9 @@
 use std::io;
 use std::path::PathBuf;
 
-use clap::{Args, CommandFactory};
+use clap::Args;
 
-use super::CommandLine;
+use super::command;
 use super::exit::Exit;
 use super::usage_error::UsageError;
 
@@ -20,7 +20,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Exit {
     let folder = &arguments.folder;
     let written = if folder.is_dir() {
-        clap_mangen::generate_to(CommandLine::command(), folder)
+        clap_mangen::generate_to(command(), folder)
     } else {
         Err(io::Error::from(io::ErrorKind::NotADirectory))
     };

@@ -38,16 +38,35 @@ mod usage_error;
 
 use std::process::{ExitCode, Termination};
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use exit::Exit;
 use log::LogLevel;
 
 /// The program `takt`: does what the command line says.
 pub fn main() -> ExitCode {
-    let exit = CommandLine::try_parse()
+    let matches = command().try_get_matches();
+    let exit = matches
+        .and_then(|matches| CommandLine::from_arg_matches(&matches))
         .map_or_else(|error| usage_error::of_command_line(&error), CommandLine::execute);
     exit.report()
+}
+
+/// The whole command line.
+fn command() -> clap::Command {
+    CommandLine::command().mut_subcommand("drive", |drive| {
+        // clap leaves out in the usage of an action what stands before it and is not always needed.
+        drive.mut_subcommands(|action| with_usage_behind(action, "takt drive [CONFIG [AXIS]]"))
+    })
+}
+
+/// Has the usage of a command, and of those below it, begin with `before`.
+fn with_usage_behind(command: clap::Command, before: &str) -> clap::Command {
+    let usage = command.clone().render_usage().to_string();
+    let own = usage.trim_start_matches("Usage:").trim_start();
+    let before_below = format!("{before} {}", command.get_name());
+    let usage = format!("{before} {own}");
+    command.override_usage(usage).mut_subcommands(|below| with_usage_behind(below, &before_below))
 }
 
 /// Hard-real-time joint-motion controller for CAN drives.
@@ -56,7 +75,15 @@ pub fn main() -> ExitCode {
 #[command(version, arg_required_else_help = true, term_width = columns::columns().map_or(0, usize::from))]
 struct CommandLine {
     /// Tell on standard error what happens, from this level on
-    #[arg(long, global = true, value_name = "LEVEL", value_enum, env = "TAKT_LOG", hide_env_values = true)]
+    #[arg(
+        long,
+        global = true,
+        value_name = "LEVEL",
+        value_enum,
+        env = "TAKT_LOG",
+        hide_env_values = true,
+        help_heading = "Diagnosis"
+    )]
     log: Option<LogLevel>,
     #[command(subcommand)]
     command: Command,

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use takt_rt::plan::Profile;
 
+use super::columns::paragraph;
 use super::exit::Exit;
 use super::print;
 use super::usage_error::UsageError;
@@ -19,7 +20,7 @@ use question::Question;
 
 /// Plan trajectories: one problem a line in JSON, one answer a line out
 #[derive(Args, Clone, Debug)]
-#[command(after_long_help = FORMAT)]
+#[command(after_long_help = format())]
 pub struct Arguments {
     /// Where the problems are; standard input when there is none
     problems: Option<PathBuf>,
@@ -28,33 +29,59 @@ pub struct Arguments {
     plot: Option<PathBuf>,
 }
 
-/// The keys of a problem and of an answer.
-const FORMAT: &str = "\
-A problem is one object in one line. Each list has one number an axis; any unit will do, as long as it is the same throughout:
+/// The keys of a problem, with their meaning.
+const OF_PROBLEM: [(&str, &str); 12] = [
+    (
+        "p0, v0, a0",
+        "position, velocity and acceleration at the start; p0 is required, the others are 0 when left out",
+    ),
+    ("pf, vf, af", "the same at the target, 0 when left out"),
+    ("vmax, amax", "highest velocity and acceleration, required"),
+    ("vmin, amin", "the lowest ones, below 0; -vmax and -amax when left out"),
+    ("jmax", "highest jerk; null or left out: no limit"),
+    ("pmin, pmax", "position limits; null or left out: none"),
+    ("interface", "\"position\" (default), or \"velocity\": reach vf and af wherever that is"),
+    (
+        "sync",
+        "\"time\" (default): all axes arrive together; \"phase\": on a straight line where that is possible; \"straight\": on a straight \
+         line or not at all; \"none\": each as soon as it can",
+    ),
+    ("dt", "the duration is a multiple of this (s), and the answer has a sample at each multiple"),
+    ("t", "the sample times (s), for others than those"),
+    ("min_duration", "the trajectory takes at least so long (s)"),
+    ("id", "anything; the answer repeats it"),
+];
 
-  echo '{\"p0\": [0], \"pf\": [1], \"vmax\": [2], \"amax\": [8], \"jmax\": [100]}' | takt plan --plot trajectory.svg
+/// The keys of an answer.
+const OF_ANSWER: [(&str, &str); 5] = [
+    ("id, result", "result is \"ok\" or the name of what is wrong, which `message` says in words"),
+    ("duration", "of the trajectory (s)"),
+    ("t_min", "how soon each axis could arrive by itself (s)"),
+    (
+        "t, p, v, a",
+        "sample times (s), and one list an axis at each of them; 16 samples from start to end without t and dt",
+    ),
+    ("pmin, pmax", "the lowest and the highest position of each axis on its way"),
+];
 
-  p0, v0, a0       position, velocity and acceleration at the start; p0 is required, the others are 0 when left out
-  pf, vf, af       the same at the target, 0 when left out
-  vmax, amax       highest velocity and acceleration, required
-  vmin, amin       the lowest ones, below 0; -vmax and -amax when left out
-  jmax             highest jerk; null or left out: no limit
-  pmin, pmax       position limits; null or left out: none
-  interface        \"position\" (default), or \"velocity\": reach vf and af wherever that is
-  sync             \"time\" (default): all axes arrive together; \"phase\": on a straight line where that is possible; \"straight\": on a
-                   straight line or not at all; \"none\": each as soon as it can
-  dt               the duration is a multiple of this (s), and the answer has a sample at each multiple
-  t                the sample times (s), for others than those
-  min_duration     the trajectory takes at least so long (s)
-  id               anything; the answer repeats it
-
-An answer is one object in one line:
-
-  id, result       result is \"ok\" or the name of what is wrong, which `message` says in words
-  duration         of the trajectory (s)
-  t_min            how soon each axis could arrive by itself (s)
-  t, p, v, a       sample times (s), and one list an axis at each of them; 16 samples from start to end without t and dt
-  pmin, pmax       the lowest and the highest position of each axis on its way";
+/// For the help: what a problem and an answer look like.
+fn format() -> String {
+    const MEANING_AT: usize = 17;
+    let lines = |keys: &[(&str, &str)]| {
+        let line = |(key, meaning): &(&str, &str)| paragraph(&format!("  {key:<13}  {meaning}"), MEANING_AT);
+        keys.iter().map(line).collect::<Vec<_>>().join("\n")
+    };
+    let problem = paragraph(
+        "A problem is one object in one line. Each list has one number an axis; any unit will do, as long as it is the same throughout:",
+        0,
+    );
+    format!(
+        "{problem}\n\n  echo '{{\"p0\": [0], \"pf\": [1], \"vmax\": [2], \"amax\": [8]}}' |\n    takt plan --plot trajectory.svg\n\n{}\n\n\
+         An answer is one object in one line:\n\n{}",
+        lines(&OF_PROBLEM),
+        lines(&OF_ANSWER)
+    )
+}
 
 /// Answers every line. The exit code is 2 when a line is no problem or the file cannot be read, 1 when an answer or the
 /// plot cannot be written, else 0: a problem without a solution is a valid answer.

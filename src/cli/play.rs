@@ -9,7 +9,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
-use crate::config::Config;
+use crate::config::{Config, Travel};
 use crate::controller::realtime_thread::StartError;
 use crate::controller::session::{SessionError, SessionOptions};
 use crate::controller::{Controller, Outcome, StartFailure};
@@ -26,6 +26,7 @@ use super::exit::Exit;
 use super::interruption;
 use super::ownership;
 use super::print;
+use super::table::{Table, UNBROKEN};
 use super::usage_error::UsageError;
 
 /// Play points from a CSV file into the arm, which is led to the first of them before.
@@ -398,16 +399,28 @@ fn text(printed: &Printed, config: &Config) -> String {
         printed.lag_s * 1e3,
         printed.lag_max_s * 1e3
     );
-    let width = printed.axes.iter().map(|axis| axis.name.len()).max().unwrap_or(0);
-    for (axis, of) in printed.axes.iter().zip(&config.axes) {
-        let AxisMaxima { name, velocity_max, acceleration_max, jerk_max } = axis;
-        let limits = &of.limits;
-        text += &format!(
-            "{name:<width$}  velocity {velocity_max:8.4} of {:.4}  acceleration {acceleration_max:9.4} of {:.4}  jerk {jerk_max:10.3} of {:.3}\n",
-            limits.velocity,
-            limits.acceleration.max(limits.deceleration),
-            limits.jerk
-        );
+    text + &format!("\nlargest set-points\n{}", maxima(&printed.axes, config))
+}
+
+/// The largest values of each axis beside their limits.
+fn maxima(axes: &[AxisMaxima], config: &Config) -> Table {
+    let mut table = Table::new(["axis", "unit", ">velocity", ">acceleration", ">jerk"]);
+    for (AxisMaxima { name, velocity_max, acceleration_max, jerk_max }, axis) in axes.iter().zip(&config.axes)
+    {
+        let limits = &axis.limits;
+        let jerk = if limits.jerk.is_finite() {
+            format!("of {:.1}", limits.jerk)
+        } else {
+            "without limit".to_owned()
+        };
+        let row = [
+            name.clone(),
+            if axis.travel == Travel::Rotary { "rad" } else { "m" }.to_owned(),
+            format!("{velocity_max:.4} of {:.4}", limits.velocity),
+            format!("{acceleration_max:.3} of {:.3}", limits.acceleration.max(limits.deceleration)),
+            format!("{jerk_max:.1} {jerk}"),
+        ];
+        table.row(row.map(|cell| cell.replace(' ', &UNBROKEN.to_string())));
     }
-    text
+    table
 }

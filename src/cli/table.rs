@@ -1,16 +1,17 @@
-//! Tables with aligned columns that fit the terminal.
+//! Tables with aligned columns that fit the terminal. Where it is too narrow for the columns, each row is a sentence.
 
 use std::fmt;
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
 
-use super::columns::columns;
+use super::columns::{broken, columns};
 
 /// A table. A heading that begins with `>` makes its column one that is aligned to the right. Where a row is too long for the
 /// terminal, cells are broken between words.
 #[derive(Debug)]
 pub struct Table {
     table: comfy_table::Table,
+    headings: Vec<&'static str>,
     /// Of each column, the letters of its longest word.
     longest_words: Vec<usize>,
 }
@@ -24,9 +25,12 @@ const LONGEST_UNBROKEN: u16 = 14;
 /// The spaces before each column.
 const GAP: u16 = 2;
 
+/// The spaces before the second line of a row that is a sentence.
+const BELOW: usize = 6;
+
 impl Table {
     /// A table with these headings.
-    pub fn new<const N: usize>(headings: [&str; N]) -> Self {
+    pub fn new<const N: usize>(headings: [&'static str; N]) -> Self {
         let mut table = comfy_table::Table::new();
         table
             .load_preset(presets::NOTHING)
@@ -37,7 +41,12 @@ impl Table {
                 column.set_cell_alignment(CellAlignment::Right);
             }
         }
-        Self { table, longest_words: headings.map(longest_word).to_vec() }
+        let longest_words = headings.map(longest_word).to_vec();
+        Self {
+            table,
+            headings: headings.map(|heading| heading.trim_start_matches('>')).to_vec(),
+            longest_words,
+        }
     }
 
     /// Adds a row.
@@ -59,7 +68,26 @@ impl Table {
                 column.set_constraint(ColumnConstraint::LowerBoundary(Width::Fixed(width)));
             }
         }
-        table.trim_fmt().replace(UNBROKEN, " ")
+        let text = table.trim_fmt().replace(UNBROKEN, " ");
+        match columns.map(usize::from) {
+            Some(columns) if text.lines().any(|line| line.chars().count() > columns) => {
+                self.sentences(columns)
+            }
+            _ => text,
+        }
+    }
+
+    /// Each row as a sentence: its first cell, then the headings of the others with what they have.
+    fn sentences(&self, columns: usize) -> String {
+        let sentence = |row: &comfy_table::Row| {
+            let mut cells = row.cell_iter().map(comfy_table::Cell::content).zip(&self.headings);
+            let first = cells.next().map_or(String::new(), |(cell, _)| cell);
+            let others = cells.filter(|(cell, _)| !matches!(cell.as_str(), "" | "-"));
+            let others: Vec<String> = others.map(|(cell, heading)| format!("{heading} {cell}")).collect();
+            let sentence = format!("{}{first}: {}", " ".repeat(GAP.into()), others.join("; "));
+            broken(&sentence, BELOW, columns).replace(UNBROKEN, " ")
+        };
+        self.table.row_iter().map(sentence).collect::<Vec<_>>().join("\n")
     }
 }
 
@@ -99,5 +127,18 @@ mod tests {
         let text = table.fitted(Some(36));
         assert!(text.lines().all(|line| line.chars().count() <= 36), "{text}");
         assert!(text.contains("joint1") && text.contains("set-point") && text.contains("199.6"), "{text}");
+    }
+
+    #[test]
+    fn where_the_columns_find_no_room_each_row_is_a_sentence() {
+        let mut table = Table::new(["axis", "unit", ">lowest", ">highest", ">jerk"]);
+        table.row(["joint1", "deg", "-170.00", "170.00", "-"].map(str::to_owned));
+        table.row(["joint2", "mm", "0.00", "800.00", "5.0"].map(str::to_owned));
+        let text = table.fitted(Some(30));
+        assert!(text.lines().all(|line| line.chars().count() <= 30), "{text}");
+        assert_eq!(
+            text.replace("\n      ", " "),
+            "  joint1: unit deg; lowest -170.00; highest 170.00\n  joint2: unit mm; lowest 0.00; highest 800.00; jerk 5.0"
+        );
     }
 }

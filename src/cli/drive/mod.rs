@@ -21,23 +21,28 @@ use target::Place;
 
 pub use target::USUAL_LINE_RATE;
 
+/// In the help of an action, its own options come first.
+const TO_THE_DRIVE: &str = "Which drive, and the way to it";
+
 /// Commission one drive: inspect it, move it, set it up
 ///
-/// The drive is an axis of a configuration (`takt drive CONFIG AXIS …`; the axis may be left out where there is only
-/// one), or a node on an interface (`takt drive --bus can0 --node 1 --family FAMILY …`) or on a serial line
-/// (`takt drive --bus serial:/dev/ttyUSB0 --node 1 --family FAMILY …`), of which no limits are
-/// known; a drive without a family of its own is named by its data sheet (`--eds drive.eds`), one of bit fields by the keys that an
-/// axis has in a configuration (`--set KEY=VALUE`, also for its limits). Values have a unit and
-/// are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the drive's own. Every motion ends at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
+/// An axis of a configuration: `takt drive CONFIG AXIS ACTION`, where AXIS may be left out if there is only one.
+///
+/// A drive without a configuration: `takt drive --bus can0 --node 1 --family FAMILY ACTION`; on a serial line with
+/// `--bus serial:/dev/ttyUSB0`. No limits are known of it. A CiA 402 drive without a family of its own is named by its data sheet
+/// (`--eds drive.eds`), one of bit fields by the keys that an axis has in a configuration (`--set KEY=VALUE`, also for its limits).
+///
+/// Values have a unit and are the joint's ("90 deg", "20 deg/s"); with --raw they are whole numbers of the drive's own. Every motion ends
+/// at rest without torque, also after Ctrl-C, unless --keep-enabled is given.
 #[derive(Args, Debug)]
 #[command(subcommand_value_name = "ACTION", subcommand_help_heading = "Actions")]
 pub struct Arguments {
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = TO_THE_DRIVE)]
     target: target::Target,
-    #[command(flatten)]
+    #[command(flatten, next_help_heading = "Options of every action")]
     options: Options,
     /// Have another takt of this host that commands the bus stop in control first, and take the bus over
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = TO_THE_DRIVE)]
     take_over: bool,
     #[command(subcommand)]
     action: Action,

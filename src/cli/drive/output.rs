@@ -1,6 +1,6 @@
 //! The output of a procedure: progress, frames, and the result.
 
-use std::io::{BufRead, IsTerminal, Read, stderr, stdin};
+use std::io::{BufRead, IsTerminal, Read, stderr, stdin, stdout};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -13,7 +13,7 @@ use crate::commission::{
 use crate::config::Quantity;
 use takt_rt::{Frame, Nanoseconds};
 
-use super::super::columns::paragraph;
+use super::super::columns::{columns, paragraph};
 use super::super::exit::Exit;
 use super::super::print;
 use super::Options;
@@ -122,12 +122,24 @@ impl Output {
 
     fn read(&mut self, at_ns: Nanoseconds, reading: &AxisReading) {
         let is_watched = self.action == "watch";
+        // Into a file or a pipe, all readings are printed, whatever the terminal shows meanwhile.
+        let has_lines = self.line.is_hidden() || !stdout().is_terminal();
         if is_watched && self.options.json {
             self.print(&format!("{}\n", self.reading_json(at_ns, reading)));
-        } else if is_watched && self.line.is_hidden() {
+        } else if is_watched && has_lines {
             self.print(&format!("{}  {}\n", seconds(at_ns), self.reading_words(reading)));
         } else {
-            self.line.set_message(format!("{}: {}", self.step, self.reading_words(reading)));
+            self.line.set_message(self.live_words(reading));
+        }
+    }
+
+    /// A reading for the line that is overwritten: as much as the terminal has room for.
+    fn live_words(&self, reading: &AxisReading) -> String {
+        let whole = format!("{}: {}", self.step, self.reading_words(reading));
+        let used = self.target.name.chars().count() + 2;
+        match columns().map(usize::from) {
+            Some(columns) if used + whole.chars().count() > columns => self.short_words(reading),
+            _ => whole,
         }
     }
 
@@ -163,6 +175,23 @@ impl Output {
         }
         let statusword = reading.statusword.map_or_else(String::new, |word| format!("0x{word:04X} "));
         format!("{words}  {statusword}{}", reading.state)
+    }
+
+    /// In one unit each, what matters most first.
+    fn short_words(&self, reading: &AxisReading) -> String {
+        let position = in_short_column(self.target.position_quantity(), reading.position);
+        let velocity = in_short_column(self.target.velocity_quantity(), reading.velocity);
+        let mut words = format!("{position}  {velocity}");
+        if let Some(torque) = reading.torque {
+            words = format!("{words}  {torque:>7.2} {}", self.target.effort_quantity().unit);
+        } else if let Some(current) = reading.current_a {
+            words = format!("{words}  {current:>7.2} A");
+        }
+        words = format!("{words}  {}", reading.state);
+        match reading.temperature_c {
+            Some(temperature) => format!("{words}  {temperature:.0} °C"),
+            None => words,
+        }
     }
 
     /// Reports that the procedure was not begun.
@@ -239,6 +268,15 @@ fn in_column(quantity: Quantity, value: f64) -> String {
         format!("{value:>9.4} {unit} ({:>9.2} {degrees})", value.to_degrees())
     } else {
         format!("{value:>9.4} {unit}")
+    }
+}
+
+/// The same in one unit, for narrow terminals.
+fn in_short_column(quantity: Quantity, value: f64) -> String {
+    let unit = quantity.unit;
+    match unit.starts_with("rad") {
+        true => format!("{:>8.2} {}", value.to_degrees(), unit.replace("rad", "deg")),
+        false => format!("{value:>8.4} {unit}"),
     }
 }
 

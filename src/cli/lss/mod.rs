@@ -18,6 +18,7 @@ use crate::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds};
 
+use super::columns::paragraph;
 use super::exit::Exit;
 use super::interruption;
 use super::usage_error::UsageError;
@@ -28,10 +29,14 @@ use simulated_device::{address, node};
 /// For the help: what those families have instead whose drives have no LSS.
 fn families_without_lss() -> String {
     let instead = family::all().into_iter().filter_map(|family| family.instead_of_lss());
-    let lines: Vec<String> = instead.map(|words| format!("  {words}")).collect();
+    let mut lines: Vec<String> = instead.map(|words| paragraph(&format!("  {words}"), 4)).collect();
+    // Several families have the same.
+    lines.dedup();
     format!("Drives without LSS:\n{}", lines.join("\n"))
 }
 
+/// In the help of an action, its own options come first.
+const OF_EVERY_ACTION: &str = "Options of every action";
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
 
@@ -46,30 +51,30 @@ pub struct Arguments {
     #[arg(long, value_name = "INTERFACE")]
     bus: Interface,
     /// The bit rate of the interface
-    #[arg(long, value_name = "RATE", global = true, value_parser = bit_rate, default_value = "1 Mbit/s")]
+    #[arg(long, value_name = "RATE", global = true, help_heading = OF_EVERY_ACTION, value_parser = bit_rate, default_value = "1 Mbit/s")]
     bit_rate: u32,
     /// The device with this identity (1018:1 to 4): VENDOR:PRODUCT:REVISION:SERIAL
-    #[arg(long, value_name = "IDENTITY", global = true, value_parser = address)]
+    #[arg(long, value_name = "IDENTITY", global = true, help_heading = OF_EVERY_ACTION, value_parser = address)]
     device: Option<LssAddress>,
     /// The only device on the bus, whatever it is
-    #[arg(long, global = true, conflicts_with = "device")]
+    #[arg(long, global = true, help_heading = OF_EVERY_ACTION, conflicts_with = "device")]
     only: bool,
     /// The time to wait for the answer to each of the 130 requests of a scan
     ///
     /// Longer waits are for slow devices and slow adapters: a device that answers too late is lost.
-    #[arg(long, value_name = "TIME", global = true, value_parser = scan_wait, default_value = "20 ms")]
+    #[arg(long, value_name = "TIME", global = true, help_heading = OF_EVERY_ACTION, value_parser = scan_wait, default_value = "20 ms")]
     scan_wait: Nanoseconds,
     /// A device on a simulated bus: IDENTITY, or IDENTITY@NODE where it has a node ID already
     ///
     /// Behind a comma it gets a behaviour: `canopennode` answers every scan request in configuration state,
     /// `no-boot-up` does not boot with its new node ID.
-    #[arg(long, value_name = "DEVICE", global = true)]
+    #[arg(long, value_name = "DEVICE", global = true, help_heading = OF_EVERY_ACTION)]
     simulate: Vec<SimulatedDevice>,
     /// Show every frame
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, help_heading = OF_EVERY_ACTION)]
     verbose: bool,
     /// Print the result as one JSON object
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = OF_EVERY_ACTION)]
     json: bool,
     #[command(subcommand)]
     action: Action,
