@@ -264,7 +264,7 @@ mod tests {
 
     #[test]
     fn an_entry_is_found_by_its_index_its_name_and_the_beginning_of_its_name() {
-        let find = |text: &str| super::find::<Entry>(text);
+        let find = |text: &str| find::<Entry>(text);
         for text in ["0x0086", "86", "0086", "absolute target position", "Absolute_Target", "absolute"] {
             assert_eq!(find(text), Ok(entries::TARGET_POSITION), "{text}");
         }
