@@ -407,25 +407,6 @@ fn motors_that_answer_commands_alone_are_asked_only_with_consent_and_by_what_sto
 }
 
 #[test]
-fn motors_in_mit_mode_are_found_by_their_replies_to_the_question_whatever_identifier_these_have() {
-    let configured =
-        Config::load(format!("{}/configs/damiao-arm.toml", env!("CARGO_MANIFEST_DIR")).as_ref()).unwrap();
-    let unasked = scan(&usual(), &mut SimulatedBus::new(&configured, 0));
-    assert!(unasked.found.devices.is_empty(), "{:#?}", unasked.found);
-    let what = BusScan { may_take_torque: true, ..usual() };
-    let outcome = scan(&what, &mut SimulatedBus::new(&configured, 0));
-    assert_eq!(outcome.nodes(), [Some(1), Some(2), Some(3)], "{:#?}", outcome.found);
-    for (node, reply) in [(1, "0x011"), (2, "0x012"), (3, "0x013")] {
-        let remarks = &outcome.node(node).remarks;
-        assert!(remarks.iter().any(|remark| remark.contains(reply)), "{remarks:?}");
-        assert!(
-            remarks.iter().any(|remark| remark.contains("a motor in MIT mode answers alike")),
-            "{remarks:?}"
-        );
-    }
-}
-
-#[test]
 fn motors_on_can_fd_are_asked_only_where_the_bus_carries_it() {
     let fd_bus = || {
         let text = BUS.replace("name = \"can\"\n", "name = \"can\"\ndata_bit_rate = \"5 Mbit/s\"\n")

@@ -14,7 +14,8 @@ use crate::config::{Config, Interface};
 use crate::controller::session::{self, Session, SessionOptions};
 use crate::controller::{Controller, StartFailure};
 use crate::faults::{FaultInjector, Scenario, ScenarioError, ScenarioFault};
-use crate::panel::{Listening, PanelError};
+use crate::monitor::BusDecoder;
+use crate::panel::{FrameSource, Listening, PanelError};
 use crate::schedule;
 use crate::serve::{self, ServeError, ServeOptions};
 use crate::telemetry::{EachCycle, Machine, Notice, RecordingDestination, RecordingOptions};
@@ -120,6 +121,7 @@ fn run_or_refuse(arguments: Arguments) -> Result<Exit, UsageError> {
         each_cycle: metrics.map(|metrics| -> EachCycle { Box::new(move |cycle| metrics.cycle(cycle)) }),
         fault_injector,
         if_owned: ownership::if_owned(arguments.take_over),
+        frames: listening.as_ref().map(|_| Arc::default()),
         sources,
     };
     let session = if serve.is_none() && listening.is_none() {
@@ -182,12 +184,14 @@ fn offered(
 ) -> Result<Session, NoSession> {
     let bar = watcher.bar.clone();
     let watch = move |snapshot: &Snapshot, progress| watcher.watch(snapshot, &progress);
+    let decoders = (0..config.buses.len()).map(|bus| BusDecoder::of(config, bus)).collect();
+    let frames = options.frames.clone().map(|feed| FrameSource { feed, decoders });
     let controller = Controller::start_watched(config.clone(), options, notify, watch)?;
     let server = serve
         .as_ref()
         .map(|(name, options)| serve::serve(controller.handle(), name, options.clone()))
         .transpose();
-    let panel = listening.map(|listening| listening.show(controller.handle(), None)).transpose();
+    let panel = listening.map(|listening| listening.show(controller.handle(), None, frames)).transpose();
     let (_server, panel) = match (server, panel) {
         (Ok(server), Ok(panel)) => (server, panel),
         (Err(error), _) => {

@@ -418,7 +418,7 @@ fn more_columns_show_more_of_each_axis_and_bus() {
     assert!(!wide.contains("- %"), "{wide}");
     assert!(wide.contains(" max  BUS"), "the histograms are whole beside the buses: {wide}");
     assert!(
-        wide.contains("TIMING   1µ  10µ  100µ   1m "),
+        wide.contains("TIMING   1µ  10µ  100µ    1m "),
         "no label of the scale touches another one: {wide}"
     );
 }

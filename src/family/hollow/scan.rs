@@ -61,13 +61,6 @@ impl OwnProtocol for CanScan {
         payload.first().copied().filter(|node| is_reply && MOTORS.contains(node))
     }
 
-    /// Eight bytes below that identifier, as motors in MIT mode send them. A motor with the ID of the reply has its commands there.
-    fn replying_when_asked(&self, frame: &Frame) -> Option<u8> {
-        let (id, payload) = low_frame(frame).filter(|(_, payload)| payload.len() == STOP.len())?;
-        let node = payload.first().copied().filter(|node| MOTORS.contains(node) && u32::from(*node) != id)?;
-        (!frame.is_fd()).then_some(node)
-    }
-
     fn consequence(&self) -> Option<&'static str> {
         Some(CONSEQUENCE)
     }

@@ -161,14 +161,10 @@ impl Heard {
 
     /// The protocol in which a frame is a reply, and the node that it comes from.
     fn replying(&self, frame: &Frame) -> Option<(usize, u8)> {
-        let was_asked = |place, node| self.drives.get(&(place, node)).is_some_and(|heard| heard.requests > 0);
-        let of_any = |(place, protocol): (usize, &&dyn OwnProtocol)| Some((place, protocol.replying(frame)?));
-        let of_asked = |(place, protocol): (usize, &&dyn OwnProtocol)| {
-            let node = protocol.replying_when_asked(frame).filter(|node| was_asked(place, *node))?;
-            Some((place, node))
-        };
-        let protocols = || self.protocols.iter().enumerate();
-        protocols().find_map(of_any).or_else(|| protocols().find_map(of_asked))
+        self.protocols
+            .iter()
+            .enumerate()
+            .find_map(|(place, protocol)| Some((place, protocol.replying(frame)?)))
     }
 
     /// Takes a frame of the pre-defined connection set (CiA 301, 7.3.3). Returns whether it is one.

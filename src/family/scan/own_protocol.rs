@@ -26,11 +26,6 @@ pub trait OwnProtocol: Sync + fmt::Debug {
     /// The node that a frame comes from, if it is a reply in this protocol.
     fn replying(&self, frame: &Frame) -> Option<u8>;
 
-    /// The node that a frame comes from, if it can only be told from a command because that node was asked.
-    fn replying_when_asked(&self, _frame: &Frame) -> Option<u8> {
-        None
-    }
-
     /// The identifier of the reply to a frame, if it is a request of this protocol that only reads.
     fn reply_to_reading(&self, _frame: &Frame) -> Option<Id> {
         None
