@@ -83,11 +83,6 @@ pub mod doctor {
 pub mod erob_can {
     pub use crate::erob_can::*;
 }
-
-pub mod erob_parameter {
-    pub use crate::erob_parameter::*;
-}
-
 pub mod family {
     pub mod erob {
         pub use crate::family::erob::*;

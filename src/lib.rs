@@ -80,7 +80,6 @@
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! canopen erob_can modbus             CiA 301, 305 and 306; eRob's own protocol; Modbus-RTU; all without I/O
-//! erob_parameter                      what the manuals say of a parameter of an eRob, in either protocol
 //! hollow_lines                        the serial lines of the hollow-shaft motors, without I/O
 //! channels                            the lock-free channels to the real-time thread
 //! bus_log                             logs of frames, as other programs write and read them
@@ -120,14 +119,6 @@ mod doctor;
     )
 )]
 mod erob_can;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(
-        unnameable_types,
-        reason = "the tables of two protocols name its types, and nobody outside names those tables"
-    )
-)]
-mod erob_parameter;
 pub mod error;
 pub mod family;
 pub mod faults;

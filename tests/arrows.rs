@@ -143,7 +143,7 @@ fn only_its_own_folder_and_the_simulation_name_a_family() {
     let mut files = rust_files("src");
     files.extend(rust_files("rt/src"));
     let is_of_family = |name: &str| {
-        let folders = ["erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402", "hollow"]
+        let folders = ["erob", "erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402", "hollow"]
             .map(|family| format!("src/family/{family}/"));
         name.starts_with("src/sim/")
             || name.starts_with("src/erob_can/")

@@ -6,7 +6,7 @@ mod rows;
 use rows::columns;
 use takt::internals::erob_can::entries::{self, Entry};
 use takt::internals::erob_can::frame::{EntryAddress, ReceivedRequest, Reply, Request, replying_node};
-use takt::internals::erob_parameter::{Access, Parameter, Unit};
+use takt::internals::erob_can::parameter::{Access, Parameter, Unit};
 use takt_rt::{Frame, Id};
 
 const VECTORS: &str = include_str!("vectors/erob-can.csv");

@@ -4,7 +4,7 @@
 mod rows;
 
 use rows::columns;
-use takt::internals::erob_parameter::{Access, Unit};
+use takt::internals::erob_can::parameter::{Access, Unit};
 use takt::internals::family::erob_modbus::register::{Number, Register};
 use takt::internals::family::erob_modbus::registers;
 use takt::internals::modbus::frame::{

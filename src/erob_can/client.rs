@@ -7,7 +7,7 @@ use takt_rt::{Frame, Id, Nanoseconds};
 use super::entries;
 use super::error_code::ErrorCode;
 use super::frame::{Reply, Request, replying_node};
-use crate::erob_parameter::Parameter as _;
+use crate::erob_can::parameter::Parameter as _;
 
 /// How long the client waits, and how often it asks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@
 use std::fmt;
 
 use super::frame::EntryAddress;
-use crate::erob_parameter::{Access, Parameter, Unit, Values};
+use crate::erob_can::parameter::{Access, Parameter, Unit, Values};
 
 /// An entry of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,6 +5,7 @@
 //! - [`entries`]: the table of parameters, variables and commands.
 //! - [`error_code`]: why a drive refuses a request, and the cure.
 //! - [`client`]: the master of one node, with one request at a time.
+//! - [`parameter`]: what the tables of the manuals say of a parameter, in this protocol and in Modbus-RTU.
 //! - [`module_information`]: serial number, model and versions, decoded.
 
 pub mod client;
@@ -12,3 +13,4 @@ pub mod entries;
 pub mod error_code;
 pub mod frame;
 pub mod module_information;
+pub mod parameter;

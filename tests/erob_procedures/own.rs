@@ -4,7 +4,7 @@ use takt::internals::erob_can::client::{RequestClient, RequestError, RequestFail
 use takt::internals::erob_can::entries;
 use takt::internals::erob_can::error_code::ErrorCode;
 use takt::internals::erob_can::frame::{ReceivedRequest, Request};
-use takt::internals::erob_parameter::Access;
+use takt::internals::erob_can::parameter::Access;
 use takt::internals::family::erob::motion::Motion;
 use takt::internals::family::erob::procedure::End;
 use takt::internals::family::erob_can::module;

@@ -347,7 +347,7 @@ impl Family for BitFieldFamily {
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {
-        Some("the IDs of a hollow-shaft motor, or of a motor in MIT mode, are set with its vendor's tool")
+        Some("the IDs of such a drive are set with its vendor's tool")
     }
 
     fn is_named_by_keys(&self) -> bool {

@@ -6,7 +6,7 @@ use std::fmt;
 use takt_rt::Nanoseconds;
 
 use super::motion::Motion;
-use crate::erob_parameter::Parameter;
+use crate::erob_can::parameter::Parameter;
 use crate::family::commission::{Failure, TargetDrive};
 use crate::procedure::{AxisReading, Client, ProcedureSession};
 

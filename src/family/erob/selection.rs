@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 
 use super::module::CommandedModule;
 use crate::config::Quantity;
-use crate::erob_parameter::{Access, Parameter, Unit, Values};
+use crate::erob_can::parameter::{Access, Parameter, Unit, Values};
 use crate::family::commission::command_value;
 use crate::family::commission::dictionary::integer;
 use crate::family::commission::{Failure, NamedEntry, Report, TargetDrive, ValueText};

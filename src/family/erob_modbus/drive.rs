@@ -5,7 +5,7 @@ use std::fmt;
 use super::fault_code::FaultCode;
 use super::register::Register;
 use super::registers;
-use crate::erob_parameter::ValueError;
+use crate::erob_can::parameter::ValueError;
 use crate::family::erob::module::Status;
 use crate::modbus::exception::ExceptionCode;
 use crate::modbus::frame::{RegisterRange, RegisterValues, Values};

@@ -5,7 +5,7 @@ use std::fmt;
 use arrayvec::ArrayVec;
 
 use super::registers;
-use crate::erob_parameter::{Access, Parameter, Unit, ValueError, Values};
+use crate::erob_can::parameter::{Access, Parameter, Unit, ValueError, Values};
 
 /// A register, or two that make one number of 32 bits: the high word has the lower address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 //! is argued in its companion table (`tests/vectors/erob-modbus-registers.csv`).
 
 use super::register::{Number, Register};
-use crate::erob_parameter::{Access, Unit, Values};
+use crate::erob_can::parameter::{Access, Unit, Values};
 
 /// The register at an address, if the table has it.
 pub fn find(address: u16) -> Option<&'static Register> {
@@ -304,7 +304,7 @@ pub static ALL: [Register; 60] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::erob_parameter::Parameter as _;
+    use crate::erob_can::parameter::Parameter as _;
 
     #[test]
     fn the_registers_stand_in_the_order_of_their_addresses_and_none_overlaps_another() {

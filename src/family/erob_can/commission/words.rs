@@ -4,7 +4,7 @@ use takt_rt::Frame;
 
 use crate::erob_can::entries;
 use crate::erob_can::frame::{ReceivedRequest, Reply, replying_node};
-use crate::erob_parameter::Access;
+use crate::erob_can::parameter::Access;
 use crate::family::commission::TargetDrive;
 use crate::family::erob::selection;
 use crate::family::erob_can::session::ErobCanSession;
