@@ -278,7 +278,7 @@ impl Packets {
         // The true length of a packet that is too long is not taken for one that fits.
         match recv(self.0.as_raw_fd(), &mut bytes, flags | MsgFlags::MSG_TRUNC) {
             Ok(length) if length > 0 && length <= bytes.len() && length % size_of::<u64>() == 0 => {
-                let (whole, _) = bytes.as_chunks::<{ size_of::<u64>() }>();
+                let (whole, _) = bytes.split_at(length).0.as_chunks::<{ size_of::<u64>() }>();
                 words.iter_mut().zip(whole).for_each(|(to, from)| *to = u64::from_ne_bytes(*from));
                 Received::Words(length / size_of::<u64>())
             }
