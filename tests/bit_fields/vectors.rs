@@ -187,7 +187,7 @@ fn assert_setup(row: &Row, more: &str, place: usize) {
 }
 
 fn assert_code(row: &Row, value: CommandValue, to: f64) {
-    let (_, compiled) = motor(HOLLOW, "");
+    let (axis, compiled) = motor(HOLLOW, "");
     let mut values = CommandValues::default();
     values.set(value, to);
     let frame = compiled.command.frame(&values);
@@ -198,6 +198,13 @@ fn assert_code(row: &Row, value: CommandValue, to: f64) {
         _ => u16::from_be_bytes([torque_high & 0xF, *torque_low]),
     };
     assert_eq!(code.to_be_bytes(), row.bytes[..], "{}", row.id);
+    let Command { position, velocity, torque, .. } = Command::read(device(&axis), frame.payload());
+    let (read, bits, full_scale) = match value {
+        CommandValue::Position => (position, 16, TAU),
+        CommandValue::Velocity => (velocity, 12, 200.0),
+        _ => (torque, 12, 4.0),
+    };
+    assert_eq!(read, centred(code.into(), bits, full_scale), "{}", row.id);
 }
 
 #[test]
