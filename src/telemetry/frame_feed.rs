@@ -32,7 +32,7 @@ pub struct FrameReader {
 
 impl FrameFeed {
     /// A reader of what comes from now on.
-    pub fn reader(&self) -> FrameReader {
+    pub(crate) fn reader(&self) -> FrameReader {
         let (sender, frames) = sync_channel(WAITING);
         let lost = Arc::<AtomicU64>::default();
         let reader = Reader { frames: sender, lost: Arc::clone(&lost) };
@@ -41,7 +41,7 @@ impl FrameFeed {
     }
 
     /// Passes frames to the readers that are there.
-    pub fn pass(&self, frames: &[OnBus<TracedFrame>]) {
+    pub(crate) fn pass(&self, frames: &[OnBus<TracedFrame>]) {
         let mut readers = self.readers.lock().unwrap_or_else(PoisonError::into_inner);
         readers.retain(|reader| frames.iter().all(|frame| reader.take(frame)));
     }
