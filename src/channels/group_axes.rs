@@ -28,18 +28,18 @@ impl GroupAxes {
         self.places.len()
     }
 
-    /// From the order of the group to that of the controller. What belongs to no axis of the group has the default.
-    pub fn spread<T: Copy + Default>(&self, of_group: [T; MAX_AXES]) -> [T; MAX_AXES] {
+    /// Brings values from the order of the group to that of the controller. What belongs to no axis of the group gets the default.
+    pub fn spread<T: Copy + Default>(&self, values: &mut [T; MAX_AXES]) {
         if self.are_own {
-            return of_group;
+            return;
         }
-        let mut all = [T::default(); MAX_AXES];
+        let of_group = *values;
+        *values = [T::default(); MAX_AXES];
         for (place, value) in self.places.iter().zip(of_group) {
-            if let Some(to) = all.get_mut(*place) {
+            if let Some(to) = values.get_mut(*place) {
                 *to = value;
             }
         }
-        all
     }
 
     /// From the order of the controller to that of the group.
@@ -57,13 +57,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_spread_is_picked_again_in_the_order_of_the_group() {
-        let places = GroupAxes::new(vec![5, 2, 3]);
-        let mut of_group = [0; MAX_AXES];
-        of_group[..3].copy_from_slice(&[10, 20, 30]);
-        let all = places.spread(of_group);
-        assert_eq!(all[..7], [0, 0, 20, 30, 0, 10, 0]);
-        assert_eq!((places.pick(&all), places.count()), (of_group, 3));
-        assert_eq!(GroupAxes::new(vec![0, 1]).spread(of_group), of_group);
+    fn each_value_is_spread_to_the_place_of_its_axis_and_picked_from_there() {
+        let of_group: [_; MAX_AXES] = std::array::from_fn(|axis| 10 * (axis + 1));
+        let (axes, mut values) = (GroupAxes::new(vec![5, 2, 3]), of_group);
+        axes.spread(&mut values);
+        assert_eq!((axes.count(), &values[..7]), (3, &[0, 0, 20, 30, 0, 10, 0][..]));
+        assert_eq!(axes.pick(&values)[..4], [10, 20, 30, 0]);
+        let mut values = of_group;
+        GroupAxes::new(vec![0, 1]).spread(&mut values);
+        assert_eq!(values, of_group);
     }
 }

@@ -34,6 +34,7 @@ mod words;
 
 use std::cell::Cell;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use takt_rt::{
     AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CallbackRun, CheckpointError,
@@ -68,7 +69,7 @@ pub(crate) use observed_events::EventWriter;
 pub use questions::{QUESTIONS_AT_MOST, Questions};
 pub use request_numbers::RequestNumbers;
 pub use ring::{Consumer, Producer, ring};
-pub use stream::{GroupStream, Streamer, chunk};
+pub use stream::{GroupStream, SentPoint, Streamer, chunk};
 pub use trajectories::{GivenTrajectory, NumberedTrajectory, TrajectoryGiver};
 use words::take_snapshot_into;
 pub(crate) use words::{put_snapshot, snapshot_words, take_snapshot};
@@ -158,7 +159,10 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         questions: Questions::default(),
         received: received_out,
         off_cycle_reports: report_in,
-        observer: Observer { snapshot: snapshot_out },
+        observer: Observer {
+            snapshot: snapshot_out,
+            number: CONTROLLERS.fetch_add(1, Ordering::Relaxed) + 1,
+        },
     };
     (rt, host, LogSide { records: record_out, events: event_out })
 }
@@ -247,14 +251,14 @@ impl HostInterface for RtSide {
         }
     }
 
-    fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
+    fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds, sample: &mut StreamSample) {
         let Self { streams, journal, .. } = self;
-        let Some(stream) = streams.get_mut(usize::from(group)) else { return StreamSample::default() };
-        stream.sample(slot_start_ns, |point| {
+        let Some(stream) = streams.get_mut(usize::from(group)) else { return };
+        stream.sample(slot_start_ns, sample, |point| {
             if let Some(journal) = journal {
                 journal.note(HostInput::Point { group, point: *point });
             }
-        })
+        });
     }
 
     fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {
@@ -481,15 +485,29 @@ impl HostSide {
     }
 }
 
+/// The last state that a thread has looked at, of any controller. What a later one does not count stays in it.
+#[derive(Default)]
+struct LookedAt {
+    /// The number of the observers of that controller; 0 for none.
+    observers: u64,
+    /// The number of the state in its mailbox.
+    number: u64,
+    snapshot: Snapshot,
+}
+
+/// The controllers that this process has had.
+static CONTROLLERS: AtomicU64 = AtomicU64::new(0);
+
 thread_local! {
-    /// The last state that this thread has looked at, of any controller. What a later one does not count stays in it.
-    static LOOKED_AT: Cell<Option<Box<Snapshot>>> = const { Cell::new(None) };
+    static LOOKED_AT: Cell<Option<Box<LookedAt>>> = const { Cell::new(None) };
 }
 
 /// Reads the state of the controller at any time, without disturbing it. Clone it for every thread.
 #[derive(Clone)]
 pub struct Observer {
     snapshot: Reader,
+    /// Another one for the observers of each controller of this process.
+    number: u64,
 }
 
 impl Observer {
@@ -502,11 +520,26 @@ impl Observer {
 
     /// Shows that state to `look`, without a copy: a snapshot has twelve kilobytes, most of which do not count.
     pub fn look<T>(&self, look: impl FnOnce(&Snapshot) -> T) -> T {
-        let mut snapshot = LOOKED_AT.take().unwrap_or_default();
-        self.read(&mut snapshot);
-        let seen = look(&snapshot);
-        LOOKED_AT.set(Some(snapshot));
+        let mut looked_at = LOOKED_AT.take().unwrap_or_default();
+        self.update(&mut looked_at);
+        let seen = look(&looked_at.snapshot);
+        LOOKED_AT.set(Some(looked_at));
         seen
+    }
+
+    /// Reads the state, unless it is the one that is there.
+    fn update(&self, looked_at: &mut LookedAt) {
+        let newest = if looked_at.observers == self.number { looked_at.number } else { 0 };
+        loop {
+            match self.snapshot.attempt(newest, |words| take_snapshot_into(words, &mut looked_at.snapshot)) {
+                Attempt::Whole((), number) => {
+                    (looked_at.observers, looked_at.number) = (self.number, number);
+                    return;
+                }
+                Attempt::Nothing if newest > 0 => return,
+                Attempt::Torn | Attempt::Nothing => std::hint::spin_loop(),
+            }
+        }
     }
 
     /// The same, written over an earlier one of this controller, or over [`Snapshot::default`].
@@ -618,6 +651,20 @@ mod tests {
         assert_eq!(host.take_service(), Some((0, received)));
         assert_eq!(host.take_service(), Some((1, received)));
         assert_eq!(host.take_service(), None);
+    }
+
+    #[test]
+    fn a_thread_that_looks_at_two_controllers_in_turn_sees_the_newest_state_of_each() {
+        let (mut first, first_host, _log) = channels(&sizes());
+        let (mut second, second_host, _log) = channels(&sizes());
+        for slot in 1..5 {
+            first.publish(&Snapshot { slot, ..Snapshot::default() });
+            for (host, seen) in [(&first_host, slot), (&second_host, 2 * (slot - 1)), (&first_host, slot)] {
+                assert_eq!(host.observer().look(|state| state.slot), seen);
+            }
+            second.publish(&Snapshot { slot: 2 * slot, ..Snapshot::default() });
+            assert_eq!(second_host.observer().look(|state| state.slot), 2 * slot);
+        }
     }
 
     #[test]

@@ -96,6 +96,12 @@ impl<T> Consumer<T> {
         Some(item)
     }
 
+    /// The number of items that can be taken out now.
+    pub fn waiting(&mut self) -> usize {
+        self.pushed = self.shared.pushed.load(Ordering::Acquire);
+        (self.pushed - self.popped) as usize
+    }
+
     /// The number of items put in since the ring was made.
     pub fn pushed(&self) -> u64 {
         self.shared.pushed.load(Ordering::Acquire)
@@ -115,7 +121,7 @@ mod tests {
     fn items_come_out_in_order_and_a_full_ring_drops_and_counts_the_newest() {
         let (mut producer, mut consumer) = ring(3);
         assert_eq!([1, 2, 3, 4, 5].map(|item| producer.push(item)), [true, true, true, false, false]);
-        assert_eq!((consumer.pushed(), consumer.dropped()), (3, 2));
+        assert_eq!((consumer.waiting(), consumer.pushed(), consumer.dropped()), (3, 3, 2));
         assert_eq!(consumer.pop(), Some(1));
         assert!(producer.push(6));
         assert_eq!(std::iter::from_fn(|| consumer.pop()).collect::<Vec<_>>(), [2, 3, 6]);

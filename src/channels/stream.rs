@@ -31,19 +31,65 @@ pub struct GroupStream {
     pub look_ahead: LookAheadParameters,
 }
 
+/// A point of a stream as a client has it, with an entry for each axis that it is for.
+#[derive(Clone, Copy)]
+pub struct SentPoint<'a> {
+    /// The time that it is meant for.
+    pub at_ns: Nanoseconds,
+    /// How it is put among the others.
+    pub role: PointRole,
+    /// What it says of each axis.
+    pub axes: &'a [AxisPoint],
+}
+
+impl<'a> From<&'a StreamPoint> for SentPoint<'a> {
+    fn from(point: &'a StreamPoint) -> Self {
+        Self { at_ns: point.at_ns, role: point.role, axes: &point.axes }
+    }
+}
+
+impl<'a> From<&'a SentPoint<'a>> for SentPoint<'a> {
+    fn from(point: &'a SentPoint<'a>) -> Self {
+        *point
+    }
+}
+
 /// The writing ends of the points of every group's stream. Clone it for every thread.
 #[derive(Clone)]
 pub struct Streamer(Arc<[StreamWriter]>);
 
 struct StreamWriter {
     axes: GroupAxes,
-    points: Mutex<Producer<StreamPoint>>,
+    points: Mutex<PointSender>,
 }
 
 impl StreamWriter {
-    fn lock(&self) -> MutexGuard<'_, Producer<StreamPoint>> {
-        // A panic of another holder of the lock leaves the ring consistent.
+    fn lock(&self) -> MutexGuard<'_, PointSender> {
+        // A panic of another holder of the lock leaves the rings consistent.
         self.points.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The clients' end of the points of a group. A point has room for many more axes than most groups have: it is written where it is, and
+/// only the axes of the group.
+struct PointSender {
+    waiting: Producer<Box<StreamPoint>>,
+    free: Consumer<Box<StreamPoint>>,
+}
+
+impl PointSender {
+    fn room(&mut self) -> usize {
+        self.free.waiting()
+    }
+
+    /// Sends a point that there is room for. `axis` is what it says of each axis of the group, in the order of the group.
+    fn send<'a>(&mut self, sent: SentPoint<'a>, axes: impl Iterator<Item = Option<&'a AxisPoint>>) {
+        let Some(mut point) = self.free.pop() else { return };
+        (point.at_ns, point.role) = (sent.at_ns, sent.role);
+        for (to, from) in point.axes.iter_mut().zip(axes) {
+            *to = from.copied().unwrap_or_default();
+        }
+        self.waiting.push(point);
     }
 }
 
@@ -55,26 +101,32 @@ pub fn stream_channels(groups: &[GroupStream]) -> (Streamer, Vec<StreamReceiver>
 }
 
 fn stream_channel(group: &GroupStream) -> (StreamWriter, StreamReceiver) {
-    let (producer, waiting) = ring(WAITING_POINTS);
+    let (sent, waiting) = ring(WAITING_POINTS);
+    // Every point is in one of both rings, so neither is ever full.
+    let (mut given_back, free) = ring(WAITING_POINTS);
+    (0..WAITING_POINTS).for_each(|_| {
+        given_back.push(Box::default());
+    });
     let points = vec![StreamPoint::default(); LOOK_AHEAD_POINTS].into_boxed_slice();
     let look_ahead = Box::new(LookAhead::new(points, group.look_ahead.clone()));
-    let writer = StreamWriter { axes: group.axes.clone(), points: Mutex::new(producer) };
-    (writer, StreamReceiver { axes: group.axes.clone(), waiting, look_ahead })
+    let sender = PointSender { waiting: sent, free };
+    let writer = StreamWriter { axes: group.axes.clone(), points: Mutex::new(sender) };
+    (writer, StreamReceiver { axes: group.axes.clone(), waiting, free: given_back, look_ahead })
 }
 
 /// A chunk: points from a time on, at equal intervals. It takes the place of every point from its first one on that came before
 /// it.
-pub fn chunk(
+pub fn chunk<A: AsRef<[AxisPoint]>>(
     from_ns: Nanoseconds,
     interval_ns: Nanoseconds,
-    points: &[[AxisPoint; MAX_AXES]],
-) -> Vec<StreamPoint> {
+    points: &[A],
+) -> Vec<SentPoint<'_>> {
     let stamps_ns = (0..).map(|number: u64| from_ns.saturating_add(number.saturating_mul(interval_ns)));
     let stamped = points.iter().zip(stamps_ns).enumerate();
     stamped
         .map(|(index, (axes, at_ns))| {
             let role = PointRole::Chunk { is_first: index == 0, is_last: index + 1 == points.len() };
-            StreamPoint { at_ns, role, axes: *axes }
+            SentPoint { at_ns, role, axes: axes.as_ref() }
         })
         .collect()
 }
@@ -84,15 +136,18 @@ impl Streamer {
     ///
     /// # Errors
     /// [`ChannelError::Full`] if there is no room for all of them.
-    pub fn push(&self, points: &[StreamPoint]) -> Result<(), ChannelError> {
+    pub fn push<'a, P>(&self, points: &'a [P]) -> Result<(), ChannelError>
+    where
+        &'a P: Into<SentPoint<'a>>,
+    {
         // Every thread takes the locks in this order.
         let mut writers: Vec<_> = self.0.iter().map(|writer| (&writer.axes, writer.lock())).collect();
-        if writers.iter_mut().any(|(_, producer)| producer.room() < points.len()) {
+        if writers.iter_mut().any(|(_, sender)| sender.room() < points.len()) {
             return Err(ChannelError::Full);
         }
-        for (places, producer) in &mut writers {
-            for point in points {
-                producer.push(StreamPoint { axes: places.pick(&point.axes), ..*point });
+        for (axes, sender) in &mut writers {
+            for point in points.iter().map(Into::into) {
+                sender.send(point, axes.places().iter().map(|place| point.axes.get(*place)));
             }
         }
         Ok(())
@@ -103,15 +158,18 @@ impl Streamer {
     ///
     /// # Errors
     /// [`ChannelError::Full`] if there is no room for all of them.
-    pub fn push_to(&self, group: u8, points: &[StreamPoint]) -> Result<(), ChannelError> {
+    pub fn push_to<'a, P>(&self, group: u8, points: &'a [P]) -> Result<(), ChannelError>
+    where
+        &'a P: Into<SentPoint<'a>>,
+    {
         let writer = self.0.get(usize::from(group)).ok_or(ChannelError::Full)?;
-        let mut producer = writer.lock();
-        if producer.room() < points.len() {
+        let mut sender = writer.lock();
+        if sender.room() < points.len() {
             return Err(ChannelError::Full);
         }
-        points.iter().for_each(|point| {
-            producer.push(*point);
-        });
+        for point in points.iter().map(Into::into) {
+            sender.send(point, (0..writer.axes.places().len()).map(|axis| point.axes.get(axis)));
+        }
         Ok(())
     }
 }
@@ -119,7 +177,9 @@ impl Streamer {
 /// The real-time thread's end of the stream of a group.
 pub struct StreamReceiver {
     axes: GroupAxes,
-    waiting: Consumer<StreamPoint>,
+    waiting: Consumer<Box<StreamPoint>>,
+    /// Points that have been used go back here.
+    free: Producer<Box<StreamPoint>>,
     look_ahead: Box<LookAhead<MAX_AXES, Box<[StreamPoint]>>>,
 }
 
@@ -142,22 +202,26 @@ impl StreamReceiver {
         self.look_ahead.begin();
     }
 
-    /// What the stream wants of the axes of the controller in the slot that begins at this time. `note` is told of each point that is
+    /// Writes what the stream wants of the axes of the controller in the slot that begins at this time. `note` is told of each point that is
     /// taken. Nothing here allocates, locks or waits.
-    pub fn sample(&mut self, slot_start_ns: Nanoseconds, mut note: impl FnMut(&StreamPoint)) -> StreamSample {
+    pub fn sample(
+        &mut self,
+        slot_start_ns: Nanoseconds,
+        sample: &mut StreamSample,
+        mut note: impl FnMut(&StreamPoint),
+    ) {
         for _ in 0..POINTS_PER_CYCLE {
             let Some(point) = self.waiting.pop() else { break };
             note(&point);
             // A point that is of no use is counted.
             let _ = self.look_ahead.insert(&point, slot_start_ns);
+            self.free.push(point);
         }
-        let sample = self.look_ahead.sample(slot_start_ns);
-        let wish = match sample.wish {
-            StreamWish::Awaited => StreamWish::Awaited,
-            StreamWish::Targets(targets) => StreamWish::Targets(self.axes.spread(targets)),
-            StreamWish::Dry(last) => StreamWish::Dry(self.axes.spread(last)),
-        };
-        StreamSample { wish, ..sample }
+        self.look_ahead.sample(slot_start_ns, sample);
+        match &mut sample.wish {
+            StreamWish::Awaited => {}
+            StreamWish::Targets(targets) | StreamWish::Dry(targets) => self.axes.spread(targets),
+        }
     }
 }
 
@@ -186,6 +250,12 @@ mod tests {
         (0..count).map(|number| [AxisPoint::position(of(number)); MAX_AXES]).collect()
     }
 
+    fn sampled(receiver: &mut StreamReceiver, slot_start_ns: Nanoseconds) -> StreamSample {
+        let mut sample = StreamSample::default();
+        receiver.sample(slot_start_ns, &mut sample, |_| {});
+        sample
+    }
+
     fn wanted(sample: &StreamSample) -> f64 {
         let StreamWish::Targets([AxisTarget::Position { state: first, .. }, ..]) = sample.wish else {
             panic!("{:?}", sample.wish)
@@ -196,7 +266,7 @@ mod tests {
     #[test]
     fn points_of_any_thread_are_wanted_at_their_time() {
         let (streamer, mut receiver) = channel();
-        assert_eq!(receiver.sample(MILLISECOND_NS, |_| {}).wish, StreamWish::Awaited);
+        assert_eq!(sampled(&mut receiver, MILLISECOND_NS).wish, StreamWish::Awaited);
         let chunk = positions(|number| 0.01 * f64::from(number), 20);
         let threads: Vec<_> = (0..2)
             .map(|half| {
@@ -214,12 +284,12 @@ mod tests {
         threads.into_iter().for_each(|thread| thread.join().unwrap());
         // One thread may have been first with all of its points, and a cycle takes only some of them.
         for at_ms in 2..4 {
-            receiver.sample(at_ms * MILLISECOND_NS, |_| {});
+            sampled(&mut receiver, at_ms * MILLISECOND_NS);
         }
-        assert_eq!(wanted(&receiver.sample(4 * MILLISECOND_NS, |_| {})), 0.0);
+        assert_eq!(wanted(&sampled(&mut receiver, 4 * MILLISECOND_NS)), 0.0);
         for at_ms in 60..150 {
             let expected = 0.001 * (at_ms - 10) as f64;
-            let wanted = wanted(&receiver.sample(at_ms * MILLISECOND_NS, |_| {}));
+            let wanted = wanted(&sampled(&mut receiver, at_ms * MILLISECOND_NS));
             assert!((wanted - expected).abs() < 1e-9, "{wanted} for {expected}");
         }
     }
@@ -227,12 +297,13 @@ mod tests {
     #[test]
     fn a_chunk_without_room_is_an_error_and_leaves_nothing() {
         let (streamer, mut receiver) = channel();
-        let chunk = chunk(0, MILLISECOND_NS, &positions(|_| 1.0, 300));
+        let points = positions(|_| 1.0, 300);
+        let chunk = chunk(0, MILLISECOND_NS, &points);
         assert_eq!(streamer.push(&chunk), Err(ChannelError::Full));
-        assert_eq!(receiver.sample(MILLISECOND_NS, |_| {}).wish, StreamWish::Awaited);
+        assert_eq!(sampled(&mut receiver, MILLISECOND_NS).wish, StreamWish::Awaited);
         streamer.push(&chunk[..256]).unwrap();
         assert_eq!(streamer.push(&chunk[..1]), Err(ChannelError::Full));
-        receiver.sample(2 * MILLISECOND_NS, |_| {});
+        sampled(&mut receiver, 2 * MILLISECOND_NS);
         assert_eq!(receiver.look_ahead.counts().points, POINTS_PER_CYCLE as u64);
         streamer.push(&chunk[..POINTS_PER_CYCLE]).unwrap();
     }
@@ -241,9 +312,7 @@ mod tests {
     fn each_group_gets_the_points_of_its_own_axes_in_its_own_order() {
         let (streamer, mut receivers) = stream_channels(&[group(&[2, 0]), group(&[1])]);
         let wanted = |receiver: &mut StreamReceiver, axis: usize| {
-            let StreamWish::Targets(targets) = receiver.sample(20 * MILLISECOND_NS, |_| {}).wish else {
-                panic!()
-            };
+            let StreamWish::Targets(targets) = sampled(receiver, 20 * MILLISECOND_NS).wish else { panic!() };
             let AxisTarget::Position { state, .. } = targets[axis] else { panic!("{targets:?}") };
             state.position
         };

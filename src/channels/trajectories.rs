@@ -31,8 +31,9 @@ impl GivenTrajectory {
 
     /// What it wants of the axes of the controller so many seconds after its beginning.
     pub fn sample(&self, at_s: f64) -> TrajectorySample {
-        let sample = self.trajectory.sample(at_s);
-        TrajectorySample { states: self.axes.spread(sample.states), ..sample }
+        let mut sample = self.trajectory.sample(at_s);
+        self.axes.spread(&mut sample.states);
+        sample
     }
 
     /// Its axes.

@@ -129,8 +129,8 @@ impl HostInterface for ReplayHost {
         self.rt.begin_stream(group);
     }
 
-    fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds) -> StreamSample {
-        self.rt.stream(group, slot_start_ns)
+    fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds, sample: &mut StreamSample) {
+        self.rt.stream(group, slot_start_ns, sample);
     }
 
     fn trajectory(&mut self, group: u8, trajectory: TrajectoryId, at_s: f64) -> Option<TrajectorySample> {

@@ -111,13 +111,15 @@ impl Parts {
         }
     }
 
-    fn points(&self, py: Python<'_>, axes: usize) -> PyResult<Vec<Vec<AxisPoint>>> {
-        let row = |row| (0..axes).map(|axis| self.point(row, axis)).collect::<Option<Vec<_>>>();
-        (0..self.rows).map(row).collect::<Option<_>>().filter(|_| self.rows > 0).ok_or_else(|| {
-            let words =
-                "a point has positions, with or without the rest; or velocities alone; or torques alone";
-            raise_argument(py, words)
-        })
+    /// One point, for each of so many axes.
+    fn row(&self, py: Python<'_>, row: usize, axes: usize) -> PyResult<Vec<AxisPoint>> {
+        let mut points = Vec::with_capacity(axes);
+        points.extend((0..axes).map_while(|axis| self.point(row, axis)));
+        if row < self.rows && points.len() == axes {
+            return Ok(points);
+        }
+        let words = "a point has positions, with or without the rest; or velocities alone; or torques alone";
+        Err(raise_argument(py, words))
     }
 }
 
@@ -195,11 +197,10 @@ impl Stream {
             Ok(Table { rows: 1, columns: values.len(), values })
         };
         let parts = Given { q, qd, qdd, torque, kp, kd }.read(py, self.axes.len(), row)?;
-        let points = parts.points(py, self.axes.len())?;
+        let point = parts.row(py, 0, self.axes.len())?;
         self.check_followed(py, controller)?;
         let at_ns = self.stamp(py, controller, "t", t)?;
-        let handed = py
-            .detach(|| points.iter().try_for_each(|point| controller.push_point(self.target, at_ns, point)));
+        let handed = py.detach(|| controller.push_point(self.target, at_ns, &point));
         self.handed(py, handed)
     }
 
@@ -222,7 +223,9 @@ impl Stream {
         let controller = self.link.controller(py)?;
         let interval = duration(py, "dt", dt)?;
         let parts = Given { q, qd, qdd, torque, kp, kd }.read(py, self.axes.len(), array::table)?;
-        let points = parts.points(py, self.axes.len())?;
+        // A chunk without points is refused as a point without parts is.
+        let rows = 0..parts.rows.max(1);
+        let points = rows.map(|row| parts.row(py, row, self.axes.len())).collect::<PyResult<Vec<_>>>()?;
         self.check_followed(py, controller)?;
         let from_ns = self.stamp(py, controller, "t0", t0)?;
         let handed = py.detach(|| controller.push_chunk(self.target, from_ns, interval, &points));

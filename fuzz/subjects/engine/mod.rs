@@ -138,9 +138,11 @@ impl HostInterface for Hall {
         self.points.begin();
     }
 
-    fn stream(&mut self, _group: u8, slot_start_ns: u64) -> StreamSample {
-        let sample = self.points.sample(slot_start_ns);
-        StreamSample { wish: self.wish.take().unwrap_or(sample.wish), ..sample }
+    fn stream(&mut self, _group: u8, slot_start_ns: u64, sample: &mut StreamSample) {
+        self.points.sample(slot_start_ns, sample);
+        if let Some(wish) = self.wish.take() {
+            sample.wish = wish;
+        }
     }
 
     fn take_callback(&mut self, _group: u8, _callback: CallbackId) -> bool {

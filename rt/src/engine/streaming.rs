@@ -40,7 +40,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 host.begin_stream(number);
                 *stream = Stream::Awaited;
             }
-            group.stream = host.stream(number, slot_start_ns);
+            host.stream(number, slot_start_ns, &mut group.stream);
         }
     }
 }

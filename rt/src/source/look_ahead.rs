@@ -99,7 +99,7 @@ enum Playback {
 /// `P` is the storage: a slice, an array or a box of points. At most [`POINTS_AT_MOST`] of them are used.
 ///
 /// ```
-/// use takt_rt::{AxisLimits, AxisPoint, AxisTarget, LookAhead, LookAheadParameters, StreamDelay, StreamPoint, StreamWish};
+/// use takt_rt::{AxisLimits, AxisPoint, AxisTarget, LookAhead, LookAheadParameters, StreamDelay, StreamPoint, StreamSample, StreamWish};
 ///
 /// let limits = [AxisLimits::NONE].into_iter().collect();
 /// let parameters = LookAheadParameters { limits, period_ns: 1_000_000, delay: StreamDelay::Fixed(40_000_000) };
@@ -110,7 +110,9 @@ enum Playback {
 ///     let point = StreamPoint { at_ns: 10_000_000 * number as u64, axes, ..StreamPoint::default() };
 ///     stream.insert(&point, 0).unwrap();
 /// }
-/// let StreamWish::Targets([AxisTarget::Position { state: wanted, .. }]) = stream.sample(145_000_000).wish else { panic!() };
+/// let mut sample = StreamSample::default();
+/// stream.sample(145_000_000, &mut sample);
+/// let StreamWish::Targets([AxisTarget::Position { state: wanted, .. }]) = sample.wish else { panic!() };
 /// assert!((wanted.position - 0.0105).abs() < 1e-12 && (wanted.velocity - 0.1).abs() < 1e-12);
 /// ```
 #[derive(Clone, Debug)]
@@ -337,7 +339,11 @@ where
         self.revision += 1;
         let Some(place) = self.places.get(index).copied() else { return };
         if let Some(kept) = self.points.as_mut().get_mut(usize::from(place)) {
-            *kept = *point;
+            (kept.at_ns, kept.role) = (point.at_ns, point.role);
+            // A point has room for many more axes than most groups have.
+            for (to, from) in kept.axes.iter_mut().zip(&point.axes).take(self.limits.len()) {
+                *to = *from;
+            }
         }
     }
 
@@ -372,22 +378,22 @@ where
         }
     }
 
-    /// What the points want of every axis in the slot of this time. Ask for it once a slot: time goes on with it.
-    pub fn sample(&mut self, at_ns: Nanoseconds) -> StreamSample<AXES> {
+    /// Writes what the points want of every axis in the slot of this time. Ask for it once a slot: time goes on with it. Of axes that
+    /// the stream does not have, nothing is written.
+    pub fn sample(&mut self, at_ns: Nanoseconds, sample: &mut StreamSample<AXES>) {
         let elapsed_ns = self.sampled_ns.map_or(0, |last_ns| at_ns.saturating_sub(last_ns));
         self.sampled_ns = Some(at_ns);
         match self.playback {
             Playback::Following => self.delay.advance(elapsed_ns),
             Playback::Awaited | Playback::Leading | Playback::Dry => self.delay.settle(),
         }
-        let mut sample = StreamSample { wish: StreamWish::Awaited, counts: self.counts() };
-        // Written where it is to be: it is large.
+        sample.counts = self.counts();
         self.put_wish(at_ns, &mut sample.wish);
-        sample
     }
 
     fn put_wish(&mut self, at_ns: Nanoseconds, wish: &mut StreamWish<AXES>) {
         let (Some(first_ns), Some(last_ns)) = (self.stamps().first().copied(), self.last_stamp()) else {
+            *wish = StreamWish::Awaited;
             return;
         };
         let played_ns = self.play_time(at_ns);
@@ -396,9 +402,9 @@ where
             let waited_ns = at_ns.saturating_sub(self.arrived_ns.max(first_ns));
             if is_alone && waited_ns > SINGLE_POINT_NS {
                 self.playback = Playback::Dry;
-                *wish = StreamWish::Dry(self.at_rest(0));
+                wish.put_dry(|targets| self.put_at_rest(0, targets));
             } else {
-                *wish = StreamWish::Targets(self.at_rest(0));
+                wish.put_targets(|targets| self.put_at_rest(0, targets));
             }
             return;
         }
@@ -407,25 +413,22 @@ where
             self.playback = Playback::Dry;
         }
         if self.playback == Playback::Dry {
-            *wish = StreamWish::Dry(self.at_rest(self.count - 1));
+            wish.put_dry(|targets| self.put_at_rest(self.count - 1, targets));
         } else {
             self.playback = Playback::Following;
-            *wish = StreamWish::Targets(self.interpolated(played_ns));
+            wish.put_targets(|targets| self.put_interpolated(played_ns, targets));
         }
     }
 
-    fn at_rest(&self, index: usize) -> [AxisTarget; AXES] {
-        let mut targets = [AxisTarget::default(); AXES];
-        if let Some(point) = self.point(index) {
-            for (target, axis) in targets.iter_mut().zip(&point.axes).take(self.limits.len()) {
-                *target = axis.at_rest();
-            }
+    fn put_at_rest(&self, index: usize, targets: &mut [AxisTarget; AXES]) {
+        let Some(point) = self.point(index) else { return };
+        for (target, axis) in targets.iter_mut().zip(&point.axes).take(self.limits.len()) {
+            *target = axis.at_rest();
         }
-        targets
     }
 
     /// The motion between the points at a time, or behind the last one.
-    fn interpolated(&mut self, played_ns: Nanoseconds) -> [AxisTarget; AXES] {
+    fn put_interpolated(&mut self, played_ns: Nanoseconds, targets: &mut [AxisTarget; AXES]) {
         let behind = self.stamps().partition_point(|stamp| *stamp <= played_ns);
         // From the last but one on there is nothing behind the interval.
         let begin = behind.saturating_sub(1).min(self.count.saturating_sub(2));
@@ -441,11 +444,9 @@ where
             rate: 1.0 / seconds(self.stamp(begin + 1).wrapping_sub(begin_ns)),
             time_rate: self.delay.time_rate(),
         };
-        let mut targets = [AxisTarget::default(); AXES];
         for (target, (piece, limits)) in targets.iter_mut().zip(self.pieces.iter().zip(&self.limits)) {
             *target = piece.target(&time, limits);
         }
-        targets
     }
 
     /// Makes the motions of the interval that begins with this point.

@@ -333,6 +333,28 @@ pub enum StreamWish<const AXES: usize = MAX_AXES> {
     Dry([AxisTarget; AXES]),
 }
 
+impl<const AXES: usize> StreamWish<AXES> {
+    /// From now on it is [`StreamWish::Targets`], as `put` writes them: they are large, and stay where they are.
+    pub(super) fn put_targets(&mut self, put: impl FnOnce(&mut [AxisTarget; AXES])) {
+        if !matches!(self, Self::Targets(_)) {
+            *self = Self::Targets([AxisTarget::default(); AXES]);
+        }
+        if let Self::Targets(targets) = self {
+            put(targets);
+        }
+    }
+
+    /// The same of [`StreamWish::Dry`].
+    pub(super) fn put_dry(&mut self, put: impl FnOnce(&mut [AxisTarget; AXES])) {
+        if !matches!(self, Self::Dry(_)) {
+            *self = Self::Dry([AxisTarget::default(); AXES]);
+        }
+        if let Self::Dry(targets) = self {
+            put(targets);
+        }
+    }
+}
+
 /// What a stream wants in one slot, and how it has gone so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]

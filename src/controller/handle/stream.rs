@@ -3,12 +3,13 @@
 use std::cell::OnceCell;
 use std::time::Duration;
 
+use arrayvec::ArrayVec;
 use takt_rt::{
     AxisPoint, MAX_AXES, Nanoseconds, PointRole, Request, RequestTarget, Snapshot, StreamPoint, StreamReport,
 };
 
 use super::{GroupHandle, Handle};
-use crate::channels::chunk;
+use crate::channels::{SentPoint, chunk};
 use crate::command::{CommandError, RunningController, StreamError, check_point};
 
 /// Hands points to the stream of a group, or to those of all groups, from any thread. Clones are cheap and equal.
@@ -33,6 +34,9 @@ enum StreamTarget {
     Group { number: u8, axes: usize },
 }
 
+/// What a point says of each axis that it is for.
+type Entries = ArrayVec<AxisPoint, MAX_AXES>;
+
 impl StreamHandle {
     /// The present time on the clock of the stamps: see [`Handle::now_ns`].
     pub fn now_ns(&self) -> Nanoseconds {
@@ -45,8 +49,9 @@ impl StreamHandle {
     /// # Errors
     /// See [`StreamError`].
     pub fn push<P: Copy + Into<AxisPoint>>(&self, at_ns: Nanoseconds, axes: &[P]) -> Result<(), StreamError> {
-        let axes = self.entries(0, axes)?;
-        self.hand_over(&[StreamPoint { at_ns, role: PointRole::Single, axes }])
+        let mut entries = ArrayVec::new();
+        self.check_entries(0, axes, &mut entries)?;
+        self.hand_over(&[SentPoint { at_ns, role: PointRole::Single, axes: &entries }])
     }
 
     /// The same as [`StreamHandle::push`] for a point that is meant for now.
@@ -68,10 +73,12 @@ impl StreamHandle {
         interval: Duration,
         points: &[A],
     ) -> Result<(), StreamError> {
-        let entries = |(index, axes): (usize, &A)| self.entries(index, axes.as_ref());
-        let points = points.iter().enumerate().map(entries).collect::<Result<Vec<_>, _>>()?;
+        let mut entries = vec![Entries::new(); points.len()];
+        for (index, (entries, axes)) in entries.iter_mut().zip(points).enumerate() {
+            self.check_entries(index, axes.as_ref(), entries)?;
+        }
         let interval_ns = u64::try_from(interval.as_nanos()).unwrap_or(u64::MAX);
-        self.hand_over(&chunk(from_ns, interval_ns, &points))
+        self.hand_over(&chunk(from_ns, interval_ns, &entries))
     }
 
     /// Takes points that are stamped already, with an entry for each axis: all of them, or none.
@@ -105,7 +112,10 @@ impl StreamHandle {
         Duration::from_nanos(self.report().counts.lag_ns)
     }
 
-    fn hand_over(&self, points: &[StreamPoint]) -> Result<(), StreamError> {
+    fn hand_over<'a, P>(&self, points: &'a [P]) -> Result<(), StreamError>
+    where
+        &'a P: Into<SentPoint<'a>>,
+    {
         let streamer = &self.handle.0.streamer;
         let handed = match self.to {
             StreamTarget::All => streamer.push(points),
@@ -121,11 +131,13 @@ impl StreamHandle {
         }
     }
 
-    fn entries<P: Copy + Into<AxisPoint>>(
+    /// Checks the entries of a point, and puts them into `entries`, which is empty.
+    fn check_entries<P: Copy + Into<AxisPoint>>(
         &self,
         point: usize,
         axes: &[P],
-    ) -> Result<[AxisPoint; MAX_AXES], StreamError> {
+        entries: &mut Entries,
+    ) -> Result<(), StreamError> {
         if self.handle.0.life.is_ending() {
             return Err(StreamError::Ended);
         }
@@ -134,12 +146,8 @@ impl StreamHandle {
             return Err(StreamError::Count { given: axes.len(), axes: expected });
         }
         let state = OnceCell::new();
-        let mut all = [AxisPoint::default(); MAX_AXES];
-        for (axis, (to, from)) in all.iter_mut().zip(axes).enumerate() {
-            *to = (*from).into();
-            self.check(point, axis, to, &state)?;
-        }
-        Ok(all)
+        entries.extend(axes.iter().take(MAX_AXES).map(|entry| (*entry).into()));
+        entries.iter().enumerate().try_for_each(|(axis, entry)| self.check(point, axis, entry, &state))
     }
 
     /// Checks an entry of a point by the mode that its axis is in: by the state, where the axis has several.
