@@ -3,12 +3,13 @@
 use takt_rt::BusPort;
 
 use crate::channels::{HostSide, LogSide};
-use crate::config::Config;
+use crate::config::{Config, ConfigSources};
 use crate::controller::port::Port;
-use crate::controller::{AfterBringUp, Supervisor, VirtualRun};
+use crate::controller::{AfterBringUp, Supervisor, VirtualRun, assemble};
 use crate::error::AssembleError;
 use crate::faults::FaultInjector;
 use crate::journal::RunJournal;
+use crate::telemetry::Logger;
 
 pub mod bit_fields {
     pub use crate::config::bit_fields::*;
@@ -236,6 +237,15 @@ pub trait RunInside<P>: Sized {
 
     /// Notes from now on what the cycle is told, but for what its ports do. Call it before the first cycle.
     fn journal(&mut self) -> RunJournal;
+}
+
+/// A logger that keeps the journal of a run of this configuration, too: for its recording and its black box.
+///
+/// # Errors
+/// See [`AssembleError`].
+pub fn with_journal(logger: Logger, run: RunJournal, config: &Config) -> Result<Logger, AssembleError> {
+    let again = assemble::rerun_parts(config)?;
+    Ok(logger.with_journal(Some(run), Some(again), &ConfigSources::default()))
 }
 
 impl<P: BusPort> RunInside<P> for VirtualRun<P> {

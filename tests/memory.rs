@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use takt::Port;
 use takt::VirtualRun;
 use takt::config::Config;
-use takt::internals::RunInside;
+use takt::internals::{RunInside, with_journal};
 use takt::telemetry::{
     BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingDestination, RecordingOptions, WallClock,
 };
@@ -60,7 +60,7 @@ impl Write for Length {
 }
 
 /// The bytes on the heap at the end of every minute of six axes in motion, with a recording or without. The black box is
-/// always on.
+/// always on, with the journal that it is replayed by.
 fn held_every_minute(minutes: usize, recording: Option<RecordingDestination>) -> Vec<i64> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
     let mut config = Config::load(&path).unwrap();
@@ -83,7 +83,8 @@ fn held_every_minute(minutes: usize, recording: Option<RecordingDestination>) ->
         black_box: Some(BlackBoxOptions { span_ns: 5_000_000_000, directory: folder.path().to_owned() }),
         traces,
     };
-    let mut logger = Logger::new(log, options, Box::new(|_| {}));
+    let logger = Logger::new(log, options, Box::new(|_| {}));
+    let mut logger = with_journal(logger, run.journal(), &config).unwrap();
     let mut held = Vec::with_capacity(minutes);
     for cycle in 1..=minutes as u64 * 60_000 {
         assert!(run.step(), "the run has ended in cycle {cycle}: {:?}", run.supervisor().outcome());

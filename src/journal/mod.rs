@@ -44,11 +44,17 @@ pub struct RunJournal {
 }
 
 impl RunJournal {
-    /// Puts what has been noted since the last call.
-    pub fn drain(&mut self, encoder: &mut Encoder) {
+    /// Puts what the clock has answered since the last call. Call it before what the ports and the host have answered is taken: a cycle
+    /// whose end is put here then is whole in what has been put by the end of [`RunJournal::drain_host`], however far the run goes on
+    /// meanwhile.
+    pub fn drain_clock(&mut self, encoder: &mut Encoder) {
         while let Some(answer) = self.clock.pop() {
             encoder.clock(answer);
         }
+    }
+
+    /// Puts what the host has answered since the last call.
+    pub fn drain_host(&mut self, encoder: &mut Encoder) {
         for (id, group, given) in self.host.take_trajectories() {
             encoder.trajectory(id, group, &given);
         }

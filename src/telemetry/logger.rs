@@ -251,6 +251,9 @@ impl Logger {
 
     /// Processes all waiting records, events and frames. Returns the number of records and events.
     pub fn drain(&mut self) -> usize {
+        if let Some(journal) = &mut self.journal {
+            journal.begin_block();
+        }
         self.drain_traces();
         let taken = self.drain_records() + self.drain_events();
         self.drain_journal();
@@ -383,7 +386,7 @@ impl Logger {
 
     fn drain_journal(&mut self) {
         let Some(journal) = &mut self.journal else { return };
-        let block = journal.drain();
+        let block = journal.end_block();
         let written =
             self.recording.as_mut().zip(block.as_ref()).map(|(recording, block)| recording.journal(block));
         if let Some(Err(error)) = written {

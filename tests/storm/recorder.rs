@@ -21,12 +21,13 @@ impl Recorder {
 
     /// Takes what has been noted: as bytes, and read again.
     pub fn drain(&mut self, traces: &mut [Trace]) {
+        self.run.drain_clock(&mut self.encoder);
         for (bus, trace) in traces.iter_mut().enumerate() {
             while let Some(traced) = trace.take_any() {
                 self.encoder.port(bus, &traced);
             }
         }
-        self.run.drain(&mut self.encoder);
+        self.run.drain_host(&mut self.encoder);
         if let Some(block) = self.encoder.take_block() {
             self.journal.add_block(&block).unwrap();
         }
