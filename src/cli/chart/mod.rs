@@ -21,8 +21,10 @@ const MARGIN: f64 = 8.0;
 const VALUES: usize = 6;
 /// The room of a time below a panel.
 const TIME_ROOM: f64 = 85.0;
-/// The longest title, in characters.
-const TITLE_LETTERS: usize = 118;
+/// The columns of a line of the title, which find room also in a wide font; and the most lines.
+const TITLE_COLUMNS: usize = 100;
+const TITLE_LINES: usize = 4;
+const TITLE_LINE: f64 = 18.0;
 
 /// Panels over one time axis.
 #[derive(Debug, Default)]
@@ -73,7 +75,8 @@ impl Chart {
     }
 
     fn draw_as(&self, width: f64, palette: &Palette) -> String {
-        let top = if self.title.is_empty() { 0.0 } else { GAP };
+        let title = title_lines(&self.title);
+        let top = if title.is_empty() { 0.0 } else { GAP + TITLE_LINE * (title.len() - 1) as f64 };
         let height = top + self.panels.len() as f64 * (PANEL + GAP) + 0.5 * GAP;
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
@@ -84,12 +87,9 @@ impl Chart {
         if let Some(background) = palette.background {
             let _ = writeln!(svg, "<rect width=\"{width}\" height=\"{height}\" fill=\"{background}\"/>");
         }
-        if !self.title.is_empty() {
-            let mut title: String = self.title.chars().take(TITLE_LETTERS).collect();
-            if title.len() < self.title.len() {
-                title.push('…');
-            }
-            let _ = writeln!(svg, "<text x=\"20\" y=\"24\" font-size=\"14\">{}</text>", escaped(&title));
+        for (number, line) in title.iter().enumerate() {
+            let y = 24.0 + TITLE_LINE * number as f64;
+            let _ = writeln!(svg, "<text x=\"20\" y=\"{y}\" font-size=\"14\">{}</text>", escaped(line));
         }
         for (index, panel) in self.panels.iter().enumerate() {
             let top = top + GAP * 0.75 + index as f64 * (PANEL + GAP);
@@ -246,6 +246,21 @@ impl Drawing<'_> {
     }
 }
 
+/// The title, broken between words. The author of a file may have given it any length.
+fn title_lines(title: &str) -> Vec<String> {
+    let most = TITLE_COLUMNS * TITLE_LINES;
+    let kept: String = title.chars().take(most + 1).collect();
+    let mut lines: Vec<String> =
+        textwrap::wrap(kept.trim(), TITLE_COLUMNS).iter().map(ToString::to_string).collect();
+    let is_whole = kept.len() == title.len() && lines.len() <= TITLE_LINES;
+    lines.truncate(TITLE_LINES);
+    if let Some(last) = lines.last_mut().filter(|_| !is_whole) {
+        last.push('…');
+    }
+    lines.retain(|line| !line.is_empty());
+    lines
+}
+
 /// Words as a part of a page or a drawing.
 pub fn escaped(words: &str) -> String {
     words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
@@ -254,6 +269,21 @@ pub fn escaped(words: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_long_title_is_broken_between_words_and_its_end_is_left_out_only_beyond_four_lines() {
+        let reason =
+            "joint3 was 0.0213 rad from its set-point (allowed: 0.0020 rad) while moving, ".repeat(4);
+        let lines = title_lines(&reason);
+        assert_eq!((lines.join(" "), lines.len()), (reason.trim().to_owned(), 4));
+        assert!(lines.iter().all(|line| line.chars().count() <= TITLE_COLUMNS), "{lines:?}");
+        let chart = |title: &str| Chart { title: title.to_owned(), ..Chart::default() }.draw();
+        assert_eq!(chart(&reason).matches("font-size=\"14\"").count(), 4);
+        assert_eq!(chart("").matches("font-size=\"14\"").count(), 0);
+        let endless = title_lines(&"x".repeat(1 << 20));
+        assert!(endless.len() == TITLE_LINES && endless[3].ends_with('…'), "{endless:?}");
+        assert_eq!(title_lines("arm"), ["arm"]);
+    }
 
     #[test]
     fn values_that_are_not_finite_and_panels_without_any_are_drawn_without_harm() {

@@ -3,6 +3,7 @@
 mod curves;
 mod histogram;
 mod page;
+mod png;
 mod svg;
 mod timeline;
 
@@ -40,6 +41,9 @@ pub struct Arguments {
     /// --to say
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
+    /// The same drawing as a picture, 1800 pixels wide; its letters are built in. takt needs the cargo feature `png` for it
+    #[arg(long, value_name = "FILE.png")]
+    png: Option<PathBuf>,
     /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
@@ -55,6 +59,9 @@ pub fn run(arguments: &Arguments) -> Exit {
 }
 
 fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
+    if arguments.png.is_some() && !png::IS_BUILT_IN {
+        return Err(png::ABSENT.to_owned().into());
+    }
     let words = |error: RecordedError| error.to_string();
     let recorded = read(arguments)?;
     let axis = recorded.axis(arguments.axis.as_deref());
@@ -65,11 +72,17 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
     let report = RecordingReport::new(&recorded, axis, arguments.cycles).map_err(words)?;
     let mut is_written = true;
     if let Some(path) = &arguments.html {
-        is_written &= write(path, &page::render(&recorded, &report).map_err(words)?);
+        is_written &= write(path, page::render(&recorded, &report).map_err(words)?.as_bytes());
     }
-    if let Some(path) = &arguments.svg {
+    if arguments.svg.is_some() || arguments.png.is_some() {
         let is_whole = arguments.from.is_some() || arguments.to.is_some();
-        is_written &= write(path, &svg::render(&recorded, axis, is_whole).map_err(words)?);
+        let drawing = svg::render(&recorded, axis, is_whole).map_err(words)?;
+        if let Some(path) = &arguments.svg {
+            is_written &= write(path, drawing.as_bytes());
+        }
+        if let Some(path) = &arguments.png {
+            is_written &= write(path, &png::render(&drawing)?);
+        }
     }
     let exit = if is_written { Exit::Done } else { Exit::Stopped };
     Ok(if arguments.json {
@@ -105,7 +118,7 @@ fn seconds(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "a time is a number of seconds after the first cycle, 0 or more".to_owned())
 }
 
-fn write(path: &Path, content: &str) -> bool {
+fn write(path: &Path, content: &[u8]) -> bool {
     let written = fs::write(path, content);
     if let Err(error) = &written {
         say!("takt: {} cannot be written: {error}", path.display());
