@@ -421,6 +421,9 @@ fn the_page_shows_every_axis_the_events_and_the_buses_and_takes_nothing_from_els
         for foreign in ["<script", "<link", " src=", "url(", "@import", "href=\"http", "NaN", "inf "] {
             assert!(!page.contains(foreign), "{foreign}");
         }
+        // No drive of this arm tells its torque.
+        let dashes = page.matches("<td class=\"number\">–</td></tr>").count();
+        assert_eq!((dashes, page.contains("0.00 N·m")), (6, false));
         assert!(page.len() < 2_000_000, "{} bytes", page.len());
     }
 }

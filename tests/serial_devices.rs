@@ -59,6 +59,17 @@ impl Device {
 }
 
 #[test]
+fn a_device_that_has_no_addresses_says_so_when_it_is_given_one() {
+    for device in ["hollow-rs485", "hollow-modbus"] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_takt"));
+        let output = command.args(["sim", "--serial", &format!("{device}:1")]).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        let words = format!("{device} has no addresses: write --serial {device}");
+        assert!(output.status.code() == Some(2) && said.contains(&words), "{said}");
+    }
+}
+
+#[test]
 fn a_motor_behind_the_rs_485_module_is_moved_to_a_position() {
     let mut module = Device::new("hollow-rs485");
     let start = module.motor(2, MotorCommand::default());

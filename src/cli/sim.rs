@@ -81,8 +81,11 @@ impl FromStr for OnSerialLine {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        if text.contains(':') {
-            text.parse().map(Self::Drives)
+        if let Some((name, _)) = text.split_once(':') {
+            match serial::named(name) {
+                Ok(kind) => Err(format!("{0} has no addresses: write --serial {0}", kind.name)),
+                Err(_) => text.parse().map(Self::Drives),
+            }
         } else {
             serial::named(text).map(Self::Device)
         }

@@ -168,8 +168,12 @@ fn summary(page: &mut String, report: &RecordingReport) {
         let acceleration =
             part(set_point_max.acceleration, &format!("{unit}/s²"), set_point_part.acceleration);
         let jerk = part(set_point_max.jerk, &format!("{unit}/s³"), set_point_part.jerk);
-        let cells =
-            [position, error, at, velocity, acceleration, jerk, format!("{:.2} {torque}", axis.torque_max)];
+        // A recording has 0 for a drive that tells no torque.
+        let torque = match axis.torque_max {
+            0.0 => "–".to_owned(),
+            largest => format!("{largest:.2} {torque}"),
+        };
+        let cells = [position, error, at, velocity, acceleration, jerk, torque];
         // Writing to a string cannot fail.
         let _ = write!(page, "<tr><td><a href=\"#axis{number}\">{}</a></td>", escaped(&axis.name));
         for cell in cells {
@@ -179,7 +183,7 @@ fn summary(page: &mut String, report: &RecordingReport) {
     }
     page.push_str(
         "</tbody></table></div><p class=\"faint\">The largest of each; velocity, acceleration and jerk of the set-points, with their part of \
-         the limit.</p></section>\n",
+         the limit. –: no torque but 0 was reported.</p></section>\n",
     );
 }
 
