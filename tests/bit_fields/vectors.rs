@@ -10,7 +10,7 @@ use takt_rt::{
     OwnFrames, ReplyValue, ReplyValues,
 };
 
-use crate::machine::{HOLLOW, HOLLOW_FD, axis, device};
+use crate::machine::{HOLLOW, HOLLOW_FD, MIT, axis, device};
 use crate::rows::columns;
 
 const VECTORS: &str = include_str!("../vectors/hollow-motor-vectors.csv");
@@ -135,6 +135,21 @@ fn assert_reply(row: &Row, keys: &str, more: &str, reply: Reply) {
         assert_eq!(values.get(ReplyValue::Temperature), reply.temperature, "{}", row.id);
         assert_eq!(values.get(ReplyValue::Mode), f64::from(reply.mode), "{}", row.id);
         assert_eq!(values.get(ReplyValue::Run), f64::from(u8::from(reply.run)), "{}", row.id);
+    }
+}
+
+/// Byte 0 of a Damiao reply is the state, then the lowest four bits of the motor ID.
+#[test]
+fn a_damiao_motor_tells_the_lowest_bits_of_its_id_beside_its_state() {
+    for description in ["damiao-dm-mit", "damiao-dm-position-velocity", "damiao-dm-velocity"] {
+        let gains = if description == "damiao-dm-mit" { "" } else { "kp = 60\nkd = 1.5\n" };
+        let mode = if description == "damiao-dm-velocity" { "mode = \"csv\"\n" } else { "" };
+        let keys = format!("{}{mode}description = {description:?}\n", MIT.replace(gains, ""));
+        let (axis, _) = motor(&keys, "");
+        for (motor_id, byte) in [(1, 0x11), (9, 0x19), (0x12, 0x12), (126, 0x1E)] {
+            let reply = Reply { state: 1, motor_id, ..NOTHING }.frame(device(&axis), master()).unwrap();
+            assert_eq!(reply.payload()[0], byte, "{description}: motor {motor_id}");
+        }
     }
 }
 

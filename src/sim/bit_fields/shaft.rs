@@ -122,7 +122,11 @@ impl Reply {
         let mut payload = [0; 16];
         let payload = payload.get_mut(..*bytes)?;
         for field in fields {
-            let code = code_of(self.get(field.value), field.scale, device);
+            let code = match field.value {
+                // A narrow field has the lowest bits of the motor ID.
+                ReplyValue::Sender => f64::from(self.motor_id) % f64::from(field.width()).exp2(),
+                value => code_of(self.get(value), field.scale, device),
+            };
             let wrapped = wrapped(code, field, device.description.wraps);
             bits::write(field, *order, wrapped, payload);
         }
