@@ -11,27 +11,15 @@ import subprocess
 import time
 from pathlib import Path
 
-import numpy
 import pytest
 import xxhash
 import zenoh
-from rosbags.typesys import Stores, get_typestore
+from node import JOINTS, STATES, STORE, TRAJECTORIES, key, listening, trajectory
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parents[3]
 PROGRAMS = Path(os.environ["TAKT_PROGRAMS"])
 PATIENCE = 60.0
-STORE = get_typestore(Stores.ROS2_JAZZY)
-JOINTS = [f"joint{number}" for number in range(1, 7)]
-
-
-def key(topic, message):
-    package, _, name = message.split("/")
-    return f"0/{topic}/{package}::msg::dds_::{name}_/{STORE.hash_rihs01(message)}"
-
-
-STATES = key("joint_states", "sensor_msgs/msg/JointState")
-TRAJECTORIES = key("joint_trajectory_controller/joint_trajectory", "trajectory_msgs/msg/JointTrajectory")
 
 
 class Lines:
@@ -68,11 +56,7 @@ def peer():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{free.getsockname()[1]}"
-    config = zenoh.Config()
-    config.insert_json5("mode", '"peer"')
-    config.insert_json5("listen/endpoints", f'["{endpoint}"]')
-    config.insert_json5("scouting/multicast/enabled", "false")
-    with zenoh.open(config) as session:
+    with zenoh.open(listening(endpoint)) as session:
         yield session, endpoint
 
 
@@ -111,28 +95,6 @@ def state(received):
         received.get()
     sample = received.get(timeout=PATIENCE)
     return STORE.deserialize_cdr(sample.payload.to_bytes(), "sensor_msgs/msg/JointState"), sample
-
-
-def trajectory(names, points, stamp=(0, 0)):
-    """Points are (time in s, positions) or (time in s, positions, velocities)."""
-    types = STORE.types
-
-    def numbers(values):
-        return numpy.array(values, dtype="float64")
-
-    def point_of(time_s, positions, velocities=()):
-        return types["trajectory_msgs/msg/JointTrajectoryPoint"](
-            positions=numbers(positions),
-            velocities=numbers(velocities),
-            accelerations=numbers([]),
-            effort=numbers([]),
-            time_from_start=types["builtin_interfaces/msg/Duration"](sec=int(time_s), nanosec=int(time_s % 1 * 1e9)),
-        )
-
-    header = types["std_msgs/msg/Header"](stamp=types["builtin_interfaces/msg/Time"](*stamp), frame_id="")
-    points = [point_of(*point) for point in points]
-    message = types["trajectory_msgs/msg/JointTrajectory"](header=header, joint_names=names, points=points)
-    return bytes(STORE.serialize_cdr(message, "trajectory_msgs/msg/JointTrajectory"))
 
 
 def wait_until(received, is_so):
