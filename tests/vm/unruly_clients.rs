@@ -4,17 +4,18 @@
 //! fast as it can. Two observe without a pause. One after another begins to stream and panics on the way. All have ordinary
 //! priority. The program takes the arguments of `takt run`, and ends with an error if the group has stopped.
 
+mod run_arguments;
 mod unruly_motion;
 
 use std::error::Error;
 use std::hint::black_box;
-use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use takt::{Config, Controller, Event, EventKind, Handle, RecordingDestination, SessionOptions};
+use takt::{Controller, Event, EventKind, Handle};
 
+use run_arguments::arguments;
 use unruly_motion::{INTERVAL, Motion};
 
 /// The motion, and when it has begun.
@@ -97,28 +98,4 @@ fn begin_and_die(handle: &Handle, motion: &Begun) {
         panic!("this client dies");
     });
     assert!(client.join().is_err());
-}
-
-/// The arguments of `takt run`, as far as the laboratory gives them.
-fn arguments() -> Result<(Config, SessionOptions, Duration), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let path =
-        arguments.next().ok_or("usage: unruly_clients CONFIG [--bus NAME=INTERFACE]... --duration S")?;
-    let mut config = Config::load(Path::new(&path))?;
-    let (mut options, mut lasting) = (SessionOptions::default(), Duration::from_secs(2));
-    while let Some(option) = arguments.next() {
-        let mut value = || arguments.next().ok_or(format!("{option} needs a value"));
-        match option.as_str() {
-            "--bus" => {
-                let value = value()?;
-                let (name, interface) = value.split_once('=').ok_or("--bus NAME=INTERFACE")?;
-                config.override_interface(name, interface)?;
-            }
-            "--duration" => lasting = Duration::from_secs_f64(value()?.parse()?),
-            "--record" => options.recording = Some(RecordingDestination::File(PathBuf::from(value()?))),
-            "--require-realtime" => options.is_realtime_required = true,
-            _ => return Err(format!("there is no option {option}").into()),
-        }
-    }
-    Ok((config, options, lasting))
 }
