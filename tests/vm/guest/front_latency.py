@@ -59,7 +59,7 @@ def cycles_until(set_points, first, cycle):
 def main(calls_path, wire_path):
     cycles, set_points = wire(wire_path)
     numbers = [cycle for cycle, _ in set_points]
-    found, lost = {}, 0
+    found, lost = {}, []
     for command, at, lag_ns in calls(calls_path):
         cycle = bisect_right(cycles, at) - 1
         # Set-points of the cycle of the call may have left already.
@@ -67,7 +67,8 @@ def main(calls_path, wire_path):
         is_at_rest = set_points[first - 1][1] == set_points[first - 2][1]
         taken = cycles_until(set_points, first, cycle)
         if taken is None or is_at_rest == (command == "stop"):
-            lost += 1
+            around = [counts for _, counts in set_points[max(first - 4, 0) : first + 20]]
+            lost.append(f"{command} at {at} µs, set-points {around}")
             continue
         found.setdefault(command, []).append((taken, math.ceil(lag_ns / 1e6)))
     for command, counted in found.items():
@@ -76,7 +77,8 @@ def main(calls_path, wire_path):
         by = f"a cycle after the lag (of {min(lags)} to {max(lags)})" if any(lags) else "the next cycle"
         print(f"  {command:6} {in_time:3} of {len(taken)} by {by}; median {statistics.median(taken):g}, at most {max(taken)} cycles")
     if lost or not found:
-        sys.exit(f"{lost} calls cannot be judged: the axis was not as it should be before them, or never changed")
+        lines = "\n".join(lost)
+        sys.exit(f"{len(lost)} calls cannot be judged, the axis was not as it should be before them, or never changed:\n{lines}")
 
 
 main(*sys.argv[1:])
