@@ -71,6 +71,13 @@ TaktSystem::CallbackReturn TaktSystem::read_tag(const hardware_interface::Hardwa
         complain("<param name=\"drives\"> is \"" + drives + "\"; it is configured, simulated or virtual");
         return CallbackReturn::ERROR;
     }
+    const std::string realtime = parameter("realtime", "wanted");
+    if (realtime != "wanted" && realtime != "required") {
+        complain("<param name=\"realtime\"> is \"" + realtime + "\"; it is wanted or required");
+        return CallbackReturn::ERROR;
+    }
+    options_.is_realtime_required = realtime == "required";
+    options_.recording = parameter("recording", "");
     joints_.clear();
     for (const auto &component : info.joints) {
         for (const auto *interfaces : {&component.command_interfaces, &component.state_interfaces}) {

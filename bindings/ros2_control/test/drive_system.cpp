@@ -13,6 +13,7 @@ int main(int count, char **arguments) {
         Manager manager;
         CHECK(manager.init(with(info, "configuration", "")) == CallbackReturn::ERROR);
         CHECK(manager.init(with(info, "drives", "imaginary")) == CallbackReturn::ERROR);
+        CHECK(manager.init(with(info, "realtime", "perhaps")) == CallbackReturn::ERROR);
         CHECK(manager.init(with(info, "urdf_limits", "perhaps")) == CallbackReturn::ERROR);
         auto strange = info;
         strange.joints[0].command_interfaces[0].name = "temper";

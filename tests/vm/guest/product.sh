@@ -1,10 +1,10 @@
 # takt itself, with `takt sim` as the other side, its SYNC seen by a listener of its own: six axes on two virtual
 # interfaces, idle and under load, at 1 ms and 2 ms, and with COMPARE=yes without the spin guard; and three axes on the two emulated
-# controllers; and a stream, beside clients of every kind that behave badly: threads of a program in Rust, other processes, a program in C,
-# one in Python; and three hollow-shaft motors over CAN FD, whose requests take the place
-# of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT, UNRULY_CLIENTS, UNRULY_PROCESSES and
-# UNRULY_C name the programs, PYTHON an interpreter with takt; CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long; EVERY_KIND=yes has clients of every kind
-# (otherwise only threads of a program in Rust), and twenty pages of the panel and twenty monitors; ONLY=words measures only what has them in its
+# controllers; and a motion, beside clients of every kind that behave badly: threads of a program in Rust, other processes, a program in C,
+# one in Python, a controller manager of ros2_control (in C++), nodes of ROS 2 over zenoh; and three hollow-shaft motors over CAN FD, whose requests take the place
+# of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT, TAKT_ZENOH, UNRULY_CLIENTS, UNRULY_PROCESSES,
+# UNRULY_C and UNRULY_ROS2 name the programs, PYTHON an interpreter with takt, ZENOH_PYTHON one with zenoh; CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long; EVERY_KIND=yes has
+# clients of every kind (otherwise only threads of a program in Rust), and twenty pages of the panel and twenty monitors; ONLY=words measures only what has them in its
 # call below. Leaves product.txt (the table, and
 # when set-points and feedback were on the wire), jitter.txt (`takt jitter`), system_calls.txt, the recordings of SYNC and
 # the reports. Fails when a mean period drifts, a slot was missed, a period deviates further above what cyclictest finds than
@@ -117,37 +117,66 @@ beside_clients() { # idle|load ALLOWANCE
     try beside "bad processes" "$arm" "$@" "$UNRULY_PROCESSES"
     try beside "bad C program" "$arm_vcan" "$@" "$UNRULY_C"
     try beside "bad Python" "$arm" "$@" "$PYTHON" tests/vm/unruly_program.py
+    try beside "bad ros2_control" "$arm_vcan" "$@" "$UNRULY_ROS2"
+    try attended "bad zenoh nodes" "$@" nodes --serve "$OUT/served"
+    try attended "watched" "$@" pages_and_monitors --panel 127.0.0.1:8080
 }
 
-# Watched: twenty pages of the panel are open and twenty monitors run. An axis moves to and fro for the first page.
-watched() { # idle|load ALLOWANCE
-    local load=$1 log=$OUT/watched-$1 run pages monitor monitors=() bus found status=0
-    chrt --other 0 "$TAKT" run "$arm" --bus base=vcan0 --bus wrist=vcan1 --require-realtime --panel 127.0.0.1:8080 --record "$log.mcap" > "$log.txt" 2>&1 & run=$!
-    chrt --other 0 python3 $guest/open_pages.py 8080 20 > "$log-pages.txt" 2>&1 & pages=$!
-    for bus in vcan{0,1}{,,,,,,,,,}; do
-        chrt --other 0 "$TAKT" monitor --bus "$bus" > "$log-monitor.txt" 2>&1 & monitors+=($!)
-    done
-    until grep -q 'an axis moves' "$log-pages.txt"; do
-        kill -0 $pages && kill -0 $run || { status=1; break; }
-        sleep 0.2
-    done
-    if [ $status = 0 ]; then
-        record vcan0 "$other_cycles" "$log.log"
-        for monitor in "${monitors[@]}"; do kill -0 "$monitor" || status=1; done
-    fi
-    kill $pages; wait $pages || status=1
-    kill "${monitors[@]}"; wait "${monitors[@]}"
+# With a front for others, beside those who use it: a function has them come, and returns when they are at work; another one has them go.
+attended() { # NAME idle|load ALLOWANCE VISITORS OPTION...
+    local name=$1 load=$2 allowance=$3 visitors=$4 log=$OUT/$4-$2 run found status=0
+    shift 4
+    chrt --other 0 "$TAKT" run "$arm" --bus base=vcan0 --bus wrist=vcan1 --require-realtime --record "$log.mcap" "$@" > "$log.txt" 2>&1 & run=$!
+    "${visitors}_come" "$log" $run && record vcan0 "$other_cycles" "$log.log" || status=1
+    "${visitors}_go" || status=1
     # 130: ended by Ctrl-C, as a person does.
     kill -INT $run; wait $run
-    [ $? = 130 ] && [ $status = 0 ] || { cat "$log.txt" "$log-pages.txt" "$log-monitor.txt"; return 1; }
+    [ $? = 130 ] && [ $status = 0 ] || { tail -n 20 "$log"*.txt; return 1; }
     read -r -a found <<< "$(periods "$log.log" 1000)"
-    row "takt, watched" vcan0 "$load" "${found[@]}"
-    tail -n 1 "$log-pages.txt" | sed 's/^/  /' | tee -a "$OUT/product.txt"
+    row "takt, $name" vcan0 "$load" "${found[@]}"
+    tail -n 1 "$log-said.txt" | sed 's/^/  /' | tee -a "$OUT/product.txt"
     limits_verdict "$arm" "$log.mcap" || status=1
-    rm -f "$log.mcap" "$log-monitor.txt"
-    verdict 1000 "${found[0]}" "${found[1]}" "${found[5]}" "${found[6]}" $((latency_max + $2)) || status=1
+    rm -f "$log.mcap" "$log"-monitor-*.txt
+    verdict 1000 "${found[0]}" "${found[1]}" "${found[5]}" "${found[6]}" $((latency_max + allowance)) || status=1
     return $status
 }
+
+# said WORDS FILE PROCESS...: waits until a file has the words, as long as the processes live.
+said() {
+    local words=$1 file=$2
+    shift 2
+    until grep -q "$words" "$file"; do kill -0 "$@" || return; sleep 0.2; done
+}
+
+# Twenty pages of the panel, for the first of which an axis moves to and fro, and twenty monitors. One after the other: on one processor,
+# monitors that start keep the pages from opening.
+pages= monitors=()
+pages_and_monitors_come() { # LOG RUN
+    local bus monitor
+    chrt --other 0 python3 $guest/open_pages.py 8080 20 > "$1-said.txt" 2>&1 & pages=$!
+    said "an axis moves" "$1-said.txt" $pages "$2" || return
+    monitors=()
+    for bus in vcan{0,1}{,,,,,,,,,}; do
+        chrt --other 0 "$TAKT" monitor --bus "$bus" > "$1-monitor-${#monitors[@]}.txt" 2>&1 & monitors+=($!)
+    done
+    for monitor in "${!monitors[@]}"; do said . "$1-monitor-$monitor.txt" "${monitors[monitor]}" || return; done
+}
+pages_and_monitors_go() {
+    local status=0 monitor
+    for monitor in "${monitors[@]}"; do kill -0 "$monitor" || status=1; done
+    kill $pages; wait $pages || status=1
+    [ ${#monitors[@]} = 0 ] || { kill "${monitors[@]}"; wait "${monitors[@]}"; }
+    return $status
+}
+
+# Nodes of ROS 2, over zenoh.
+nodes=
+nodes_come() { # LOG RUN
+    said "served by the name" "$1.txt" "$2" || return
+    chrt --other 0 "$ZENOH_PYTHON" tests/vm/unruly_zenoh.py "$OUT/served" > "$1-said.txt" 2>&1 & nodes=$!
+    said "the arm moves" "$1-said.txt" $nodes "$2"
+}
+nodes_go() { kill $nodes; wait $nodes; }
 
 # A leg of hollow-shaft motors, each of which answers its request 500 us later; the request to the first of them is timed.
 requests_of_leg() { # idle|load ALLOWANCE
@@ -210,7 +239,6 @@ try measure "takt" idle "$cycles" $idle_allowance 1000 "$arm" vcan0 vcan0 vcan1
 [ -z "${COMPARE:-}" ] || try measure "takt, sleep only" idle "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
 beside_clients idle $idle_allowance
-[ -z "${EVERY_KIND:-}" ] || try watched idle $idle_allowance
 try system_calls
 try jitter idle vcan0
 
@@ -220,7 +248,6 @@ try measure "takt" load "$load_cycles" $load_allowance 1000 "$arm" vcan0 vcan0 v
 [ -z "${COMPARE:-}" ] || try measure "takt, sleep only" load "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 try measure "takt, 2 ms" load "$other_cycles" $load_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
 beside_clients load $load_allowance
-[ -z "${EVERY_KIND:-}" ] || try watched load $load_allowance
 try jitter load vcan0
 load_off
 drives_off

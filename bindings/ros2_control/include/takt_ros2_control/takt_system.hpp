@@ -32,7 +32,8 @@ namespace takt_ros2_control {
 /// and its rate need not be that of the bus. write() stamps its points, read() never waits for a drive.
 ///
 /// Parameters of <hardware>: `configuration`, a file; `drives`, "configured" (the default), "simulated", or "virtual": simulated in virtual
-/// time, of which each read() lets its period pass; `urdf_limits`, "checked" (the default) or "ignored". The joints are named as the axes of the
+/// time, of which each read() lets its period pass; `realtime`, "wanted" (the default) or "required"; `recording`, a folder; `urdf_limits`,
+/// "checked" (the default) or "ignored". The joints are named as the axes of the
 /// configuration. An axis that is no joint holds.
 class TaktSystem : public hardware_interface::SystemInterface {
 public:
