@@ -20,7 +20,6 @@ pub mod bus_log {
 }
 
 pub mod canopen {
-    #[cfg(feature = "cli")]
     pub mod lss {
         pub use crate::canopen::lss::*;
     }
@@ -138,7 +137,6 @@ pub mod modbus {
     pub use crate::modbus::*;
 }
 
-#[cfg(feature = "cli")]
 pub mod monitor {
     pub use crate::monitor::*;
 }
@@ -153,7 +151,7 @@ pub mod remote {
     };
 }
 
-#[cfg(feature = "cli")]
+#[cfg(feature = "browser")]
 pub mod replay {
     pub use crate::replay::*;
 }

@@ -93,8 +93,8 @@
 // Some names are passed on for the tests alone, to whom types of private modules are open.
 #![cfg_attr(not(feature = "internals"), allow(unused_imports))]
 #![cfg_attr(feature = "internals", allow(unnameable_types))]
-// Some functions are for the program alone.
-#![cfg_attr(not(feature = "cli"), allow(dead_code))]
+// Some functions, and names under which they are used, are for the program alone.
+#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
 #[cfg(feature = "browser")]
 #[doc(hidden)]
@@ -143,7 +143,7 @@ pub mod link;
     )
 )]
 mod modbus;
-#[cfg(feature = "cli")]
+#[cfg(any(feature = "cli", feature = "internals"))]
 mod monitor;
 mod monotonic_clock;
 mod packet;

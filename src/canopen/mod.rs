@@ -13,7 +13,7 @@ pub(crate) mod communication_names;
 pub mod dcf;
 pub mod eds;
 pub mod emcy;
-#[cfg(feature = "cli")]
+#[cfg(any(feature = "cli", feature = "internals"))]
 pub(crate) mod lss;
 pub mod nmt;
 pub mod object;
