@@ -171,8 +171,10 @@ impl Dispatch {
         let taken = IdTaken { id: new.id };
         let entry = SHARED | new.entry & FD;
         let mut others = self.shared.iter().filter(|other| other.id == new.id);
-        let is_told_apart =
-            |other: &SharedId| other.sender.at == new.sender.at && other.sender.value != new.sender.value;
+        let place = |sender: SenderByte| (sender.at, sender.mask);
+        let is_told_apart = |other: &SharedId| {
+            place(other.sender) == place(new.sender) && other.sender.value != new.sender.value
+        };
         if self.shared.is_full() || !others.all(is_told_apart) {
             return Err(taken);
         }
@@ -228,10 +230,8 @@ impl Dispatch {
 
     /// Where a frame goes whose identifier several drives share.
     fn shared_destination(&self, frame: &Frame) -> Destination {
-        let is_sender = |shared: &&SharedId| {
-            let SenderByte { at, value } = shared.sender;
-            shared.id == frame.id() && frame.payload().get(usize::from(at)) == Some(&value)
-        };
+        let is_sender =
+            |shared: &&SharedId| shared.id == frame.id() && shared.sender.has_sent(frame.payload());
         let found = self.shared.iter().find(is_sender);
         found.map_or(Destination::Service, |shared| destination_of(shared.entry & !FD))
     }
@@ -274,7 +274,7 @@ mod tests {
     }
 
     fn shared(id: Id, at: u8, value: u8) -> Pdo {
-        Pdo { sender: Some(SenderByte { at, value }), ..pdo(id) }
+        Pdo { sender: Some(SenderByte::whole(at, value)), ..pdo(id) }
     }
 
     fn enter(table: &mut Dispatch, pdo: &Pdo, axis: u8, number: u8) -> Result<(), IdTaken> {
@@ -394,6 +394,24 @@ mod tests {
         for id in [reply, command] {
             assert_eq!(table.destination(&Frame::of(id, [0; 8])), Destination::Service);
         }
+    }
+
+    #[test]
+    fn drives_are_told_apart_by_a_part_of_a_byte_whatever_its_other_bits_are() {
+        let id = Id::base(0x011).unwrap();
+        let low = |value| Pdo { sender: Some(SenderByte { at: 0, mask: 0x0F, value }), ..pdo(id) };
+        let mut table = Dispatch::default();
+        enter(&mut table, &low(1), 0, 0).unwrap();
+        enter(&mut table, &low(2), 1, 0).unwrap();
+        let to = |byte| table.destination(&Frame::of(id, [byte, 0x80]));
+        for state in [0x00, 0x10, 0xE0] {
+            assert_eq!(to(state | 1), Destination::Feedback { axis: 0, pdo: 0 });
+            assert_eq!(to(state | 2), Destination::Feedback { axis: 1, pdo: 0 });
+            assert_eq!(to(state | 3), Destination::Service, "nobody's");
+        }
+        let taken = Err(IdTaken { id });
+        assert_eq!(enter(&mut table, &shared(id, 0, 3), 2, 0), taken, "other bits of the byte");
+        assert_eq!(enter(&mut table, &low(2), 2, 0), taken, "two drives would be one");
     }
 
     #[test]

@@ -49,7 +49,7 @@ fn hollow(motor: u8) -> FieldDriveParameters {
         command: FieldFrame::compile(own, format, 16, order, &command).unwrap(),
         reply: FieldFrame::compile(MASTER, format, 16, order, &reply)
             .unwrap()
-            .sent_by(SenderByte { at: 15, value: motor }),
+            .sent_by(SenderByte::whole(15, motor)),
         life_cycle: LifeCycle::ByFields { modes: ModeCodes { torque: 0, velocity: 1, position: 2 } },
         position_reference: PositionReference::Zero,
         beside_target: BesideTarget::Limits { velocity: LIMITS.velocity, torque: TORQUE_LIMIT },
@@ -81,7 +81,7 @@ fn impedance(motor: u8) -> FieldDriveParameters {
         command: FieldFrame::compile(id, format, 16, order, &command).unwrap(),
         reply: FieldFrame::compile(MASTER, format, 12, order, &reply)
             .unwrap()
-            .sent_by(SenderByte { at: 0, value: motor }),
+            .sent_by(SenderByte::whole(0, motor)),
         life_cycle: LifeCycle::ByFrames(OwnFrames {
             start: own(0xFC),
             stop: own(0xFD),

@@ -86,9 +86,7 @@ impl FieldMember {
 
     fn reply(&self, frame: &Frame) -> Option<FieldMeaning> {
         let reply = Some(&self.parameters.reply).filter(|reply| reply.id() == frame.id())?;
-        if let Some(sender) = reply.sender()
-            && frame.payload().get(usize::from(sender.at)) != Some(&sender.value)
-        {
+        if reply.sender().is_some_and(|sender| !sender.has_sent(frame.payload())) {
             return None;
         }
         let mut received = ReplyValues::default();

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{
-    BesideTarget, BitField, CommandValue, FieldDriveParameters, FieldFrame, FieldGains, FieldValue,
-    LayoutError, LifeCycle, LinearScale, MAX_SETUP_FRAMES, Number, OwnFrames, PositionReference, ReplyValue,
-    SenderByte, SetUpAgain,
+    BesideTarget, BitField, ByteOrder, CommandValue, FieldDriveParameters, FieldFrame, FieldGains,
+    FieldValue, LayoutError, LifeCycle, LinearScale, MAX_SETUP_FRAMES, Number, OwnFrames, PositionReference,
+    ReplyValue, SenderByte, SetUpAgain,
 };
 
 use super::{
@@ -176,12 +176,20 @@ impl FieldDevice {
         }
     }
 
-    /// The byte of a reply that has the motor ID, if one has.
+    /// The byte of a reply that has the motor ID, or its lowest bits, if one has.
     fn sender_byte(&self, motor: u8) -> Option<SenderByte> {
-        let bits = self.description.reply.field(ReplyValue::Sender)?.bits;
-        let is_byte = bits.low.is_none() && bits.high.width == 8 && bits.high.at.is_multiple_of(8);
+        let reply = &self.description.reply;
+        let bits = reply.field(ReplyValue::Sender)?.bits;
+        let (first, width) = (bits.high.at % 8, u16::from(bits.high.width));
+        // A field that reaches into another byte is not looked at.
+        let beyond = 8u16.checked_sub(first + width).filter(|_| bits.low.is_none())?;
+        let shift = match reply.order {
+            ByteOrder::BigEndian => beyond,
+            ByteOrder::LittleEndian => first,
+        };
+        let mask = (u8::MAX >> (8 - width)) << shift;
         let at = u8::try_from(bits.high.at / 8).ok()?;
-        is_byte.then_some(SenderByte { at, value: motor })
+        Some(SenderByte { at, mask, value: motor << shift & mask })
     }
 
     /// The range of the joint in which the reported position wraps around.

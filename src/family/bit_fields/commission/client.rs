@@ -140,9 +140,7 @@ impl Client for FieldClient {
 
     fn receive(&mut self, frame: &Frame) {
         let reply = &self.parameters.reply;
-        let is_sender = reply.sender().is_none_or(|sender| {
-            frame.payload().get(usize::from(sender.at)).is_some_and(|byte| *byte == sender.value)
-        });
+        let is_sender = reply.sender().is_none_or(|sender| sender.has_sent(frame.payload()));
         if frame.id() != reply.id() || !is_sender {
             return;
         }
