@@ -161,6 +161,25 @@ fn a_description_is_read_strictly_and_its_problems_are_named() {
     }
 }
 
+#[test]
+fn what_is_said_of_how_a_drive_is_found_is_read_strictly_too() {
+    let without = changed("firmware = 14\n", "");
+    assert_eq!(without, "");
+    for (from, to, word) in [
+        ("by = \"registers\"", "by = \"magic\"", "heartbeat"),
+        ("by = \"registers\"", "by = \"heartbeat\"", "identifiers"),
+        ("mode_is = 1", "", "mode_is"),
+        ("master_id = 7", "master_id = 256", "255"),
+        ("0x33, \"register\", 0, 0, 0, 0]", "0x33, 7, 0, 0, 0, 0]", "a frame that reads"),
+        ("0x33, \"register\", 0, 0, 0, 0]", "0x33, \"register\", 0, 0, 0]", "eight bytes"),
+        ("\"value\", \"value\"]", "\"value\", 0]", "four times"),
+        ("torque_full_scale = 23", "torque = 23", "torque_full_scale"),
+    ] {
+        let problems = changed(from, to);
+        assert!(problems.contains(word), "{to}: {problems}");
+    }
+}
+
 /// Descriptions that are right.
 const RIGHT: [&str; 5] = [
     include_str!("../../drives/bit-fields/damiao-dm-mit.toml"),

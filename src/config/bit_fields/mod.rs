@@ -6,6 +6,8 @@
 mod compile;
 mod expression;
 mod read;
+mod read_scan;
+mod scan;
 mod settings;
 
 use std::ops::RangeInclusive;
@@ -17,6 +19,7 @@ use takt_rt::{
 
 pub use expression::{IdExpression, PayloadByte};
 pub use read::{load, parse};
+pub use scan::{DescribedScan, HeartbeatScan, RegisterByte, RegisterFrame, RegisterProtocol, RegisterScan};
 pub use settings::{Setting, Settings};
 
 pub use super::data_file::DescribedDrive;
@@ -45,8 +48,10 @@ pub struct Description {
     pub states: Option<StateCodes>,
     /// When the reply comes.
     pub reply_moment: ReplyMoment,
-    /// What it sends by itself beside its replies, and nobody reads here.
+    /// What it sends by itself beside its replies. The cycle does not read it.
     pub heartbeat: Option<DescribedHeartbeat>,
+    /// How it is found on a bus, where that can be without a command to it.
+    pub scan: Option<DescribedScan>,
     /// How the drive is started and stopped.
     pub life_cycle: DescribedLifeCycle,
     /// The frames that set it up before it is used, in their order.

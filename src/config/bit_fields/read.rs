@@ -8,6 +8,7 @@ use takt_rt::{
 };
 use toml::de::DeTable;
 
+use super::read_scan;
 use super::{
     Amount, BesideTargetKind, DescribedFrames, DescribedHeartbeat, DescribedLifeCycle, DescribedScale,
     Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, IdExpression,
@@ -108,6 +109,11 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
     let has_heartbeat = root.get("heartbeat").is_some();
     let heartbeat = has_heartbeat.then(|| heartbeat(root.section("heartbeat")));
     let states = root.get("states").is_some().then(|| states(root.section("states")));
+    let has_scan = root.get("scan").is_some();
+    let scan = has_scan.then(|| {
+        let heartbeat = heartbeat.as_ref().and_then(Option::as_ref);
+        read_scan::scan(root.section("scan"), heartbeat)
+    });
     let command_section = root.section("command");
     let (command_spot, reply_section) = (command_section.header_spot(), root.section("reply"));
     let reply_spot = reply_section.header_spot();
@@ -134,6 +140,10 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
         heartbeat: match heartbeat {
             None => None,
             Some(heartbeat) => Some(heartbeat?),
+        },
+        scan: match scan {
+            None => None,
+            Some(scan) => Some(scan?),
         },
         life_cycle: life_cycle?,
         setup: setup.into_iter().collect::<Option<_>>()?,
@@ -211,7 +221,7 @@ fn states(mut section: Section<'_>) -> Option<StateCodes> {
 }
 
 /// Two whole numbers, the lower one first.
-fn two(entry: &Entry<'_>, allowed: std::ops::Range<i64>) -> Option<(i64, i64)> {
+pub(super) fn two(entry: &Entry<'_>, allowed: std::ops::Range<i64>) -> Option<(i64, i64)> {
     let numbers = each(entry, |entry| entry.integer(allowed.clone()))?;
     match numbers.as_slice() {
         [low, high] if low <= high => Some((*low, *high)),
@@ -272,7 +282,7 @@ fn frame<V: FieldValue>(
     })
 }
 
-fn expression(entry: &Entry<'_>, is_extended: bool) -> Option<IdExpression> {
+pub(super) fn expression(entry: &Entry<'_>, is_extended: bool) -> Option<IdExpression> {
     let text = entry.text()?;
     let read = IdExpression::parse(text, is_extended);
     if read.is_none() {

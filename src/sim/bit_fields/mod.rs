@@ -6,6 +6,7 @@
 
 mod bits;
 mod current_loop;
+mod registers;
 mod shaft;
 
 use std::f64::consts::TAU;
@@ -22,9 +23,10 @@ use super::motion::{Actual, Generator};
 use super::plant::{Gravity, Joint, JointParameters};
 use super::servo::{LoopFactors, Servo};
 use crate::config::bit_fields::{
-    BesideTargetKind, DescribedLifeCycle, FieldDevice, ReplyMoment, Setting, SetupFrame,
+    BesideTargetKind, DescribedLifeCycle, DescribedScan, FieldDevice, ReplyMoment, Setting, SetupFrame,
 };
 use current_loop::CurrentLoop;
+use registers::RegisterServer;
 pub use shaft::{Command, Reply};
 
 /// The period of the drive's loops.
@@ -139,6 +141,7 @@ pub struct FieldSimulation {
     offset: f64,
     defects: Defects,
     reply_ns: Option<Nanoseconds>,
+    registers: RegisterServer,
     heartbeat_ns: Option<Nanoseconds>,
     ready_ns: Nanoseconds,
     stepped_ns: Nanoseconds,
@@ -168,6 +171,7 @@ impl FieldSimulation {
             offset: 0.0,
             defects: Defects::default(),
             reply_ns: None,
+            registers: RegisterServer::new(device),
             heartbeat_ns: None,
             ready_ns: parameters.power_up_ns,
             stepped_ns: 0,
@@ -181,6 +185,7 @@ impl FieldSimulation {
     fn boot(&mut self, now_ns: Nanoseconds) {
         self.power = Power::Off;
         (self.command, self.torque) = (None, 0.0);
+        self.registers.reset();
         self.setup.iter_mut().for_each(|(_, _, is_taken)| *is_taken = false);
         // It forgets every gain with its power.
         self.factors = LoopFactors::PRESET;
@@ -418,13 +423,17 @@ impl FieldSimulation {
         }
     }
 
-    /// The heartbeat that is due. What it says is not described: its bytes are zero.
+    /// The heartbeat that is due. Each byte of it is the lowest that the description allows.
     fn take_heartbeat(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
         let due_ns = self.heartbeat_ns.filter(|due_ns| *due_ns <= now_ns)?;
         let FieldSimulationParameters { device, motor_id, .. } = &self.parameters;
         let heartbeat = device.description.heartbeat?;
         self.heartbeat_ns = Some(due_ns.saturating_add(heartbeat.period_ns));
-        Frame::data(device.id(&heartbeat.id, *motor_id), [0; 8].get(..heartbeat.bytes)?).ok()
+        let bytes: Vec<u8> = match &device.description.scan {
+            Some(DescribedScan::Heartbeat(scan)) => scan.bytes.iter().map(|range| *range.start()).collect(),
+            Some(DescribedScan::Registers(_)) | None => vec![0; heartbeat.bytes],
+        };
+        Frame::data(device.id(&heartbeat.id, *motor_id), &bytes).ok()
     }
 
     fn shows_mode(&self) -> bool {
@@ -471,7 +480,8 @@ impl Drive for FieldSimulation {
         let answers =
             matches!(self.parameters.device.description.reply_moment, ReplyMoment::AfterCommand { .. });
         // A motor that is about to reply takes nothing else: the manual asks for 500 µs between two frames.
-        if now_ns < self.ready_ns || answers && self.reply_ns.is_some() {
+        let is_busy = answers && (self.reply_ns.is_some() || self.registers.due_ns().is_some());
+        if now_ns < self.ready_ns || is_busy {
             return;
         }
         self.run_until(now_ns);
@@ -482,6 +492,15 @@ impl Drive for FieldSimulation {
         let is_command = frame.id() == self.command_id
             && frame.payload().len() == description.command.bytes
             && frame.is_fd() == is_fd;
+        let delay_ns = match description.reply_moment {
+            ReplyMoment::AfterCommand { delay_ns } => Some(delay_ns.max(1)),
+            ReplyMoment::Cyclic { .. } => None,
+        };
+        let FieldSimulationParameters { device, motor_id, .. } = &self.parameters;
+        let answered_ns = now_ns.saturating_add(delay_ns.unwrap_or(1));
+        if self.registers.take(frame, device, *motor_id, answered_ns) {
+            return;
+        }
         if let Some(order) = own {
             self.obey(order);
         } else if is_command {
@@ -489,8 +508,8 @@ impl Drive for FieldSimulation {
         } else if !self.take_setup(frame) {
             return;
         }
-        if let ReplyMoment::AfterCommand { delay_ns } = self.parameters.device.description.reply_moment {
-            self.reply_ns = Some(now_ns.saturating_add(delay_ns.max(1)));
+        if let Some(delay_ns) = delay_ns {
+            self.reply_ns = Some(now_ns.saturating_add(delay_ns));
         }
     }
 
@@ -505,14 +524,17 @@ impl Drive for FieldSimulation {
                 ReplyMoment::Cyclic { period_ns } => Some(due_ns.saturating_add(period_ns)),
             };
         }
-        if let Some(frame) = self.take_heartbeat(now_ns) {
+        for frame in [self.registers.poll(now_ns), self.take_heartbeat(now_ns)].into_iter().flatten() {
             mailbox.push(frame);
         }
     }
 
     fn wake_ns(&self) -> Nanoseconds {
         let step_ns = self.stepped_ns + STEP_NS;
-        [self.reply_ns, self.heartbeat_ns].into_iter().flatten().fold(step_ns, Nanoseconds::min)
+        [self.reply_ns, self.registers.due_ns(), self.heartbeat_ns]
+            .into_iter()
+            .flatten()
+            .fold(step_ns, Nanoseconds::min)
     }
 
     fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
