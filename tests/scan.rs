@@ -114,7 +114,8 @@ fn only_reads(sent: &[Frame]) {
             ))
         );
         let is_own_read = (0x641..=0x67F).contains(&id) && [2, 4].contains(&frame.payload().len());
-        assert!(is_sdo_upload || is_own_read || id == 0x7E5, "{frame:?}");
+        let is_register_read = id == 0x7FF && frame.payload().get(1..3) == Some(&[0, 0x33]);
+        assert!(is_sdo_upload || is_own_read || is_register_read || id == 0x7E5, "{frame:?}");
     }
 }
 
@@ -243,7 +244,7 @@ fn two_devices_with_the_same_node_id_are_told_in_both_protocols() {
 fn a_silent_bus_has_nothing_and_a_scan_of_it_ends() {
     let outcome = scan(&usual(), &mut played(|_| vec![]));
     assert!(outcome.found.devices.is_empty() && outcome.found.remarks.is_empty(), "{:#?}", outcome.found);
-    assert!(outcome.duration_ns < 2 * SECOND, "{} ms", outcome.duration_ns / MS);
+    assert!(outcome.duration_ns < 2_500 * MS, "{} ms", outcome.duration_ns / MS);
     only_reads(&outcome.sent);
 }
 
@@ -422,6 +423,160 @@ fn motors_on_can_fd_are_asked_only_where_the_bus_carries_it() {
     assert_eq!(outcome.node(4).drive, Some("hollow-can-fd"), "{:#?}", outcome.found);
 }
 
+fn damiao(node: u8, master_id: u16, mode: &str, keys: &str) -> String {
+    format!(
+        "node = {node}; master_id = {master_id}; drive = \"bit-fields\"; description = \"damiao-dm-{mode}\"; position_full_scale = 12.5; \
+         velocity_full_scale = 30; torque_full_scale = 10{keys}"
+    )
+}
+
+/// A Damiao motor of each mode.
+fn three_modes() -> SimulatedBus {
+    let mit = damiao(1, 0x11, "mit", "; kp = 60; kd = 1.5");
+    let position = damiao(2, 0x7A, "position-velocity", "");
+    let velocity = damiao(20, 0x314, "velocity", "");
+    bus(&[&mit, &position, &velocity])
+}
+
+/// Whether a frame asks motors by the identifier that every one of them hears.
+fn reads_registers(frame: &Frame) -> bool {
+    frame.id().value() == 0x7FF
+}
+
+#[test]
+fn motors_with_registers_tell_their_mode_their_master_id_and_their_full_scales() {
+    let outcome = scan(&usual(), &mut three_modes());
+    only_reads(&outcome.sent);
+    assert_eq!(outcome.nodes(), [1, 2, 20].map(Some), "{:#?}", outcome.found);
+    assert!(outcome.found.remarks.is_empty(), "{:?}", outcome.found.remarks);
+    for (node, mode, master_id) in
+        [(1, "mit", "0x011"), (2, "position-velocity", "0x07A"), (20, "velocity", "0x314")]
+    {
+        let motor = outcome.node(node);
+        assert_eq!((motor.answered, motor.drive), (Answered::Own("Damiao registers"), Some("bit-fields")));
+        assert_eq!((motor.vendor.as_deref(), motor.firmware.as_deref()), (Some("Damiao"), Some("1")));
+        let keys = motor.axis_keys.join("\n");
+        let description = format!("description = \"damiao-dm-{mode}\"");
+        let master_id = format!("master_id = {master_id}");
+        let scales = ["\"12.5 rad\"", "\"30 rad/s\"", "\"10 Nm\""];
+        for words in [description.as_str(), master_id.as_str()].into_iter().chain(scales) {
+            assert!(keys.contains(words), "{words}: {keys}");
+        }
+        let is_odd = |remark: &&String| remark.contains("two devices") || remark.contains("CANopen");
+        assert_eq!(motor.remarks.iter().find(is_odd), None);
+    }
+}
+
+#[test]
+fn a_motor_with_registers_is_found_beside_drives_of_other_protocols() {
+    let motor = damiao(5, 0x15, "mit", "; kp = 60; kd = 1.5");
+    let buses = [EROB, OWN, &motor].map(|axis| bus(&[axis]));
+    let outcome = scan(&usual(), &mut Joined(buses.into()));
+    only_reads(&outcome.sent);
+    let found: Vec<_> = outcome.found.devices.iter().map(|device| (device.node, device.drive)).collect();
+    let drives = ["erob-canopen", "bit-fields", "erob-can"].map(Some);
+    assert_eq!(found, [1, 5, 20].map(Some).into_iter().zip(drives).collect::<Vec<_>>());
+}
+
+#[test]
+fn two_motors_with_the_same_motor_id_are_told() {
+    let twin = |master_id| bus(&[&damiao(3, master_id, "velocity", "")]);
+    let outcome = scan(&usual(), &mut Joined(vec![twin(0x13), twin(0x14)]));
+    let motor = outcome.node(3);
+    assert!(motor.remarks.iter().any(|remark| remark.contains("two devices")), "{motor:#?}");
+}
+
+#[test]
+fn a_motor_that_replies_by_an_identifier_of_canopen_is_told_of_it() {
+    let read = |frame: &Frame| match frame.payload() {
+        &[1, 0, 0x33, register, ..] if reads_registers(frame) => {
+            let value = if register == 10 { 1 } else { 0 };
+            vec![Frame::of(Id::base(0).unwrap(), [1, 0, 0x33, register, value, 0, 0, 0])]
+        }
+        _ => vec![],
+    };
+    let outcome = scan(&usual(), &mut played(read));
+    let motor = outcome.node(1);
+    assert!(motor.remarks.iter().any(|remark| remark.contains("CANopen nodes take")), "{motor:#?}");
+    let scales = motor.remarks.iter().filter(|remark| remark.contains("does not tell its"));
+    assert_eq!(scales.count(), 3, "no full scale is 0: {motor:#?}");
+}
+
+#[test]
+fn a_motor_in_a_mode_without_a_description_is_told_without_an_axis() {
+    let read = |frame: &Frame| match frame.payload() {
+        &[9, 0, 0x33, register, ..] if reads_registers(frame) => {
+            let value = if register == 10 { 4 } else { 0x19 };
+            vec![Frame::of(Id::base(0x19).unwrap(), [9, 0, 0x33, register, value, 0, 0, 0])]
+        }
+        _ => vec![],
+    };
+    let outcome = scan(&usual(), &mut played(read));
+    let motor = outcome.node(9);
+    assert_eq!(motor.drive, None);
+    assert!(motor.remarks.iter().any(|remark| remark.contains("its mode (4)")), "{motor:#?}");
+}
+
+#[test]
+fn whoever_has_answered_a_read_is_not_asked_by_a_command_that_stops_it() {
+    let outcome = scan(&BusScan { may_take_torque: true, ..usual() }, &mut three_modes());
+    let stopped = |node: u32| outcome.sent.iter().any(|frame| frame.id().value() == node);
+    assert_eq!([1, 3, 4].map(stopped), [false, true, true]);
+    let is_in_mit_mode = outcome.node(1).axis_keys[0].contains("damiao-dm-mit");
+    assert!(is_in_mit_mode, "{:#?}", outcome.found);
+}
+
+/// An ODrive, by its node ID.
+fn odrive(node: u8) -> SimulatedBus {
+    bus(&[&format!("node = {node}; drive = \"bit-fields\"; description = \"odrive-can-simple\"")])
+}
+
+#[test]
+fn a_drive_that_sends_heartbeats_is_heard_and_nobody_is_asked_by_an_identifier_that_is_a_command_to_it() {
+    // By the identifiers of nobody in CANopen, of emergency messages and of process data.
+    for node in [1, 4, 12] {
+        let motor = bus(&[&damiao(33, 0x31, "velocity", "")]);
+        let outcome = scan(&usual(), &mut Joined(vec![odrive(node), motor]));
+        assert_eq!(outcome.nodes(), [Some(node)], "{:#?}", outcome.found);
+        let drive = outcome.node(node);
+        assert_eq!((drive.answered, drive.drive), (Answered::Heard("ODrive CAN Simple"), Some("bit-fields")));
+        assert!(!outcome.sent.iter().any(reads_registers), "it would wait for new firmware");
+        let remarks = outcome.found.remarks.join("; ");
+        assert!(remarks.contains("Damiao registers") && !remarks.contains("nothing known"), "{remarks}");
+        let own = u32::from(node) * 32;
+        let is_to_it = |frame: &Frame| (own..own + 32).contains(&frame.id().value());
+        assert!(!outcome.sent.iter().any(is_to_it), "{:#?}", outcome.sent);
+    }
+}
+
+#[test]
+fn a_question_that_has_an_identifier_of_a_drive_that_is_heard_is_not_sent() {
+    let outcome = scan(&usual(), &mut odrive(48));
+    assert_eq!(outcome.nodes(), [Some(48)], "{:#?}", outcome.found);
+    let asked = |node: u32| outcome.sent.iter().any(|frame| frame.id().value() == 0x600 + node);
+    assert_eq!([1, 12, 31, 32, 64].map(asked), [false, false, false, true, true]);
+}
+
+#[test]
+fn a_node_whose_emergency_messages_have_the_identifier_of_a_heartbeat_is_no_drive_that_sends_them() {
+    let mut at_ns = 0;
+    let change = |now_ns: u64, batch: &mut ReceiveBatch| {
+        if now_ns >= at_ns {
+            at_ns = now_ns + 100 * MS;
+            for (id, payload) in [(0x081, [0, 0, 0, 0, 1, 0, 0, 0]), (0x0A1, [0x10, 0x43, 9, 0, 0, 0, 0, 0])]
+            {
+                let frame = Frame::of(Id::base(id).unwrap(), payload);
+                let _ = batch.try_push(Received { frame, at_ns: now_ns });
+            }
+        }
+    };
+    let mut port = Through { bus: bus(&[EROB]), change, health: None };
+    let outcome = scan(&usual(), &mut port);
+    assert_eq!(outcome.node(1).answered, Answered::Sdo, "{:#?}", outcome.found);
+    assert_eq!(outcome.node(33).answered, Answered::Heard("CANopen"));
+    assert_eq!(outcome.nodes(), [1, 33].map(Some), "{:#?}", outcome.found);
+}
+
 /// Scans a line, and returns the requests, too.
 fn scan_slaves(
     what: LineScan,
@@ -491,6 +646,12 @@ fn the_configuration_of_what_was_found_is_whole_but_for_what_only_the_owner_know
         let config = Config::parse("found.toml", &text).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
         config.validate().unwrap_or_else(|error| panic!("{error:?}\n{text}"));
         assert!(text.contains("# YOURS"), "{text}");
+    }
+    for mut bus in [three_modes(), odrive(3)] {
+        let found = scan(&usual(), &mut bus).found.devices;
+        let text = starting_configuration(&[(place("sim"), found)], None);
+        let config = Config::parse("found.toml", &text).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
+        config.validate().unwrap_or_else(|error| panic!("{error:?}\n{text}"));
     }
     let motors = scan(&BusScan { may_take_torque: true, ..usual() }, &mut bus(&[MOTOR])).found.devices;
     let text = starting_configuration(&[(place("sim"), motors)], None);

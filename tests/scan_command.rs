@@ -76,6 +76,29 @@ fn what_was_found_is_an_object_and_a_configuration_that_check_accepts() {
 }
 
 #[test]
+fn motors_with_registers_become_a_configuration_that_drives_them() {
+    let simulated = Simulated::new(&["configs/damiao-arm.toml"]);
+    let output = scan(&["--bus", &adapter(&simulated), "--to", "8", "--config"]);
+    ends_with(0, &output);
+    let text = said(&output);
+    for words in ["damiao-dm-mit", "master_id = 0x012", "position_full_scale = \"12.5 rad\"", "# YOURS"] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let file = simulated.path.with_file_name("found.toml");
+    let program = "\n[[program.move]]\nto = [\"20 deg\", \"-20 deg\", \"10 deg\"]\n";
+    fs::write(&file, text + program).unwrap();
+    let checked = takt("check").arg(&file).output().unwrap();
+    ends_with(0, &checked);
+    let run = takt("run").arg(&file).args(["--bus", "bus=sim", "--json"]).output().unwrap();
+    ends_with(0, &run);
+    let report: Value = serde_json::from_str(&said(&run)).unwrap();
+    for (axis, degrees) in [20.0f64, -20.0, 10.0].into_iter().enumerate() {
+        let reached = report["axes"][axis]["final_position"].as_f64().unwrap();
+        assert!((reached - degrees.to_radians()).abs() < 0.02, "{report}");
+    }
+}
+
+#[test]
 fn slaves_on_a_serial_line_are_found_at_the_bit_rate_that_is_theirs() {
     let simulated = Simulated::new(&["--serial", "erob-modbus:2,5"]);
     let output = scan(&["--bus", &serial(&simulated), "--to", "6", "--json"]);

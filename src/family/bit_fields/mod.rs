@@ -6,6 +6,7 @@
 
 mod commission;
 mod device;
+mod scan;
 
 use std::f64::consts::TAU;
 
@@ -60,7 +61,7 @@ pub type LookOnLine = for<'a> fn(&'a ModbusSession, u32) -> LookingAtSlave<'a>;
 #[derive(Clone, Copy, Debug)]
 pub struct FoundBy {
     /// Their protocols on a CAN bus.
-    pub protocols: &'static [&'static dyn OwnProtocol],
+    pub protocols: fn() -> &'static [&'static dyn OwnProtocol],
     /// A look at a slave on a Modbus line, where the drives may be on one.
     pub on_line: Option<LookOnLine>,
     /// The keys of an axis with such a drive.
@@ -75,7 +76,7 @@ pub static FROM_FILE: BitFieldFamily = BitFieldFamily {
     describe: described,
     on_line: None,
     pulse_width: None,
-    found_by: None,
+    found_by: Some(FoundBy { protocols: scan::protocols, on_line: None, starting_keys: scan::starting_keys }),
 };
 
 /// The descriptions that come with takt.
@@ -272,7 +273,7 @@ impl Family for BitFieldFamily {
     }
 
     fn own_protocols(&self) -> &'static [&'static dyn OwnProtocol] {
-        self.found_by.map_or(&[], |found_by| found_by.protocols)
+        self.found_by.map_or(&[], |found_by| (found_by.protocols)())
     }
 
     fn recognises_on_line<'a>(

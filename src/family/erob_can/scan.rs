@@ -32,8 +32,8 @@ impl OwnProtocol for OwnScan {
         1..=63
     }
 
-    fn question(&self, node: u8) -> Frame {
-        Request::Read(entries::FIRMWARE_VERSION.address).frame(node)
+    fn question(&self, node: u8) -> Option<Frame> {
+        Some(Request::Read(entries::FIRMWARE_VERSION.address).frame(node))
     }
 
     fn replying(&self, frame: &Frame) -> Option<u8> {
@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn the_question_reads_and_does_not_write() {
-        assert_eq!(format!("{:?}", OwnScan.question(2)), "642#00010004");
+        assert_eq!(format!("{:?}", OwnScan.question(2).unwrap()), "642#00010004");
         assert_eq!(OwnScan.replying(&Reply::Value(5).frame(2)), Some(2));
         let sdo_response = Frame::of(reply_id(2), [0x43, 0, 0x10, 0, 0x92, 1, 2, 0]);
         assert_eq!(OwnScan.replying(&sdo_response), None, "it is that of the CANopen node 66");

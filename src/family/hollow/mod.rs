@@ -32,7 +32,7 @@ pub static CAN: BitFieldFamily = BitFieldFamily {
     on_line: None,
     pulse_width: Some(pwm_task::report),
     found_by: Some(FoundBy {
-        protocols: &[&scan::CanScan],
+        protocols: || &[&scan::CanScan],
         on_line: None,
         starting_keys: scan::starting_keys,
     }),
@@ -47,7 +47,7 @@ pub static CAN_FD: BitFieldFamily = BitFieldFamily {
     on_line: Some(registers_task::begin),
     pulse_width: Some(pwm_task::report),
     found_by: Some(FoundBy {
-        protocols: &[&scan::FdScan],
+        protocols: || &[&scan::FdScan],
         on_line: Some(|session, bit_rate| Box::pin(scan::look(session, bit_rate))),
         starting_keys: scan::starting_keys,
     }),

@@ -50,8 +50,8 @@ impl OwnProtocol for CanScan {
         MOTORS
     }
 
-    fn question(&self, node: u8) -> Frame {
-        Frame::of(Id::canopen(0, node), STOP)
+    fn question(&self, node: u8) -> Option<Frame> {
+        Some(Frame::of(Id::canopen(0, node), STOP))
     }
 
     /// Six bytes in normal mode. Eight in extended mode, as many as a command has, which is told apart by its identifier.
@@ -111,12 +111,8 @@ impl OwnProtocol for FdScan {
     }
 
     /// All bytes 0: stop and free, in torque mode, without a current (section 4.1 of the manual).
-    fn question(&self, node: u8) -> Frame {
-        let id = Id::canopen(0, node);
-        match Frame::fd(id, &[0; DATA_BYTES], false) {
-            Ok(frame) => frame,
-            Err(_) => unreachable!("a frame of CAN FD has room for 16 bytes"),
-        }
+    fn question(&self, node: u8) -> Option<Frame> {
+        Frame::fd(Id::canopen(0, node), &[0; DATA_BYTES], false).ok()
     }
 
     /// The last byte is the motor's ID. In a command it sets the zero, and is 0 or 1.
@@ -226,14 +222,14 @@ mod tests {
         assert_eq!(CanScan.replying(&extended), Some(7));
         let command = frame(7, &[7, 0x80, 0, 0x80, 8, 0, 0, 0]);
         assert_eq!(CanScan.replying(&command), None);
-        assert_eq!(CanScan.replying(&CanScan.question(7)), None);
+        assert_eq!(CanScan.replying(&CanScan.question(7).unwrap()), None);
         assert_eq!(CanScan.replying(&frame(0x181, &[7, 0, 0, 0, 0, 0])), None);
     }
 
     #[test]
     fn no_question_starts_a_motor() {
-        assert_eq!(format!("{:?}", CanScan.question(7)), "007#FFFFFFFFFFFFFFFD");
-        let fd = FdScan.question(7);
+        assert_eq!(format!("{:?}", CanScan.question(7).unwrap()), "007#FFFFFFFFFFFFFFFD");
+        let fd = FdScan.question(7).unwrap();
         assert_eq!((fd.payload(), FdScan.replying(&fd)), (&[0; 16][..], None), "run is 0, and zero is 0");
         assert!(CanScan.consequence().is_some() && FdScan.consequence().is_some());
     }

@@ -2,10 +2,11 @@
 
 use std::ops::RangeInclusive;
 
-use takt_rt::Nanoseconds;
+use takt_rt::{Frame, Id, Nanoseconds};
 
 use super::Scanned;
 use super::canopen;
+use super::conclusion;
 use super::device::{Answered, FoundDevice};
 use super::heard::{Heard, HeardDrive, HeardNode};
 use super::own_protocol::OwnProtocol;
@@ -23,9 +24,9 @@ const LISTENING_STEP_NS: Nanoseconds = 20_000_000;
 const ROUNDS: usize = 2;
 /// The highest node ID of CANopen.
 const HIGHEST_NODE: u8 = 127;
-
-/// More frames in a second than drives send that nobody commands: a third of what a bus of 1 Mbit/s carries.
-const FLOODED_HZ: f64 = 3_000.0;
+/// Before anything is asked. Drives that send heartbeats of their own do so several times in this time: some of them would take a question
+/// for a command.
+const LISTENING_FIRST_NS: Nanoseconds = 250_000_000;
 
 /// What is asked on a CAN bus.
 #[derive(Clone, Debug)]
@@ -49,7 +50,7 @@ pub struct BusScan {
 /// The procedure of a scan. It never fails: interrupted, it ends with what it has found so far.
 pub fn scan_bus(scan: BusScan) -> Procedure<ScanClient, Scanned, Failure> {
     let session = ScanSession::new(ScanClient::new());
-    let work = Scan { session: session.clone(), scan, done: 0, of: 0 };
+    let work = Scan { session: session.clone(), scan, done: 0, of: 0, left_out: None };
     Procedure::new(session, async move { Ok(work.carry_out().await) })
 }
 
@@ -59,6 +60,8 @@ struct Scan {
     /// Questions that were asked, and all of them.
     done: u32,
     of: u32,
+    /// Who was not asked because of others.
+    left_out: Option<String>,
 }
 
 impl Scan {
@@ -68,6 +71,8 @@ impl Scan {
         let asked: Vec<(usize, &'static dyn OwnProtocol)> =
             protocols.into_iter().enumerate().filter(|(_, protocol)| self.may_ask(*protocol)).collect();
         if !self.scan.only_listens {
+            self.session.step("listen");
+            self.session.pause(LISTENING_FIRST_NS).await;
             let own = asked.iter().map(|(_, protocol)| self.asked_nodes(*protocol).count());
             let questions = ROUNDS * (own.sum::<usize>() + self.canopen_nodes().count());
             self.of = u32::try_from(questions).unwrap_or(u32::MAX);
@@ -80,25 +85,40 @@ impl Scan {
         }
         let is_interrupted = self.session.is_interrupted();
         self.session.heard(|heard| {
-            add_heard(heard, &mut devices);
-            mark_duplicates(heard, &mut devices);
+            conclusion::add_heard(heard, &mut devices);
+            conclusion::mark_duplicates(heard, &mut devices);
             devices.sort_by_key(|device| (device.node.is_none(), device.node));
-            let mut remarks = remarks(heard, self.session.now_ns());
+            let mut remarks = conclusion::remarks(heard, self.session.now_ns());
             // That its own controller is active is no news.
-            remarks.extend(self.scan.of_controller.is_none().then(|| active_master(heard)).flatten());
+            let is_news = self.scan.of_controller.is_none();
+            remarks.extend(is_news.then(|| conclusion::active_master(heard)).flatten());
+            remarks.extend(self.left_out);
             Scanned { devices, remarks, is_interrupted }
         })
     }
 
+    /// Whose question may disturb another drive is asked last: the longer one listens, the more is known of the others.
     async fn ask_round(
         &mut self,
         asked: &[(usize, &'static dyn OwnProtocol)],
         devices: &mut Vec<FoundDevice>,
     ) {
-        for (place, protocol) in asked {
-            self.ask_in(*place, *protocol, devices).await;
+        let (first, last): (Vec<_>, Vec<_>) =
+            asked.iter().partition(|(_, protocol)| self.disturbs_nobody(*protocol));
+        for (place, protocol) in first {
+            self.ask_in(place, protocol, devices).await;
         }
         self.ask_canopen(devices).await;
+        for (place, protocol) in last {
+            self.ask_in(place, protocol, devices).await;
+        }
+    }
+
+    /// Whether the question of a protocol is no command to any drive, whoever is on the bus.
+    fn disturbs_nobody(&self, protocol: &dyn OwnProtocol) -> bool {
+        let Some(question) = protocol.question(1) else { return true };
+        let harms = |other: &&'static dyn OwnProtocol| other.is_harmed_by(question.id());
+        protocol.consequence().is_none() && !self.session.heard(|heard| heard.protocols().iter().any(harms))
     }
 
     /// Listens for the rest of the time that was wished for.
@@ -118,7 +138,8 @@ impl Scan {
     /// Whether the question of a protocol may be asked on this bus.
     fn may_ask(&self, protocol: &dyn OwnProtocol) -> bool {
         let is_allowed = self.scan.may_take_torque || protocol.consequence().is_none();
-        is_allowed && (self.scan.has_fd || !protocol.question(1).is_fd())
+        let may_be_sent = |question: Frame| self.scan.has_fd || !question.is_fd();
+        is_allowed && protocol.question(1).is_some_and(may_be_sent)
     }
 
     /// The node IDs that may be asked.
@@ -154,17 +175,19 @@ impl Scan {
             if self.session.is_interrupted() {
                 break;
             }
+            let Some(question) = protocol.question(node) else { break };
             let twin = protocol.shares_sdo_with(node);
             // It has shown that it is a CANopen node: the question would reach its SDO server.
             let is_of_node = |heard: &Heard, twin| heard.node(twin).is_some_and(HeardNode::is_there);
             let is_taken = twin.is_some_and(|twin| self.session.heard(|heard| is_of_node(heard, twin)));
-            if !is_taken && !known.contains(&node) {
+            if !is_taken && !known.contains(&node) && self.reaches_nobody_else(place, protocol, question.id())
+            {
                 self.session.count_request(|heard| {
                     heard.own_request(place, node);
                     // Should it be there and quiet so far, its SDO server may reply to this.
                     twin.into_iter().for_each(|twin| heard.sdo_request(twin));
                 });
-                self.session.send_frame(protocol.question(node));
+                self.session.send_frame(question);
                 self.session.pause(SPACING_NS).await;
             }
             self.asked_one();
@@ -180,6 +203,21 @@ impl Scan {
         }
     }
 
+    /// Whether a question is one to nobody but the drives of its protocol. What is left out because of drives that are heard is remembered.
+    fn reaches_nobody_else(&mut self, place: usize, protocol: &dyn OwnProtocol, id: Id) -> bool {
+        if let Some(other) = self.session.heard(|heard| heard.would_take(id)) {
+            let (name, other) = (protocol.name(), other.name());
+            self.left_out.get_or_insert_with(|| {
+                format!(
+                    "not every node was asked by {name}: a drive is heard that speaks {other}, and the question (identifier {id:?}) could \
+                     be a command to it"
+                )
+            });
+            return false;
+        }
+        !self.session.heard(|heard| heard.is_command_to_other(place, id))
+    }
+
     /// Asks every node that has not answered yet for its device type (1000), and reads what those tell that answer.
     async fn ask_canopen(&mut self, devices: &mut Vec<FoundDevice>) {
         self.session.step("CANopen");
@@ -188,10 +226,12 @@ impl Scan {
             if self.session.is_interrupted() {
                 break;
             }
-            // A request to such a node would be one to the drive that has answered in its own protocol.
-            if !known.contains(&node) && !self.is_own_drive(node) {
+            let question = SdoRequest::Upload { object: DEVICE_TYPE.address }.frame(node);
+            let is_of_other = self.session.heard(|heard| heard.would_take(question.id()).is_some());
+            // A request to such a node would be one to the drive that has answered in its own protocol, or is heard.
+            if !known.contains(&node) && !self.is_own_drive(node) && !is_of_other {
                 self.session.count_request(|heard| heard.sdo_request(node));
-                self.session.send_frame(SdoRequest::Upload { object: DEVICE_TYPE.address }.frame(node));
+                self.session.send_frame(question);
                 self.session.pause(SPACING_NS).await;
             }
             self.asked_one();
@@ -224,73 +264,4 @@ impl Scan {
 /// The node IDs of the devices that have answered so.
 fn known_nodes(devices: &[FoundDevice], answered: Answered) -> Vec<u8> {
     devices.iter().filter(|device| device.answered == answered).filter_map(|device| device.node).collect()
-}
-
-/// Adds the devices that were heard alone.
-fn add_heard(heard: &Heard, devices: &mut Vec<FoundDevice>) {
-    for (place, protocol) in heard.protocols().iter().enumerate() {
-        for (node, _) in heard.drives_of(place) {
-            let is_known = devices
-                .iter()
-                .any(|device| device.node == Some(node) && device.answered == Answered::Own(protocol.name()));
-            if !is_known {
-                devices.push(protocol.overheard(node));
-            }
-        }
-    }
-    for (node, shown) in heard.nodes() {
-        let place = devices.iter().position(|device| {
-            device.node == Some(node) && matches!(device.answered, Answered::Sdo | Answered::Heard(_))
-        });
-        match place.and_then(|place| devices.get_mut(place)) {
-            Some(device) => canopen::remark_heard(device, shown),
-            None => devices.extend(canopen::heard_alone(node, shown)),
-        }
-    }
-}
-
-/// Remarks on devices that share a node ID.
-fn mark_duplicates(heard: &Heard, devices: &mut [FoundDevice]) {
-    for device in devices {
-        let Some(node) = device.node else { continue };
-        let is_double = match device.answered {
-            Answered::Sdo => heard.node(node).is_some_and(HeardNode::answers_twice),
-            Answered::Own(name) => heard.protocols().iter().enumerate().any(|(place, protocol)| {
-                protocol.name() == name
-                    && heard.drives_of(place).any(|(drive, heard)| drive == node && heard.answers_twice())
-            }),
-            Answered::Heard(_) | Answered::Modbus { .. } | Answered::Lss | Answered::OfController => false,
-        };
-        if is_double {
-            device.remark(
-                "two devices answer with this node ID, and what stands here may be of either: give one of them another ID",
-            );
-        }
-    }
-}
-
-/// That another master is active, if one is.
-fn active_master(heard: &Heard) -> Option<String> {
-    let frames = heard.master_frames();
-    (frames > 0).then(|| format!("a master is active: {frames} of its frames were heard"))
-}
-
-/// What is odd on the bus as a whole.
-fn remarks(heard: &Heard, duration_ns: Nanoseconds) -> Vec<String> {
-    let mut remarks = vec![];
-    let rate = heard.frames() as f64 / (duration_ns.max(1) as f64 * 1e-9);
-    if rate > FLOODED_HZ {
-        remarks.push(format!(
-            "the bus is flooded: {rate:.0} frames/s were heard, so that answers may be missing; `takt monitor --stats` shows who sends \
-             them"
-        ));
-    }
-    let others: Vec<String> = heard.others().map(|(id, frames)| format!("{id:?} ({frames})")).collect();
-    if !others.is_empty() {
-        remarks.push(format!(
-            "frames that belong to nothing known here, by identifier: {}; `takt monitor` shows them",
-            others.join(", ")
-        ));
-    }
-    remarks
 }

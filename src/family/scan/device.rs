@@ -59,6 +59,8 @@ pub struct FoundDevice {
     pub identity: Option<NodeIdentity>,
     /// The identifier of its replies, where that is a setting of its own.
     pub reply_id: Option<u32>,
+    /// Lines of its axis, where it has told them or its description has them.
+    pub axis_keys: Vec<String>,
     /// Its data sheet, where one was given that has its vendor and product.
     pub sheet: Option<PathBuf>,
     /// The family that drives it, as `drive` names it in a configuration.
@@ -80,6 +82,7 @@ impl FoundDevice {
             serial: None,
             identity: None,
             reply_id: None,
+            axis_keys: vec![],
             sheet: None,
             drive: None,
             remarks: vec![],

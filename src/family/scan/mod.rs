@@ -1,7 +1,7 @@
 //! What is on a bus or on a serial line, without a configuration. Devices are asked what changes nothing in them, and heard.
 //!
 //! ```text
-//! bus ── a CAN bus: protocols of vendors, then CANopen, listening all the while
+//! bus ── a CAN bus: protocols of vendors and CANopen, listening all the while; conclusion ── what follows from what was heard
 //! line ── a serial line: Modbus slaves, one address after the other
 //!   │
 //! canopen ── what a CANopen node tells of itself
@@ -19,6 +19,7 @@
 
 mod bus;
 mod canopen;
+mod conclusion;
 mod device;
 mod heard;
 mod line;
@@ -31,7 +32,7 @@ pub use bus::{BusScan, scan_bus};
 pub use canopen::{NodeIdentity, Recognised};
 pub use device::{Answered, FoundDevice};
 pub use line::{LineScan, scan_line};
-pub use own_protocol::{OwnProtocol, Reading};
+pub use own_protocol::{Likeness, OwnProtocol, Reading};
 pub use reading::reply_to_reading;
 pub use session::{ScanClient, ScanSession};
 pub use starting::{PlaceOfScan, StartingKeys, can_drive, starting_configuration};
