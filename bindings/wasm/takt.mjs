@@ -35,7 +35,7 @@ export class Takt {
     return this.#text("takt_advance", by_ms);
   }
 
-  // Each of these throws { error, words } when it is refused.
+  // Each of these throws { error, words: { en, zh } } when it is refused.
   command(command) {
     this.#order("takt_command", command);
   }

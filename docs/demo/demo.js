@@ -1,7 +1,7 @@
 // The page of the panel on a simulated arm, with what the panel has not: breaking it, and reading its black box.
 
 import { Arm } from "./arm.js";
-import { element, isChinese, put } from "./texts.js";
+import { element, isChinese, put, told } from "./texts.js";
 
 const WORDS = {
   title: ["A simulated arm, in this page alone", "仅在本页面中运行的仿真机械臂"],
@@ -101,7 +101,7 @@ class Demo {
       this.#arm.takt.break(what, Number(this.#axis.value), isBroken);
       if (STATES.includes(what)) isBroken ? this.#broken.add(key) : this.#broken.delete(key);
     } catch (refusal) {
-      put(this.#result, refusal.words ?? refusal.message);
+      put(this.#result, refusal.words ? told(refusal.words) : refusal.message);
     }
     this.#show();
   }

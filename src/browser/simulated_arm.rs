@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use serde_json::json;
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds, StopCategory};
 
 use super::breakage::Breakage;
 use crate::config::{Config, ConfigSources};
 use crate::controller::{Events, VirtualController, assemble};
-use crate::panel::command::{Command, CommandRefusal, target_of};
+use crate::panel::command::{Command, ProblemView, target_of};
 use crate::panel::motions::{LOOK, Motions, Problem};
 use crate::panel::view::{EventView, MachineView, Viewer};
 use crate::telemetry::{
@@ -135,7 +135,7 @@ impl SimulatedArm {
             self.controller.pass(LOOK.min(Duration::from_nanos(left_ns)));
             let problems = std::cell::RefCell::new(String::new());
             self.motions.look(|Problem { refusal, .. }| {
-                problems.borrow_mut().push_str(&message("problem", &refused(&refusal)));
+                problems.borrow_mut().push_str(&message("problem", &refusal.view()));
             });
             messages.push_str(&problems.into_inner());
         }
@@ -154,7 +154,7 @@ impl SimulatedArm {
     pub fn command(&mut self, command: &str) -> Result<(), String> {
         let command: Command = read(command)?;
         let carried_out = self.motions.carry_out(PAGE, command, self.motions.stops(), &|| true);
-        carried_out.map_err(|refusal| text(&refused(&refusal)))
+        carried_out.map_err(|refusal| text(&refusal.view()))
     }
 
     /// Stops a group, or all: `{"group": null, "category": 1}`.
@@ -171,7 +171,7 @@ impl SimulatedArm {
         };
         let stopped = target_of(group, self.controller.machine())
             .and_then(|target| self.motions.stop(target, category));
-        stopped.map_err(|refusal| text(&refused(&refusal)))
+        stopped.map_err(|refusal| text(&refusal.view()))
     }
 
     /// Breaks something, or mends it: `{"what": "silent", "axis": 2, "is_broken": true}`.
@@ -249,17 +249,15 @@ fn read<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, String> {
     serde_json::from_str(text).map_err(|error| malformed(&error.to_string()))
 }
 
-fn refused(refusal: &CommandRefusal) -> Value {
-    json!({ "error": refusal.key(), "words": refusal.to_string() })
-}
-
 fn malformed(words: &str) -> String {
-    json!({ "error": "refused", "words": words }).to_string()
+    json!(ProblemView::of("refused", words.to_owned())).to_string()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::Value;
+
     use crate::browser::replay::replay;
 
     fn arm() -> SimulatedArm {

@@ -68,6 +68,10 @@ pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACT
 /// YZ-AIM integrated servo, CANopen edition.
 pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
 
+/// A sentence of takt in English, and the same in Chinese. `{0}` is a name or a number, which stays as it is; `<1>` is made of words, which have a
+/// phrase of their own. They are numbered in the order of the English sentence.
+pub type ChinesePhrase = (&'static str, &'static str);
+
 /// Describes frames in words.
 pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
 
@@ -227,6 +231,12 @@ pub trait Family: ConfiguredFamily {
     /// What clears a fault with this code, where the family knows more than the standard.
     fn error_cure(&self, _code: u16) -> Option<&'static str> {
         None
+    }
+
+    /// What the family says, in Chinese, beside what drives share: its errors and their cures, what fails in commissioning, what a scan
+    /// remarks. A sentence without a phrase stays English.
+    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
+        vec![]
     }
 
     /// How its node ID and bit rate are set, where its drives have no LSS (CiA 305): a sentence for people.

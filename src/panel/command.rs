@@ -2,9 +2,10 @@
 
 use std::time::Duration;
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use takt_rt::{OperationMode, RequestTarget};
 
+use super::chinese::Words;
 use crate::command::{CommandError, MotionError, MotionId, MoveOptions, RunningController};
 use crate::telemetry::Machine;
 
@@ -196,6 +197,26 @@ impl CommandRefusal {
             Self::BusyWithDrive => "busy_with_drive",
             _ => "refused",
         }
+    }
+
+    /// As pages are told it.
+    pub fn view(&self) -> ProblemView {
+        ProblemView::of(self.key(), self.to_string())
+    }
+}
+
+/// A problem as pages are told it.
+#[derive(Debug, Serialize)]
+pub struct ProblemView {
+    /// Its word for programs.
+    error: &'static str,
+    words: Words,
+}
+
+impl ProblemView {
+    /// A problem in the words of takt.
+    pub fn of(error: &'static str, words: String) -> Self {
+        Self { error, words: Words::of(words) }
     }
 }
 

@@ -24,7 +24,7 @@ use tokio::sync::{Notify, watch};
 use tokio::time::{MissedTickBehavior, interval, timeout};
 
 use super::access::{Access, Denied};
-use super::command::CommandRefusal;
+use super::command::{CommandRefusal, ProblemView};
 use super::connections::Connection;
 use super::page::File;
 use super::pages::{PageNumber, PageRefusal, Pages};
@@ -211,9 +211,10 @@ impl From<CommandRefusal> for Problematic {
     }
 }
 
-impl IntoResponse for Problematic {
-    fn into_response(self) -> Response {
-        let (status, key, words) = match &self {
+impl Problematic {
+    /// Its status, its word for programs, and its words.
+    pub fn told(&self) -> (StatusCode, &'static str, String) {
+        match self {
             Self::Denied(denied @ Denied::Token) => (StatusCode::UNAUTHORIZED, "token", denied.to_string()),
             Self::Denied(denied) => (StatusCode::FORBIDDEN, "site", denied.to_string()),
             Self::NoHeader => (StatusCode::FORBIDDEN, "header", format!("the header {OWN} is missing")),
@@ -247,8 +248,14 @@ impl IntoResponse for Problematic {
             Self::Malformed(words) => {
                 (StatusCode::BAD_REQUEST, "malformed", format!("this is no command: {words}"))
             }
-        };
-        let mut response = json_response(status, &json!({ "error": key, "words": words }));
+        }
+    }
+}
+
+impl IntoResponse for Problematic {
+    fn into_response(self) -> Response {
+        let (status, key, words) = self.told();
+        let mut response = json_response(status, &ProblemView::of(key, words));
         if status == StatusCode::UNAUTHORIZED {
             response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }

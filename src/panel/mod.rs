@@ -20,6 +20,7 @@
 mod access;
 #[cfg(feature = "panel")]
 mod bench;
+mod chinese;
 pub(crate) mod command;
 #[cfg(feature = "panel")]
 mod connections;

@@ -12,7 +12,6 @@ use axum::http::header::HeaderMap;
 use axum::response::Response;
 use axum::routing::{get, post};
 use serde::Deserialize;
-use serde_json::json;
 use takt_rt::StopCategory;
 use tokio::sync::oneshot;
 
@@ -197,8 +196,7 @@ impl Server {
     pub fn lead_motions(&self) {
         let may_move = |page| self.gate.pages().may_move(page, Instant::now());
         let tell = |Problem { page, refusal }: Problem| {
-            let view = json!({ "error": refusal.key(), "words": refusal.to_string() });
-            self.gate.tell(Some(page), |_| message("problem", &view));
+            self.gate.tell(Some(page), |_| message("problem", &refusal.view()));
         };
         self.motions.run(may_move, tell);
     }

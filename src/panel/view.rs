@@ -7,6 +7,7 @@ use takt_rt::{
     BusHealth, BusState, Event, EventKind, Nanoseconds, RequestTarget, Snapshot, StopReason, TimingLevel,
 };
 
+use super::chinese::Words;
 use super::pages::PageNumber;
 use crate::command::RunningController;
 use crate::telemetry::{Machine, words};
@@ -131,8 +132,8 @@ struct StopView {
     category: u8,
     /// Whether it must be cleared.
     is_fault: bool,
-    words: String,
-    cure: Option<&'static str>,
+    words: Words,
+    cure: Option<Words>,
 }
 
 #[derive(Serialize)]
@@ -158,8 +159,8 @@ struct AxisView {
 #[derive(Serialize)]
 struct ErrorView {
     code: u16,
-    words: String,
-    cure: &'static str,
+    words: Words,
+    cure: Words,
 }
 
 #[derive(Serialize)]
@@ -270,16 +271,16 @@ fn stop_view(stop: &StopReason, machine: &Machine) -> StopView {
         axis: stop.axis(),
         category: stop.category as u8,
         is_fault: !stop.is_requested(),
-        words: words::stop_cause(stop, machine),
-        cure: words::stop_cure(stop, machine),
+        words: Words::of(words::stop_cause(stop, machine)),
+        cure: words::stop_cure(stop, machine).map(Words::of),
     }
 }
 
 fn axis_view(number: u8, axis: &takt_rt::AxisSnapshot, state: &Snapshot, machine: &Machine) -> AxisView {
     let error = (axis.error_code != 0).then(|| ErrorView {
         code: axis.error_code,
-        words: machine.drive_error(number, axis.error_code),
-        cure: machine.drive_cure(number, axis.error_code),
+        words: Words::of(machine.drive_error(number, axis.error_code)),
+        cure: Words::of(machine.drive_cure(number, axis.error_code)),
     });
     AxisView {
         position: rounded(axis.position),
@@ -339,7 +340,7 @@ pub struct EventView {
     time_ms: u64,
     /// `fault`, `warning` or `info`
     level: &'static str,
-    words: String,
+    words: Words,
 }
 
 impl EventView {
@@ -352,17 +353,17 @@ impl EventView {
             EventKind::Timing { level } if level != TimingLevel::Normal => "warning",
             _ => "info",
         };
-        Self { number, time_ms, level, words: words::event(event, machine) }
+        Self { number, time_ms, level, words: Words::of(words::event(event, machine)) }
     }
 
     /// What the panel itself has to say.
     pub fn said(number: u64, level: &'static str, words: String) -> Self {
-        Self { number, time_ms: time_ms(), level, words }
+        Self { number, time_ms: time_ms(), level, words: Words::of(words) }
     }
 
     /// Of events that came faster than they were read.
     pub fn missed(number: u64, count: u64, time_ms: u64) -> Self {
-        let words = format!("{count} events were missed: they came too fast");
+        let words = Words::of(format!("{count} events were missed: they came too fast"));
         Self { number, time_ms, level: "warning", words }
     }
 }

@@ -94,7 +94,7 @@ fn a_page_that_asks_too_often_is_told_so_and_may_still_stop() {
         (0..200).map(|_| page.command(&json!({ "do": "clear_faults" }))).find(|(status, _)| *status != 200);
     let (status, value) = refused.expect("200 commands at once were taken");
     assert_eq!((status, &value["error"]), (429, &json!("too_often")));
-    assert!(value["words"].as_str().unwrap().contains("10 a second"), "{value}");
+    assert!(value["words"]["en"].as_str().unwrap().contains("10 a second"), "{value}");
     for _ in 0..100 {
         assert_eq!(post(shown.address(), "/api/stop", "", r#"{"category":2}"#).0, 200);
     }

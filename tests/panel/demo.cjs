@@ -66,6 +66,18 @@ async function main() {
     await phase(tab, "Holding");
     await tab.locator("#language").click();
     assert.match(await tab.locator("#demo h2").textContent(), /仿真/);
+    // What takt has said is there in Chinese; and so is what it refuses now.
+    await tab.locator("#events li", { hasText: "状态：" }).first().waitFor({ timeout: LONG });
+    const english = (await tab.locator("#events li span").allTextContents()).filter((words) => !/[\u4e00-\u9fff]/.test(words));
+    assert.deepEqual(english, [], `${name}: events without Chinese words`);
+    await tab.locator("#tab-mode").click();
+    await tab.locator("#field-mode").selectOption("1");
+    await tab.locator("#kind button", { hasText: "更改模式" }).click();
+    await tab.locator("#said", { hasText: "被拒绝" }).waitFor({ timeout: LONG });
+    await tab.locator("#broken-axis").selectOption("1");
+    await tab.evaluate(() => document.getElementById("break-over_voltage").click());
+    await tab.locator("#faults .banner", { hasText: /joint2 的驱动器报告故障.*过压.*建议：/ }).waitFor({ timeout: LONG });
+    await tab.screenshot({ path: path.join(folder, `demo-${name}-chinese.png`) });
     assert.ok(await tab.evaluate(() => document.documentElement.scrollWidth <= innerWidth), `${name}: wider than the screen`);
     assert.deepEqual(problems, [], name);
     console.log(`${name}: the arm of the demonstration moves, stops, tells why, and begins anew`);

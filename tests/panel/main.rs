@@ -137,7 +137,7 @@ fn what_a_page_has_let_go_is_not_stopped_any_more_when_the_page_gives_command_ba
     let messages = page.messages.lock().unwrap();
     let stops = messages
         .iter()
-        .filter(|(kind, event)| kind == "event" && event["words"].as_str().unwrap().contains("stop"));
+        .filter(|(kind, event)| kind == "event" && event["words"]["en"].as_str().unwrap().contains("stop"));
     assert_eq!(stops.collect::<Vec<_>>(), Vec::<&(String, Value)>::new());
 }
 
@@ -273,8 +273,10 @@ fn a_fault_is_told_with_its_words_and_is_cleared_by_the_page() {
         (&stop["rule"], &stop["axis"], &stop["is_fault"]),
         (&json!("drive_fault"), &json!(1), &json!(true))
     );
-    assert!(stop["words"].as_str().unwrap().contains("joint2 reports fault"), "{stop}");
-    assert!(!stop["cure"].as_str().unwrap().is_empty(), "{stop}");
+    assert!(stop["words"]["en"].as_str().unwrap().contains("joint2 reports fault"), "{stop}");
+    assert!(!stop["cure"]["en"].as_str().unwrap().is_empty(), "{stop}");
+    assert!(stop["words"]["zh"].as_str().unwrap().contains("joint2 的驱动器报告故障"), "{stop}");
+    assert!(stop["cure"]["zh"].as_str().unwrap().contains("让驱动器冷却"), "{stop}");
     let words = page.is_refused(&json!({ "do": "enable" }), 409, "refused");
     assert!(words.contains("must be reset first"), "{words}");
     page.does(&json!({ "do": "clear_faults" }));
@@ -282,7 +284,7 @@ fn a_fault_is_told_with_its_words_and_is_cleared_by_the_page() {
     shown.until_phase(Phase::Holding);
     // A page that is opened later is told what has happened.
     let late = shown.open();
-    let mut told = std::iter::repeat_with(|| late.next("event")["words"].as_str().unwrap().to_owned());
+    let mut told = std::iter::repeat_with(|| late.next("event")["words"]["en"].as_str().unwrap().to_owned());
     let stop = told.find(|words| words.starts_with("stop: ") && !words.contains("requested"));
     assert!(stop.unwrap().contains("joint2"));
 }

@@ -184,7 +184,7 @@ impl Page {
     pub fn is_refused(&mut self, command: &Value, with: u16, key: &str) -> String {
         let (status, value) = self.command(command);
         assert_eq!((status, value["error"].as_str()), (with, Some(key)), "{command}: {value}");
-        value["words"].as_str().unwrap().to_owned()
+        value["words"]["en"].as_str().unwrap().to_owned()
     }
 
     /// The next message of this kind.
@@ -252,7 +252,7 @@ pub fn hold_until(shown: &Shown, page: &mut Page, velocity: f64, is_so: impl Fn(
             true => page.command(&json!({ "do": "renew", "axis": 0, "value": velocity })),
             false => page.command(&jog(0, velocity)),
         };
-        let words = value["words"].as_str().unwrap_or_default();
+        let words = value["words"]["en"].as_str().unwrap_or_default();
         // A busy machine misses slots as well, and begins no stream then.
         let is_late = value["error"] == "nothing_to_renew" || words.contains("slots were missed");
         assert!(status == 200 || value["error"] == "too_often" || is_late, "{value}");

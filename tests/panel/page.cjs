@@ -153,6 +153,14 @@ async function looksRight(panel, name) {
   assert.equal(overflow, 0, `${name} is wider than its window`);
 }
 
+// What takt says on a Chinese page: Han, and no English words but those of names and what stands in backticks.
+function isChinese(words) {
+  const outside = words.split("`").filter((_, place) => place % 2 === 0).join(" ");
+  const english = outside.match(/[a-z]{3,}\d*/g) ?? [];
+  assert.match(words, /[\u4e00-\u9fff]/, words);
+  assert.deepEqual(english.filter((word) => !/^(joint\d|rad|base|wrist|takt|modes)$/.test(word)), [], words);
+}
+
 const steps = {
   async "a page takes command, moves an axis, and disables and enables it"({ browser, address }) {
     const panel = await Panel.open(browser, address);
@@ -287,7 +295,7 @@ const steps = {
         await panel.page.locator("#axes-title", { hasText: "轴" }).waitFor();
         await panel.page.locator("#unit").click();
         await panel.page.locator(".position", { hasText: "rad" }).first().waitFor();
-        // English words in Chinese are those of names, units and events.
+        // English words in Chinese are those of names and units.
         const left = await panel.page.evaluate(() => [...document.querySelectorAll("h2, h3, dt, button, label span, .soft")].map((one) => one.textContent.trim()).filter((words) => /[a-z]{4,}/.test(words) && !/[\u4e00-\u9fff]/.test(words)));
         const names = ["joint1", "joint2", "joint3", "joint4", "joint5", "joint6", "English", "base (sim)", "wrist (sim)"];
         assert.deepEqual(left.filter((words) => !names.includes(words)), []);
@@ -352,6 +360,52 @@ const steps = {
     await panel.page.context().close();
   },
 
+  async "what takt says is Chinese on a Chinese page: a refused command, a fault, a stop"({ browser, place }) {
+    fs.writeFileSync(path.join(place, "fault.toml"), FAULT);
+    const own = await arm(place, "--faults", path.join(place, "fault.toml"));
+    const panel = await Panel.open(browser, own.address, { locale: "zh-CN" });
+    const { page } = panel;
+    const said = async (words) => {
+      await page.locator("#said", { hasText: words }).waitFor({ timeout: LONG });
+      isChinese(await page.locator("#said").textContent());
+    };
+    await panel.take();
+    await page.locator("#axes .pick").nth(1).click();
+    await panel.tab("mode");
+    await page.locator("#field-mode").selectOption("1");
+    await page.locator("#kind button", { hasText: "更改模式" }).click();
+    await said("被拒绝");
+    await panel.tab("absolute");
+    await page.fill("#field-target", "60");
+    await page.fill("#field-speed_part", "100");
+    await page.fill("#field-acceleration_part", "100");
+    await page.locator("#kind .primary").click();
+    const banner = page.locator("#faults .banner.fault");
+    await banner.waitFor({ timeout: LONG });
+    await panel.phase("未使能");
+    assert.match(await banner.textContent(), /joint2 的驱动器报告故障 0x4310（驱动器温度过高）.*建议：让驱动器冷却/s);
+    isChinese(await banner.textContent());
+    isChinese(await page.locator("#axes .axis .error").nth(1).textContent());
+    await page.locator("#events li", { hasText: "停止：joint2 的驱动器报告故障" }).waitFor({ timeout: LONG });
+    await looksRight(panel, "fault-chinese");
+    // While a page is looked at by a program, it confirms nothing.
+    await panel.take();
+    await banner.locator("button").click();
+    await banner.waitFor({ state: "detached", timeout: LONG });
+    await page.locator("#groups .enable").first().click();
+    await panel.phase("保持");
+    await page.keyboard.press("Escape");
+    await page.locator("#events li", { hasText: "停止：收到停止请求" }).waitFor({ timeout: LONG });
+    for (const words of await page.locator("#events li span").allTextContents()) isChinese(words);
+    // What was told before is there in the other language, too.
+    await page.locator("#language").click();
+    await page.locator("#events li", { hasText: "stop: a stop was requested" }).waitFor({ timeout: LONG });
+    await panel.close();
+    own.process.removeAllListeners("exit");
+    own.process.kill("SIGINT");
+    await ended(own.process);
+  },
+
   async "drives are commissioned without a controller, in both languages"({ browser }) {
     const config = path.join(__dirname, "../../configs/single-erob.toml");
     const bench = await start("panel", config, "--address", "127.0.0.1:0");
@@ -376,6 +430,14 @@ const steps = {
       await page.locator("#cycle").fill("2000");
       await page.locator("#cycle-write").click();
       await isDone(words("communication cycle", "通信周期"));
+      if (isChinese) {
+        // What cannot be done is told with why, and what helps.
+        await panel.tab("home");
+        await page.locator("#kind .primary:enabled").waitFor({ timeout: LONG });
+        await page.locator("#kind input").first().fill("17");
+        await page.locator("#kind .primary").click();
+        await page.locator("#result h3.refused", { hasText: "回零方法 17 需要限位开关" }).waitFor({ timeout: LONG });
+      }
 
       await page.locator("#watch:enabled").click();
       await page.locator("#reading .position dd").waitFor({ timeout: LONG });
@@ -407,7 +469,7 @@ const steps = {
 
       // A frame is not sent while the drive has torque.
       await page.locator("#send:enabled").click();
-      await page.locator("#said", { hasText: "has torque" }).waitFor({ timeout: LONG });
+      await page.locator("#said", { hasText: words("has torque", "带有转矩。未发送任何帧") }).waitFor({ timeout: LONG });
       await page.locator("#disable:enabled").click();
       await isDone(words("disable", "去使能"));
       await page.locator("#drives .torque").waitFor({ state: "hidden", timeout: LONG });

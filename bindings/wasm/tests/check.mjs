@@ -64,8 +64,8 @@ class Arm {
     for (const message of this.#takt.advance(ms).split("\n\n").filter(Boolean)) {
       const [, name, data] = /^event: (\w+)\ndata: (.*)$/.exec(message);
       if (name === "state") this.state = JSON.parse(data);
-      if (name === "event") this.events.push(JSON.parse(data).words);
-      if (name === "problem") this.problems.push(JSON.parse(data).words);
+      if (name === "event") this.events.push(JSON.parse(data).words.en);
+      if (name === "problem") this.problems.push(JSON.parse(data).words.en);
     }
     return this;
   }
@@ -85,7 +85,7 @@ check("the simulated arm moves where it is told to, and jogs while it is told to
   arm.takt.command(move(1, 0.3));
   arm.pass(2000);
   assert.ok(Math.abs(arm.state.axes[1].position - 0.3) < 1e-3, `${arm.state.axes[1].position}`);
-  assert.throws(() => arm.takt.command(move(1, 99)), (refusal) => refusal.error === "refused" && /joint2/.test(refusal.words));
+  assert.throws(() => arm.takt.command(move(1, 99)), (refusal) => refusal.error === "refused" && /joint2/.test(refusal.words.en) && /位置限值|超出/.test(refusal.words.zh));
   arm.takt.command({ do: "drive", axis: 0, quantity: "velocity", value: 0.5, while: "held" });
   for (let renewals = 0; renewals < 10; renewals += 1) {
     arm.takt.command({ do: "renew", axis: 0, value: 0.5 });

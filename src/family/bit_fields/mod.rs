@@ -4,6 +4,7 @@
 //! A description says everything of a make of drive; nothing here knows one. It comes with takt (`drives/bit-fields/`), or from a file of
 //! your own. Families of one vendor are the same with their own words.
 
+mod chinese;
 mod commission;
 mod device;
 mod scan;
@@ -18,7 +19,7 @@ use takt_rt::{
 use super::bring_up::{AxisSession, ProcessData};
 use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
-use super::{DataSheet, Family, LookingAtSlave, SettingUp, UNWATCHED_SHUT_DOWN_NS};
+use super::{ChinesePhrase, DataSheet, Family, LookingAtSlave, SettingUp, UNWATCHED_SHUT_DOWN_NS};
 use crate::config::bit_fields::{
     self, BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings,
 };
@@ -66,6 +67,8 @@ pub struct FoundBy {
     pub on_line: Option<LookOnLine>,
     /// The keys of an axis with such a drive.
     pub starting_keys: fn(&FoundDevice) -> Option<StartingKeys>,
+    /// What is said of them then, in Chinese.
+    pub chinese_phrases: &'static [ChinesePhrase],
 }
 
 /// Drives whose description the configuration names.
@@ -345,6 +348,11 @@ impl Family for BitFieldFamily {
 
     fn error_cure(&self, _: u16) -> Option<&'static str> {
         Some("remove its cause, then reset the fault; if it stays, power-cycle the drive")
+    }
+
+    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
+        let of_scan = self.found_by.map_or(&[][..], |found_by| found_by.chinese_phrases);
+        [chinese::PHRASES, of_scan].concat()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

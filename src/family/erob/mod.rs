@@ -9,6 +9,7 @@
 //! - `following`: the velocity that leads a joint beside the cycle, and the times of that.
 //! - `simulated`: the module that stands in for an axis.
 
+pub mod chinese;
 pub mod following;
 pub mod module;
 pub mod motion;

@@ -11,7 +11,7 @@ pub use facts::FACTS;
 use takt_rt::Frame;
 
 use super::scan::{FoundDevice, StartingKeys};
-use super::{Family, OtherProtocol, SettingUp, erob_can};
+use super::{ChinesePhrase, Family, OtherProtocol, SettingUp, erob, erob_can};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
@@ -80,6 +80,10 @@ impl Family for ErobCanopen {
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         errors::error_advice(ErrorCode(code))
+    }
+
+    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
+        erob::chinese::PHRASES.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

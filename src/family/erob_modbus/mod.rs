@@ -34,7 +34,10 @@ use takt_rt::Frame;
 
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
 use super::scan::{FoundDevice, StartingKeys};
-use super::{Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, erob_can};
+use super::{
+    ChinesePhrase, Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, erob,
+    erob_can,
+};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::erob::selection;
@@ -145,6 +148,10 @@ impl Family for ErobModbus {
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         Some(FaultCode(code).cure())
+    }
+
+    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
+        erob::chinese::PHRASES.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

@@ -68,8 +68,8 @@ impl OwnProtocol for CanScan {
     fn read<'a>(&'a self, _: &'a ScanSession, node: u8, reply: Frame) -> Reading<'a> {
         Box::pin(async move {
             let mut device = motor(node, Answered::Own(CAN_NAME));
-            let mode = if reply.payload().len() == 6 { "normal mode" } else { "extended mode" };
-            device.kind = format!("{} in {mode}", CAN.name);
+            let mode = if reply.payload().len() == 6 { "in normal mode" } else { "in extended mode" };
+            device.kind = format!("{} {mode}", CAN.name);
             show_reply(&mut device, &reply);
             device.remark(ALIKE);
             device

@@ -5,6 +5,7 @@
 
 mod alarm;
 mod bring_up;
+mod chinese;
 mod commission;
 mod facts;
 mod process_data;
@@ -16,7 +17,7 @@ pub(crate) use process_data::answers_sync;
 use takt_rt::Frame;
 
 use super::scan::{FoundDevice, StartingKeys};
-use super::{Family, MappingMatch, SettingUp};
+use super::{ChinesePhrase, Family, MappingMatch, SettingUp};
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
@@ -84,6 +85,10 @@ impl Family for YzAim {
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         Some(Alarm::of(code).advice().unwrap_or(super::error_words::UNKNOWN))
+    }
+
+    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
+        chinese::PHRASES.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

@@ -4,6 +4,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use takt_rt::BusHealth;
 
+use super::super::chinese::Words;
 use super::super::pages::PageNumber;
 use super::super::view::{bus_state, rounded};
 use crate::commission::{AxisReading, Failure, ProcedureError, Report, ReportItem, TargetDrive};
@@ -33,13 +34,13 @@ pub struct DriveView {
 /// What a scan has found.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundView {
-    protocol: String,
-    kind: String,
+    protocol: Words,
+    kind: Words,
     vendor: Option<String>,
     product: Option<String>,
     firmware: Option<String>,
     serial: Option<String>,
-    remarks: Vec<String>,
+    remarks: Vec<Words>,
 }
 
 impl FoundView {
@@ -50,13 +51,13 @@ impl FoundView {
 
     pub fn of(found: &FoundDevice) -> Self {
         Self {
-            protocol: found.answered.words(),
-            kind: found.kind.clone(),
+            protocol: Words::of(found.answered.words()),
+            kind: Words::of(&*found.kind),
             vendor: found.vendor.clone(),
             product: found.product.clone(),
             firmware: found.firmware.clone(),
             serial: found.serial.clone(),
-            remarks: found.remarks.clone(),
+            remarks: found.remarks.iter().map(|remark| Words::of(&**remark)).collect(),
         }
     }
 }
@@ -215,18 +216,19 @@ pub fn outcome(
     let items: Vec<Value> = outcome.as_ref().map_or_else(
         |_| vec![],
         |report| {
-            let item = |item: &ReportItem| json!({ "key": item.key, "label": item.label, "text": item.text });
+            let item = |item: &ReportItem| json!({ "key": item.key, "label": item.label, "text": Words::of(&*item.text) });
             report.items().iter().map(item).collect()
         },
     );
+    let notes: Vec<Words> = notes.iter().map(|note| Words::of(&**note)).collect();
     let consequence = match failed.map(|failed| &failed.failure) {
-        Some(Failure::NeedsConsent { consequence, .. }) => Some(*consequence),
+        Some(Failure::NeedsConsent { consequence, .. }) => Some(Words::of(*consequence)),
         _ => None,
     };
     json!({
         "drive": drive, "action": action, "ended": ended, "step": failed.map(|failed| failed.step),
-        "failure": failed.map(|failed| failed.failure.to_string()),
-        "advice": failed.and_then(|failed| failed.failure.advice()),
+        "failure": failed.map(|failed| Words::of(failed.failure.to_string())),
+        "advice": failed.and_then(|failed| failed.failure.advice()).map(Words::of),
         "consequence": consequence, "items": items, "notes": notes,
     })
 }

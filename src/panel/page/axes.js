@@ -1,6 +1,6 @@
 // The axes, their bars and figures; the groups with what they can be told.
 
-import { element, put, text, textOr } from "./texts.js";
+import { element, put, sentences, text, textOr, told } from "./texts.js";
 import { position, shown, torque, unitOf, velocity } from "./units.js";
 
 const FIGURES = ["velocity", "following_error_short", "torque", "current", "temperature"];
@@ -84,7 +84,7 @@ export class Axes {
     put(row.figures.current, state.current_per_mille === null ? "–" : shown(state.current_per_mille / 10, 1, "%"));
     put(row.figures.temperature, state.temperature === null ? "–" : shown(state.temperature, 0, "°C"));
     row.error.hidden = state.error === null;
-    if (state.error) put(row.error, `${state.error.words}. ${text("try_this", state.error.cure)}`);
+    if (state.error) put(row.error, sentences(told(state.error.words), text("try_this", told(state.error.cure))));
   }
 
   #drive(state) {

@@ -5,7 +5,7 @@ import { askToken, find, forgetEvents, link, say, sayProblem, showCommander, sho
 import { Monitor } from "./monitor.js";
 import { Plots } from "./plots.js";
 import { Tasks } from "./tasks.js";
-import { element, fill, isChinese, put, switchLanguage, text, textOr } from "./texts.js";
+import { element, fill, isChinese, put, sentences, switchLanguage, text, textOr, told } from "./texts.js";
 import { isInDegrees, parse, position, shown, switchUnit, torque, velocity } from "./units.js";
 
 let machine = null;
@@ -149,9 +149,9 @@ function drawDrives() {
     const facts = [
       ["node", one.node],
       ["family", one.family ?? text("no_family")],
-      ["protocol", found?.protocol],
+      ["protocol", found && told(found.protocol)],
       ["vendor", found?.vendor],
-      ["product", found?.product ?? found?.kind],
+      ["product", found?.product ?? (found && told(found.kind))],
       ["firmware", found?.firmware],
       ["serial_number", found?.serial],
     ].filter(([, value]) => value !== null && value !== undefined);
@@ -160,7 +160,7 @@ function drawDrives() {
       { class: "axis" },
       element("div", { class: "row" }, name, element("span", { class: "soft" }, machine.buses.length > 1 ? machine.buses[one.bus].name : ""), element("span", { class: "phase torque" })),
       element("dl", { class: "figures facts" }, ...facts.map(([label, value]) => element("div", {}, element("dt", {}, text(label)), element("dd", {}, String(value))))),
-      ...(found?.remarks ?? []).map((remark) => element("p", { class: "soft" }, remark)),
+      ...(found?.remarks ?? []).map((remark) => element("p", { class: "soft" }, told(remark))),
     );
   });
   find("drives").replaceChildren(...(rows.length ? rows : [element("li", { class: "soft" }, text("no_drives"))]));
@@ -287,27 +287,30 @@ function showDrives() {
 }
 
 async function showOutcome(outcome) {
-  const name = machine?.drives[outcome.drive]?.name ?? "";
-  const action = text(`action_${outcome.action}`);
   if (outcome.consequence !== null && commands() && outcome.drive === chosen) {
-    if (await sure(text("consent", outcome.consequence), text("do_it"))) task({ kind: outcome.action, is_confirmed: true });
+    if (await sure(text("consent", told(outcome.consequence)), text("do_it"))) task({ kind: outcome.action, is_confirmed: true });
     return;
   }
-  const words = [outcome.failure, outcome.advice && text("try_this", outcome.advice)].filter(Boolean).join(". ");
-  result = { words: text(`ended_${outcome.ended}`, name, action, words), outcome };
-  if (["failed", "refused"].includes(outcome.ended)) say(result.words);
+  result = outcome;
+  if (["failed", "refused"].includes(outcome.ended)) say(howEnded(outcome));
   const cycle = outcome.items.find(({ key }) => key === "value" || key === "1006:00");
-  if (outcome.action === "cycle" && cycle && outcome.drive === chosen) find("cycle").value = cycle.text.replace(/[^\d].*$/, "");
+  if (outcome.action === "cycle" && cycle && outcome.drive === chosen) find("cycle").value = cycle.text.en.replace(/[^\d].*$/, "");
   showResult();
+}
+
+function howEnded({ drive: number, action, ended, failure, advice }) {
+  const name = machine?.drives[number]?.name ?? "";
+  const why = sentences(failure && told(failure), advice && text("try_this", told(advice)));
+  return text(`ended_${ended}`, name, text(`action_${action}`), why);
 }
 
 function showResult() {
   if (result === null) return find("result").replaceChildren();
-  const { words, outcome } = result;
+  const item = ({ label, text: value }) => element("div", {}, element("dt", {}, textOr(`label_${label.replaceAll(" ", "_").toLowerCase()}`, label)), element("dd", {}, told(value)));
   find("result").replaceChildren(
-    element("h3", { class: outcome.ended }, words),
-    ...outcome.notes.map((note) => element("p", { class: "soft" }, note)),
-    ...(outcome.items.length ? [element("dl", { class: "report" }, ...outcome.items.map(({ label, text: value }) => element("div", {}, element("dt", {}, textOr(`label_${label.replaceAll(" ", "_").toLowerCase()}`, label)), element("dd", {}, value))))] : []),
+    element("h3", { class: result.ended }, howEnded(result)),
+    ...result.notes.map((note) => element("p", { class: "soft" }, told(note))),
+    ...(result.items.length ? [element("dl", { class: "report" }, ...result.items.map(item))] : []),
   );
 }
 

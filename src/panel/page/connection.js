@@ -122,10 +122,10 @@ export class Connection {
     try {
       answer = await fetch(path, { method: "POST", headers, body, keepalive: true });
     } catch {
-      throw { error: "unreachable", words: "" };
+      throw { error: "unreachable", words: null };
     }
     const told = await answer.json().catch(() => ({}));
-    if (!answer.ok) throw { error: told.error ?? "unreachable", words: told.words ?? `HTTP ${answer.status}` };
+    if (!answer.ok) throw { error: told.error ?? "unreachable", words: told.words ?? { en: `HTTP ${answer.status}`, zh: `HTTP ${answer.status}` } };
   }
 
   // Each of these throws { error, words } when it is refused.

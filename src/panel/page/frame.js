@@ -1,6 +1,6 @@
 // What the pages of a controller and of commissioning share: what is said, the link, the stop, and the questions.
 
-import { element, isChinese, put, text, textOr } from "./texts.js";
+import { element, put, text, told, toldElement } from "./texts.js";
 
 export const find = (id) => document.getElementById(id);
 
@@ -12,11 +12,8 @@ export function say(words) {
   sayTimer = setTimeout(() => (find("said").textContent = ""), 6000);
 }
 
-// What takt says itself is in English; for what has a text here, that comes first.
-export function sayProblem({ error, words }) {
-  const own = textOr(`error_${error}`, "");
-  say(isChinese() && own ? (error === "refused" ? `${own} ${words}` : own) : words || own);
-}
+// A problem without words is one of the page itself.
+export const sayProblem = ({ words }) => say(words ? told(words) : text("error_unreachable"));
 
 let linkState = "connecting";
 export function link(key = linkState) {
@@ -106,6 +103,6 @@ export function showEvent(event) {
   const time = new Date(event.time_ms);
   const clock = time.toLocaleTimeString("en-GB") + "." + String(time.getMilliseconds()).padStart(3, "0");
   const list = find("events");
-  list.prepend(element("li", {}, element("time", { datetime: time.toISOString() }, clock), element("span", { class: event.level }, event.words)));
+  list.prepend(element("li", {}, element("time", { datetime: time.toISOString() }, clock), toldElement("span", { class: event.level }, event.words)));
   while (list.children.length > EVENTS_SHOWN) list.lastChild.remove();
 }

@@ -6,7 +6,7 @@ import { askToken, find, forgetEvents, isTyping, link, say, sayProblem as sayIt,
 import { Monitor } from "./monitor.js";
 import { Motion } from "./motion.js";
 import { Histogram, Plots } from "./plots.js";
-import { element, fill, isChinese, put, switchLanguage, text, textOr } from "./texts.js";
+import { element, fill, isChinese, put, switchLanguage, text, textOr, told } from "./texts.js";
 import { isInDegrees, shown, switchUnit } from "./units.js";
 
 let machine = null;
@@ -178,9 +178,7 @@ function showFaults() {
   if (key === faultsShown) return;
   faultsShown = key;
   const banner = ({ stop, number, phase }) => {
-    // What takt says itself is in English.
-    const own = textOr(`cure_${stop.rule}`, "");
-    const cure = isChinese() && own ? own : stop.cure ?? own;
+    const cure = stop.cure ? told(stop.cure) : textOr(`cure_${stop.rule}`, "");
     const clear = element("button", { type: "button", class: "primary", onclick: () => act("clear_fault", number) }, text("clear_fault"));
     clear.disabled = !commands() || phase === "stopping";
     return element(
@@ -188,7 +186,7 @@ function showFaults() {
       { class: "banner fault" },
       element("h2", {}, text("fault_of", textOr(`rule_${stop.rule}`, stop.rule))),
       element("div", { class: "buttons" }, clear),
-      element("p", {}, stop.words),
+      element("p", {}, told(stop.words)),
       element("p", { class: "cure" }, cure ? text("try_this", cure) : ""),
     );
   };

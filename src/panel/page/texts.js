@@ -112,19 +112,7 @@ export const TEXTS = {
   set_point: ["set-point", "设定值"],
   actual: ["actual", "实际值"],
 
-  error_not_commander: ["This page does not command.", "本页面没有控制权。"],
-  error_not_present: ["States do not reach this page at present, so it moves nothing.", "状态数据暂未到达本页面，因此不能驱动。"],
-  error_not_open: ["The connection of this page is lost.", "本页面的连接已断开。"],
-  error_too_often: ["Too many commands in too short a time.", "指令过于频繁。"],
-  error_overtaken: ["A later command has overtaken this one.", "该指令已被后来的指令取代。"],
-  error_discarded: ["A stop has discarded the command.", "停止已取消该指令。"],
-  error_nothing_to_renew: ["The motion has ended.", "该运动已结束。"],
-  error_busy: ["Too many commands wait for the controller.", "等待控制器的指令过多。"],
-  error_lease: ["Another program commands this controller.", "另一个程序正在控制。"],
-  error_refused: ["Refused.", "被拒绝。"],
-  error_ended: ["The controller has ended.", "控制器已结束。"],
   error_unreachable: ["takt does not answer.", "takt 没有响应。"],
-  error_token: ["The token is missing or wrong.", "令牌缺失或错误。"],
 
   bench: ["Commissioning", "调试"],
   nodes: ["Buses and drives", "总线与驱动器"],
@@ -208,8 +196,6 @@ export const TEXTS = {
   count: ["How often", "次数"],
   period: ["Every (ms)", "间隔 (ms)"],
   send: ["Send", "发送"],
-  error_busy_with_drive: ["Something is done with a drive already: wait for its end, or end it.", "正在操作驱动器：请等待结束或先结束它。"],
-  error_malformed: ["This is no command.", "这不是有效指令。"],
 
   label_acceleration: ["acceleration", "加速度"],
   label_after: ["after", "之后"],
@@ -419,9 +405,19 @@ export function text(key, ...parts) {
 // The text of a key that may not be there.
 export const textOr = (key, otherwise) => (TEXTS[key] ? text(key) : otherwise);
 
+// What takt says itself comes in both languages.
+export const told = (words) => words[language];
+
+// Sentences, one after the other.
+export const sentences = (...all) => all.filter(Boolean).join(isChinese() ? "。" : ". ");
+
+// An element with what takt says, in the language that the page has and will have.
+export const toldElement = (tag, attributes, words) => element(tag, { ...attributes, "data-en": words.en, "data-zh": words.zh }, told(words));
+
 // Fills in the texts of a part of the page.
 export function fill(root) {
   document.documentElement.lang = isChinese() ? "zh-CN" : "en";
+  for (const element of root.querySelectorAll("[data-en]")) element.textContent = element.dataset[language];
   for (const element of root.querySelectorAll("[data-text]")) element.textContent = text(element.dataset.text);
   for (const element of root.querySelectorAll("[data-label]")) {
     element.setAttribute("aria-label", text(element.dataset.label));

@@ -48,9 +48,12 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
     };
     match rejected.reason {
         RejectReason::Phase => format!("not possible while {}", phase(rejected.phase)),
+        RejectReason::StopLatched { rule } if rejected.axis.is_some() => {
+            let rule = rule_key(rule);
+            format!("the group has stopped for a fault of {axis} ({rule}), which must be reset first")
+        }
         RejectReason::StopLatched { rule } => {
-            let of = rejected.axis.map_or_else(String::new, |_| format!(" of {axis}"));
-            format!("the group has stopped for a fault{of} ({}), which must be reset first", rule_key(rule))
+            format!("the group has stopped for a fault ({}), which must be reset first", rule_key(rule))
         }
         RejectReason::EnableInhibited => "the run is ending".to_owned(),
         RejectReason::MissedSlots { missed, limit } => {

@@ -13,7 +13,7 @@ use takt::family::bring_up::{
     pdo_mapping,
 };
 use takt::family::commission::{DriveTask, Failure, TargetDrive, Task};
-use takt::family::{Family, SettingUp};
+use takt::family::{ChinesePhrase, Family, SettingUp};
 use takt::rt::{Frame, controlword};
 use takt::sim::Drive;
 use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
@@ -99,6 +99,10 @@ impl Family for BeltServo {
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         (code == 0xFF01).then_some("put a new belt on")
+    }
+
+    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
+        vec![("belt torn", "皮带断裂"), ("put a new belt on", "更换新的皮带")]
     }
 
     fn commission(&self, _: TargetDrive, _: Task) -> Result<DriveTask<Frame>, Failure> {

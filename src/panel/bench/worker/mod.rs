@@ -9,10 +9,10 @@ use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use serde_json::json;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Nanoseconds};
 
+use super::super::command::ProblemView;
 use super::super::gate::message;
 use super::super::pages::PageNumber;
 use super::asked::{Ask, AskedTask};
@@ -123,7 +123,7 @@ impl Worker {
             Ask::Renew {} | Ask::End {} => Ok(()),
         };
         if let Err(words) = result {
-            let problem = json!({ "error": "refused", "words": words });
+            let problem = ProblemView::of("refused", words);
             self.bench.gate.tell(Some(page), |_| message("problem", &problem));
         }
         self.finish();
