@@ -79,7 +79,12 @@ pub static FROM_FILE: BitFieldFamily = BitFieldFamily {
     describe: described,
     on_line: None,
     pulse_width: None,
-    found_by: Some(FoundBy { protocols: scan::protocols, on_line: None, starting_keys: scan::starting_keys }),
+    found_by: Some(FoundBy {
+        protocols: scan::protocols,
+        on_line: None,
+        starting_keys: scan::starting_keys,
+        chinese_phrases: scan::CHINESE_PHRASES,
+    }),
 };
 
 /// The descriptions that come with takt.

@@ -4,6 +4,7 @@
 //! - `registers`: drives whose registers can be read.
 //! - `heartbeat`: drives that send heartbeats by themselves.
 
+mod chinese;
 mod heartbeat;
 mod registers;
 
@@ -14,6 +15,7 @@ use takt_rt::{CommandValue, FieldMode};
 use super::{FROM_FILE, SHIPPED, shipped};
 use crate::config::bit_fields::{DescribedScan, Description, FieldDevice, Settings};
 use crate::family::scan::{FoundDevice, OwnProtocol, StartingKeys};
+pub use chinese::PHRASES as CHINESE_PHRASES;
 use heartbeat::HeartbeatDrives;
 use registers::RegisterDrives;
 
