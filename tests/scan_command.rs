@@ -85,6 +85,10 @@ fn motors_with_registers_become_a_configuration_that_drives_them() {
         assert!(text.contains(words), "{words}: {text}");
     }
     let file = simulated.path.with_file_name("found.toml");
+    // What only the owner of the machine knows.
+    let joint =
+        "inertia = \"0.03 kg m^2\", viscous_friction = \"0.05 Nm s/rad\", coulomb_friction = \"0.1 Nm\"";
+    let text = text.replace("kd = 1.5", &format!("joint = {{ {joint} }}\nkd = 1.5"));
     let program = "\n[[program.move]]\nto = [\"20 deg\", \"-20 deg\", \"10 deg\"]\n";
     fs::write(&file, text + program).unwrap();
     let checked = takt("check").arg(&file).output().unwrap();
@@ -94,7 +98,7 @@ fn motors_with_registers_become_a_configuration_that_drives_them() {
     let report: Value = serde_json::from_str(&said(&run)).unwrap();
     for (axis, degrees) in [20.0f64, -20.0, 10.0].into_iter().enumerate() {
         let reached = report["axes"][axis]["final_position"].as_f64().unwrap();
-        assert!((reached - degrees.to_radians()).abs() < 0.02, "{report}");
+        assert!((reached - degrees.to_radians()).abs() < 0.03, "{report}");
     }
 }
 

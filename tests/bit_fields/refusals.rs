@@ -173,7 +173,7 @@ fn what_is_said_of_how_a_drive_is_found_is_read_strictly_too() {
         ("0x33, \"register\", 0, 0, 0, 0]", "0x33, 7, 0, 0, 0, 0]", "a frame that reads"),
         ("0x33, \"register\", 0, 0, 0, 0]", "0x33, \"register\", 0, 0, 0]", "eight bytes"),
         ("\"value\", \"value\"]", "\"value\", 0]", "four times"),
-        ("torque_full_scale = 23", "torque = 23", "torque_full_scale"),
+        ("settings = {", "settingz = {", "settings"),
     ] {
         let problems = changed(from, to);
         assert!(problems.contains(word), "{to}: {problems}");

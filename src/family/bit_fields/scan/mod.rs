@@ -44,8 +44,8 @@ impl Make {
             return vec![];
         }
         let gains = [
-            (CommandValue::Stiffness, "kp = 20  # YOURS: the gain of the drive's position loop"),
-            (CommandValue::Damping, "kd = 1  # YOURS: the damping of the drive's position loop"),
+            (CommandValue::Stiffness, "kp = 60  # YOURS: the gain of the drive's position loop"),
+            (CommandValue::Damping, "kd = 1.5  # YOURS: the damping of the drive's position loop"),
         ];
         gains.into_iter().filter(|(value, _)| has(*value)).map(|(_, line)| line.to_owned()).collect()
     }
