@@ -34,6 +34,18 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ),
     ("identifier {0} is out of range: expected 0 to {1}", "标识符 {0} 超出范围：应为 0 至 {1}"),
     ("`{0}` is no hexadecimal digit", "`{0}` 不是十六进制数字"),
+    (
+        "one hexadecimal digit of flags belongs behind `##`: 0, or 1 for bit-rate switching (123##1DEAD)",
+        "`##` 之后须有一位十六进制标志：0，或 1 表示切换波特率 (123##1DEAD)",
+    ),
+    (
+        "behind `R` belongs nothing, or a length from 0 to 8: 701#R, 601#R8",
+        "`R` 之后须为空，或为 0 至 8 的长度：701#R、601#R8",
+    ),
+    (
+        "a length code behind `_` is not supported: the data has the length",
+        "不支持 `_` 之后的长度码：长度由数据决定",
+    ),
     ("the last byte has one digit instead of two", "最后一个字节只有一位数字，应为两位"),
     (
         "{0} bytes: a classic frame has at most 8; one of CAN FD begins with `##` and its flags",

@@ -231,7 +231,8 @@ mod tests {
         let mut seen = BTreeSet::new();
         for (english, chinese) in phrases() {
             assert!(seen.insert(english), "{english:?} stands twice");
-            let is_chinese = |letter| matches!(letter, '\u{4e00}'..='\u{9fff}' | '：' | '；' | '、' | '（');
+            let is_chinese =
+                |letter: char| matches!(letter, '\u{4e00}'..='\u{9fff}' | '：' | '；' | '、' | '（');
             assert!(chinese.contains(is_chinese), "{english:?}: {chinese:?}");
             let in_order: Vec<usize> = parts(english).iter().map(|(_, place)| *place).collect();
             assert!(in_order.iter().copied().eq(0..in_order.len()), "{english:?}");

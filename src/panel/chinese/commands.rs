@@ -160,7 +160,8 @@ mod tests {
             CommandRefusal::Busy,
             CommandRefusal::BusyWithDrive,
         ];
-        let all = (own.into_iter())
+        let all = own
+            .into_iter()
             .chain(of_controller.into_iter().chain(wrong_modes).map(CommandRefusal::from))
             .chain(leases.map(CommandError::from).map(CommandRefusal::from))
             .chain(motions.map(CommandRefusal::from))

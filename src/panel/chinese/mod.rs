@@ -66,7 +66,7 @@ mod tests {
             cycle_ns: 1_000_000,
             axes: vec![axis("shoulder", Unit::Radian), axis("slide", Unit::Metre)],
             buses: vec![bus],
-            groups: vec!["left".to_owned(), "right".to_owned()],
+            groups: ["left", "right", "slide"].map(str::to_owned).to_vec(),
         }
     }
 

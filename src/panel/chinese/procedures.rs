@@ -134,6 +134,9 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("the slave could not carry it out", "从站未能执行"),
     ("the slave has accepted it, and needs a long time for it", "从站已接受，需要较长时间"),
     ("the slave is busy", "从站忙"),
+    ("the memory of the slave has a parity error", "从站的存储器有奇偶校验错误"),
+    ("the gateway has no path to the slave", "网关没有通往从站的路径"),
+    ("the slave behind the gateway does not reply", "网关后的从站不应答"),
     // What is waited for.
     ("the acknowledgement of the set-point", "设定点的确认"),
     ("the end of the acknowledgement", "确认的结束"),
