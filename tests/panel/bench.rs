@@ -149,7 +149,7 @@ fn a_scan_lists_who_is_there_and_an_unknown_drive_can_be_added_by_its_family() {
     until(&page, "a scan that has found something", |state| state["version"] == 2);
     let machine = bench.machine();
     let found = &machine["drives"][0]["found"];
-    assert_eq!(found["protocol"], "CANopen SDO", "{machine}");
+    assert_eq!(found["protocol"]["en"], "CANopen SDO", "{machine}");
     assert_eq!(
         (found["vendor"].as_str(), found["product"].as_str()),
         (Some("ZeroErr"), Some("eRob")),

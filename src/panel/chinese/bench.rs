@@ -65,7 +65,7 @@ mod tests {
     fn what_commissioning_says_is_chinese() {
         for sentence in [
             "slide may still have torque: it could not be disabled. Use the emergency stop",
-            "can0: 3 found, interrupted",
+            "left: 3 found, interrupted",
             "slide has torque. Nothing was sent: disable it first",
             "slide: the drive is no longer enabled (statusword 0x1250)",
             "-3 s: a time is 0 s to 86400 s",

@@ -12,9 +12,10 @@ use crate::family::{self, ChinesePhrase};
 
 /// No sentence of takt is longer, in bytes. What comes from elsewhere may be.
 const LONGEST: usize = 800;
+/// Of the phrases that match a sentence, so many are tried.
+const TRIED_AT_MOST: usize = 4;
 
-/// The phrases, those with the longest texts of their own first, otherwise in the order of the tables: the first one that a sentence matches
-/// is the one for it.
+/// The phrases, those with the longest texts of their own first, otherwise in the order of the tables.
 pub struct Book {
     phrases: Vec<Phrase>,
 }
@@ -40,6 +41,13 @@ impl Part {
     fn may_be(self, text: &str) -> bool {
         !text.is_empty() && (self == Self::Words || !(text.contains(": ") || text.contains("; ")))
     }
+}
+
+/// A sentence in Chinese.
+struct Found {
+    words: String,
+    /// Whether every part of it has a phrase.
+    is_whole: bool,
 }
 
 /// What comes next in a sentence of a phrase.
@@ -82,29 +90,50 @@ impl Book {
 
     /// A sentence in Chinese; `None` where no phrase is for it.
     pub fn chinese(&self, sentence: &str) -> Option<String> {
+        Some(self.found(sentence)?.words)
+    }
+
+    /// By the first phrase that leaves nothing in English, or else by the first one.
+    fn found(&self, sentence: &str) -> Option<Found> {
         if sentence.len() > LONGEST {
             return None;
         }
-        let mut found = self.phrases.iter().filter_map(|phrase| Some((phrase, phrase.parts_of(sentence)?)));
-        let (phrase, given) = found.next()?;
-        let parts = phrase.parts.iter().zip(&given);
-        let parts: Vec<Option<String>> = parts
+        let matching = self.phrases.iter().filter_map(|phrase| Some((phrase, phrase.parts_of(sentence)?)));
+        let filled = matching.take(TRIED_AT_MOST).filter_map(|(phrase, given)| self.filled(phrase, &given));
+        let mut first = None;
+        for found in filled {
+            if found.is_whole {
+                return Some(found);
+            }
+            first.get_or_insert(found);
+        }
+        first
+    }
+
+    /// A phrase with its parts; `None` where it only joins words without a phrase.
+    fn filled(&self, phrase: &Phrase, given: &[&str]) -> Option<Found> {
+        let parts = phrase.parts.iter().zip(given);
+        let parts: Vec<Option<Found>> = parts
             .map(|(part, given)| match part {
                 Part::Stays => None,
-                Part::Words => self.chinese(given),
+                Part::Words => self.found(given),
             })
             .collect();
         if phrase.is_join() && parts.iter().all(Option::is_none) {
             return None;
         }
-        let filled = pieces(phrase.chinese).map(|piece| match piece {
+        let is_whole =
+            phrase.parts.iter().zip(&parts).all(|(part, found)| {
+                *part == Part::Stays || found.as_ref().is_some_and(|found| found.is_whole)
+            });
+        let words = pieces(phrase.chinese).map(|piece| match piece {
             Piece::Text(text) => text,
             Piece::Part(_, place) => match parts.get(place) {
-                Some(Some(words)) => words.as_str(),
+                Some(Some(found)) => found.words.as_str(),
                 _ => given.get(place).copied().unwrap_or_default(),
             },
         });
-        Some(filled.collect())
+        Some(Found { words: words.collect(), is_whole })
     }
 }
 

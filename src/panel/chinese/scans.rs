@@ -31,7 +31,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("device without a node ID", "没有节点 ID 的设备"),
     ("Modbus slave", "Modbus 从站"),
     ("{0}, heard", "{0}（监听到）"),
-    ("Modbus-RTU at {0} bit/s", "Modbus-RTU，{0} bit/s"),
+    ("Modbus-RTU at {0} bit/s", "Modbus-RTU，速率 {0} bit/s"),
     ("not asked", "未询问"),
     // Remarks on a device.
     ("it answers SDO requests now and then: <0>", "它只是偶尔应答 SDO 请求：<0>"),
@@ -102,8 +102,8 @@ mod tests {
     #[test]
     fn what_a_scan_says_is_chinese() {
         for sentence in [
-            "can0: a master is active: 12 of its frames were heard",
-            "can0: 300 frames were lost before they were read: scan again",
+            "left: a master is active: 12 of its frames were heard",
+            "left: 300 frames were lost before they were read: scan again",
             "it reports an error: 0x4310 (excess temperature of the drive)",
             "it answers SDO requests now and then: no reply within 500 ms in 3 attempts",
             "CANopen node (heartbeat: pre-operational)",
