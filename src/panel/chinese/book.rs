@@ -4,7 +4,7 @@
 //! stays as it is; `<1>` is made of words, and looked up as well.
 
 use std::cmp::Reverse;
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::OnceLock;
 
 use super::{bench, commands, drive_errors, events, procedures, refusals, rejections, scans, stops};
@@ -12,8 +12,6 @@ use crate::family::{self, ChinesePhrase};
 
 /// No sentence of takt is longer, in bytes. What comes from elsewhere may be.
 const LONGEST: usize = 800;
-/// Of the phrases that match a sentence, so many are tried.
-const TRIED_AT_MOST: usize = 4;
 
 /// The phrases, those with the longest texts of their own first, otherwise in the order of the tables.
 pub struct Book {
@@ -44,11 +42,15 @@ impl Part {
 }
 
 /// A sentence in Chinese.
+#[derive(Clone)]
 struct Found {
     words: String,
-    /// Whether every part of it has a phrase.
-    is_whole: bool,
+    /// How much of the sentence stays as it is, in bytes.
+    left: usize,
 }
+
+/// Sentences that were looked up.
+type Known<'s> = HashMap<&'s str, Option<Found>>;
 
 /// What comes next in a sentence of a phrase.
 enum Piece {
@@ -90,42 +92,47 @@ impl Book {
 
     /// A sentence in Chinese; `None` where no phrase is for it.
     pub fn chinese(&self, sentence: &str) -> Option<String> {
-        Some(self.found(sentence)?.words)
+        Some(self.found(sentence, &mut HashMap::new())?.words)
     }
 
-    /// By the first phrase that leaves nothing in English, or else by the first one.
-    fn found(&self, sentence: &str) -> Option<Found> {
+    /// By the phrase that leaves the least as it is; of two that leave the same, the first one. What was looked up before is in `known`, so
+    /// that a sentence of many parts takes no longer than it has pairs of them.
+    fn found<'s>(&self, sentence: &'s str, known: &mut Known<'s>) -> Option<Found> {
         if sentence.len() > LONGEST {
             return None;
         }
-        let matching = self.phrases.iter().filter_map(|phrase| Some((phrase, phrase.parts_of(sentence)?)));
-        let filled = matching.take(TRIED_AT_MOST).filter_map(|(phrase, given)| self.filled(phrase, &given));
-        let mut first = None;
-        for found in filled {
-            if found.is_whole {
-                return Some(found);
-            }
-            first.get_or_insert(found);
+        if let Some(found) = known.get(sentence) {
+            return found.clone();
         }
-        first
+        let mut best: Option<Found> = None;
+        for phrase in &self.phrases {
+            let Some(given) = phrase.parts_of(sentence) else { continue };
+            let Some(found) = self.filled(phrase, &given, known) else { continue };
+            if best.as_ref().is_none_or(|best| found.left < best.left) {
+                best = Some(found);
+            }
+        }
+        known.insert(sentence, best.clone());
+        best
     }
 
     /// A phrase with its parts; `None` where it only joins words without a phrase.
-    fn filled(&self, phrase: &Phrase, given: &[&str]) -> Option<Found> {
+    fn filled<'s>(&self, phrase: &Phrase, given: &[&'s str], known: &mut Known<'s>) -> Option<Found> {
         let parts = phrase.parts.iter().zip(given);
         let parts: Vec<Option<Found>> = parts
             .map(|(part, given)| match part {
                 Part::Stays => None,
-                Part::Words => self.found(given),
+                Part::Words => self.found(given, known),
             })
             .collect();
         if phrase.is_join() && parts.iter().all(Option::is_none) {
             return None;
         }
-        let is_whole =
-            phrase.parts.iter().zip(&parts).all(|(part, found)| {
-                *part == Part::Stays || found.as_ref().is_some_and(|found| found.is_whole)
-            });
+        let left = parts.iter().zip(given).map(|(found, given)| match found {
+            Some(found) => found.left,
+            None => given.len(),
+        });
+        let left = left.sum();
         let words = pieces(phrase.chinese).map(|piece| match piece {
             Piece::Text(text) => text,
             Piece::Part(_, place) => match parts.get(place) {
@@ -133,7 +140,7 @@ impl Book {
                 _ => given.get(place).copied().unwrap_or_default(),
             },
         });
-        Some(Found { words: words.collect(), is_whole })
+        Some(Found { words: words.collect(), left })
     }
 }
 

@@ -30,7 +30,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("drive (CiA 402)", "驱动器 (CiA 402)"),
     ("device without a node ID", "没有节点 ID 的设备"),
     ("Modbus slave", "Modbus 从站"),
-    ("{0}, heard", "{0}（监听到）"),
+    ("<0>, heard", "<0>（监听到）"),
     ("Modbus-RTU at {0} bit/s", "Modbus-RTU，速率 {0} bit/s"),
     ("not asked", "未询问"),
     // Remarks on a device.
