@@ -555,6 +555,10 @@ fn a_question_that_has_an_identifier_of_a_drive_that_is_heard_is_not_sent() {
     assert_eq!(outcome.nodes(), [Some(48)], "{:#?}", outcome.found);
     let asked = |node: u32| outcome.sent.iter().any(|frame| frame.id().value() == 0x600 + node);
     assert_eq!([1, 12, 31, 32, 64].map(asked), [false, false, false, true, true]);
+    let remarks = outcome.found.remarks.join("; ");
+    for protocol in ["CANopen", "Damiao registers"] {
+        assert!(remarks.contains(&format!("not every node was asked by {protocol}: ")), "{remarks}");
+    }
 }
 
 #[test]

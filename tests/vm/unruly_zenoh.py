@@ -2,7 +2,7 @@
 
 One publishes ten trajectories a second, each of the next half second, and stalls for a third of a second after every 0.7 s. One publishes in
 bursts, as fast as it can, what must be refused: positions beyond every limit, and bytes that are no message. One takes a twentieth of a second
-for each joint state. The bridge is killed (`kill -9`) every two seconds, and started again.
+for each joint state. The bridge is killed (`kill -9`) every two seconds, and started again. Bursts and kills begin when the arm moves.
 
     python3 unruly_zenoh.py SERVED
 
@@ -69,6 +69,7 @@ class Unruly:
         time.sleep(0.333)
 
     def flood(self):
+        self.has_moved.wait()
         far = trajectory(JOINTS, [(0.1, [1e3] * len(JOINTS))])
         end = time.monotonic() + 0.2
         while time.monotonic() < end:
@@ -80,7 +81,6 @@ class Unruly:
     def keep_a_bridge(self, served):
         words = [os.environ["TAKT_ZENOH"], served, "--connect", ENDPOINT, "--listen", "tcp/127.0.0.1:0", "--domain", "0"]
         bridge = subprocess.Popen(words, stderr=subprocess.DEVNULL)
-        # The first one is left alone until the arm moves.
         self.has_moved.wait()
         self.is_over.wait(LIFE_OF_A_BRIDGE_S)
         if bridge.poll() is not None:

@@ -1,5 +1,6 @@
 //! The scan of a CAN bus.
 
+use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use takt_rt::{Frame, Id, Nanoseconds};
@@ -24,6 +25,8 @@ const LISTENING_STEP_NS: Nanoseconds = 20_000_000;
 const ROUNDS: usize = 2;
 /// The highest node ID of CANopen.
 const HIGHEST_NODE: u8 = 127;
+/// The name of the protocol of CANopen nodes.
+const CANOPEN: &str = "CANopen";
 /// Before anything is asked. Drives that send heartbeats of their own do so several times in this time: some of them would take a question
 /// for a command.
 const LISTENING_FIRST_NS: Nanoseconds = 250_000_000;
@@ -50,7 +53,7 @@ pub struct BusScan {
 /// The procedure of a scan. It never fails: interrupted, it ends with what it has found so far.
 pub fn scan_bus(scan: BusScan) -> Procedure<ScanClient, Scanned, Failure> {
     let session = ScanSession::new(ScanClient::new());
-    let work = Scan { session: session.clone(), scan, done: 0, of: 0, left_out: None };
+    let work = Scan { session: session.clone(), scan, done: 0, of: 0, left_out: BTreeMap::new() };
     Procedure::new(session, async move { Ok(work.carry_out().await) })
 }
 
@@ -60,8 +63,8 @@ struct Scan {
     /// Questions that were asked, and all of them.
     done: u32,
     of: u32,
-    /// Who was not asked because of others.
-    left_out: Option<String>,
+    /// What is to be said of each protocol in which not everybody was asked, because of other drives.
+    left_out: BTreeMap<&'static str, String>,
 }
 
 impl Scan {
@@ -92,7 +95,7 @@ impl Scan {
             // That its own controller is active is no news.
             let is_news = self.scan.of_controller.is_none();
             remarks.extend(is_news.then(|| conclusion::active_master(heard)).flatten());
-            remarks.extend(self.left_out);
+            remarks.extend(self.left_out.into_values());
             Scanned { devices, remarks, is_interrupted }
         })
     }
@@ -203,33 +206,39 @@ impl Scan {
         }
     }
 
-    /// Whether a question is one to nobody but the drives of its protocol. What is left out because of drives that are heard is remembered.
+    /// Whether a question is one to nobody but the drives of its protocol.
     fn reaches_nobody_else(&mut self, place: usize, protocol: &dyn OwnProtocol, id: Id) -> bool {
-        if let Some(other) = self.session.heard(|heard| heard.would_take(id)) {
-            let (name, other) = (protocol.name(), other.name());
-            self.left_out.get_or_insert_with(|| {
-                format!(
-                    "not every node was asked by {name}: a drive is heard that speaks {other}, and the question (identifier {id:?}) could \
-                     be a command to it"
-                )
-            });
-            return false;
-        }
-        !self.session.heard(|heard| heard.is_command_to_other(place, id))
+        !self.would_be_taken(protocol.name(), id)
+            && !self.session.heard(|heard| heard.is_command_to_other(place, id))
+    }
+
+    /// Whether a drive that is heard would take a question for a command. The first one of each protocol that is left out so is remembered.
+    fn would_be_taken(&mut self, asker: &'static str, id: Id) -> bool {
+        let Some(other) = self.session.heard(|heard| heard.would_take(id)) else { return false };
+        self.left_out.entry(asker).or_insert_with(|| {
+            format!(
+                "not every node was asked by {asker}: a drive is heard that speaks {}, and the question (identifier {id:?}) could be a \
+                 command to it",
+                other.name()
+            )
+        });
+        true
     }
 
     /// Asks every node that has not answered yet for its device type (1000), and reads what those tell that answer.
     async fn ask_canopen(&mut self, devices: &mut Vec<FoundDevice>) {
-        self.session.step("CANopen");
+        self.session.step(CANOPEN);
         let known = known_nodes(devices, Answered::Sdo);
         for node in self.canopen_nodes() {
             if self.session.is_interrupted() {
                 break;
             }
             let question = SdoRequest::Upload { object: DEVICE_TYPE.address }.frame(node);
-            let is_of_other = self.session.heard(|heard| heard.would_take(question.id()).is_some());
             // A request to such a node would be one to the drive that has answered in its own protocol, or is heard.
-            if !known.contains(&node) && !self.is_own_drive(node) && !is_of_other {
+            if !known.contains(&node)
+                && !self.is_own_drive(node)
+                && !self.would_be_taken(CANOPEN, question.id())
+            {
                 self.session.count_request(|heard| heard.sdo_request(node));
                 self.session.send_frame(question);
                 self.session.pause(SPACING_NS).await;

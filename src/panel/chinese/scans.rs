@@ -57,6 +57,10 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "它不是 takt 已知的驱动器；寄存器 0 被拒绝：<0>",
     ),
     // Remarks on a bus.
+    (
+        "not every node was asked by {0}: a drive is heard that speaks {1}, and the question (identifier {2}) could be a command to it",
+        "未用 {0} 询问所有节点：监听到使用 {1} 的驱动器，询问帧（标识符 {2}）可能被它当作命令",
+    ),
     ("a master is active: {0} of its frames were heard", "有主站正在工作：监听到它的 {0} 帧"),
     (
         "the bus is flooded: {0} frames/s were heard, so that answers may be missing; `takt monitor --stats` shows who sends them",
@@ -107,6 +111,8 @@ mod tests {
             "it reports an error: 0x4310 (excess temperature of the drive)",
             "it answers SDO requests now and then: no reply within 500 ms in 3 attempts",
             "CANopen node (heartbeat: pre-operational)",
+            "not every node was asked by CANopen: a drive is heard that speaks Modbus, and the question (identifier 0x601) could be a \
+             command to it",
             "servo drive (CiA 402)",
         ] {
             is_chinese(sentence);
