@@ -277,10 +277,14 @@ fn a_change_is_refused_behind_a_fault_until_it_is_reset() {
 }
 
 #[test]
-fn a_mode_that_the_axis_is_not_set_up_for_is_refused() {
+fn a_mode_that_is_none_of_those_of_an_axis_that_can_change_is_refused() {
     let mut rig = holding(ModeCondition::AtRest);
     let mode = OperationMode::ProfilePosition;
     assert_eq!(refusal(&mut rig, to(mode)), Some(RejectReason::UnknownMode { mode }));
+}
+
+#[test]
+fn an_axis_that_cannot_change_its_mode_is_refused_every_other_one() {
     let mut parameters = parameters(1);
     parameters.axes[0] = axis_in(ControlLaw::Position, 0, 1);
     let mut rig = Rig::of(parameters).enable();
