@@ -266,49 +266,52 @@ double *TaktSystem::Joint::command(const std::string &interface) {
     return interface == HW_IF_POSITION ? &position_command : interface == HW_IF_VELOCITY ? &velocity_command : &effort_command;
 }
 
-std::optional<std::vector<TaktSystem::Kind>> TaktSystem::switched(
-    const std::vector<std::string> &start, const std::vector<std::string> &stop) const {
-    std::vector<Kind> kinds;
-    if (!arm_) return kinds;
-    for (const auto &joint : joints_) {
-        Kind kind = joint.kind;
-        const auto is_of = [&](const std::string &key, const char *interface) { return key == joint.name + "/" + interface; };
-        const std::pair<const char *, Kind> known[] = {
-            {HW_IF_POSITION, Kind::position}, {HW_IF_VELOCITY, Kind::velocity}, {HW_IF_EFFORT, Kind::effort}};
-        for (const auto &key : stop)
-            for (const auto &[interface, of] : known)
-                if (is_of(key, interface) && kind == of) kind = Kind::hold;
-        for (const auto &key : start) {
-            for (const auto &[interface, of] : known) {
-                if (!is_of(key, interface)) continue;
-                if (kind != Kind::hold && kind != of) {
-                    complain(joint.name + ": two command interfaces are claimed at once");
-                    return std::nullopt;
-                }
-                kind = of;
+bool TaktSystem::Joint::has(const std::string &key, const char *interface) const {
+    return key.size() > name.size() && key[name.size()] == '/' && key.compare(0, name.size(), name) == 0 &&
+           key.compare(name.size() + 1, std::string::npos, interface) == 0;
+}
+
+std::optional<TaktSystem::Kind> TaktSystem::kind_after(
+    const Joint &joint, const std::vector<std::string> &start, const std::vector<std::string> &stop) const {
+    const std::pair<const char *, Kind> known[] = {
+        {HW_IF_POSITION, Kind::position}, {HW_IF_VELOCITY, Kind::velocity}, {HW_IF_EFFORT, Kind::effort}};
+    Kind kind = joint.kind;
+    for (const auto &key : stop)
+        for (const auto &[interface, of] : known)
+            if (joint.has(key, interface) && kind == of) kind = Kind::hold;
+    for (const auto &key : start) {
+        for (const auto &[interface, of] : known) {
+            if (!joint.has(key, interface)) continue;
+            if (kind != Kind::hold && kind != of) {
+                complain(joint.name + ": two command interfaces are claimed at once");
+                return std::nullopt;
             }
+            kind = of;
         }
-        if (kind == Kind::effort && state_[joint.axis].mode_set != cyclic_synchronous_torque) {
-            complain(joint.name + ": an effort needs mode = \"cst\" in the configuration");
-            return std::nullopt;
-        }
-        kinds.push_back(kind);
     }
-    return kinds;
+    if (kind == Kind::effort && state_[joint.axis].mode_set != cyclic_synchronous_torque) {
+        complain(joint.name + ": an effort needs mode = \"cst\" in the configuration");
+        return std::nullopt;
+    }
+    return kind;
+}
+
+bool TaktSystem::can_switch(const std::vector<std::string> &start, const std::vector<std::string> &stop) const {
+    return std::all_of(joints_.begin(), joints_.end(), [&](const Joint &joint) { return kind_after(joint, start, stop).has_value(); });
 }
 
 return_type TaktSystem::prepare_command_mode_switch(const std::vector<std::string> &start, const std::vector<std::string> &stop) {
-    return switched(start, stop) ? return_type::OK : return_type::ERROR;
+    return !arm_ || can_switch(start, stop) ? return_type::OK : return_type::ERROR;
 }
 
 return_type TaktSystem::perform_command_mode_switch(const std::vector<std::string> &start, const std::vector<std::string> &stop) {
+    if (!arm_) return return_type::OK;
     take_commands();
-    const auto kinds = switched(start, stop);
-    if (!kinds) return return_type::ERROR;
-    for (std::size_t number = 0; number < kinds->size(); number++) {
-        Joint &joint = joints_[number];
-        if (joint.kind == (*kinds)[number]) continue;
-        joint.kind = (*kinds)[number];
+    if (!can_switch(start, stop)) return return_type::ERROR;
+    for (Joint &joint : joints_) {
+        const Kind kind = kind_after(joint, start, stop).value_or(joint.kind);
+        if (joint.kind == kind) continue;
+        joint.kind = kind;
         // It goes on from where it is, whatever the interface was last used for.
         const auto &axis = state_[joint.axis];
         joint.held = joint.position_command = axis.position_set;

@@ -1,6 +1,21 @@
 // Leads a TaktSystem through its life, in virtual time, as a controller manager does.
 #include "manager.hpp"
 
+#include <cstdlib>
+#include <new>
+
+namespace {
+std::size_t allocations = 0;
+}
+
+void *operator new(std::size_t size) {
+    allocations++;
+    if (void *memory = std::malloc(size)) return memory;
+    throw std::bad_alloc();
+}
+void operator delete(void *memory) noexcept { std::free(memory); }
+void operator delete(void *memory, std::size_t) noexcept { std::free(memory); }
+
 int main(int count, char **arguments) {
     CHECK(count == 3);
     const std::string configuration = arguments[1];
@@ -65,8 +80,15 @@ int main(int count, char **arguments) {
     CHECK(manager.run(250) == return_type::OK);
     CHECK(std::abs(manager.state("joint1/position") - home) < 0.01);
 
+    // Neither a switch nor a cycle takes memory: the thread of the controller manager may be real-time.
+    const std::vector<std::string> claimed = {"joint1/position", "joint2/position"}, released;
+    CHECK(system.prepare_command_mode_switch(claimed, released) == return_type::OK);
+    const std::size_t allocated = allocations;
+    CHECK(system.perform_command_mode_switch(claimed, released) == return_type::OK);
+    CHECK(manager.run(3) == return_type::OK);
+    CHECK(allocations == allocated);
+
     // Positions.
-    CHECK(manager.switch_to({"joint1/position", "joint2/position"}, {}) == return_type::OK);
     CHECK(manager.run(500, [&](double time_s) {
         manager.command("joint1/position", home + 0.1 * (1.0 - std::cos(1.5 * time_s)));
         manager.command("joint2/position", home2);

@@ -84,6 +84,8 @@ private:
         /// Where it stays while nobody has claimed it.
         double held = 0.0;
 
+        /// Whether a key, as in joint1/velocity, is an interface of this joint.
+        bool has(const std::string &key, const char *interface) const;
         /// What a state interface or a command interface of this name is about.
         double *state(const std::string &interface);
         double *command(const std::string &interface);
@@ -98,8 +100,9 @@ private:
     void take_commands();
     /// Shows what a joint begins at, so that no command of an earlier time is followed.
     void show_commands();
-    /// The kinds of the joints after a switch; none if it is not possible, with the reason in the log.
-    std::optional<std::vector<Kind>> switched(const std::vector<std::string> &start, const std::vector<std::string> &stop) const;
+    /// The kind of a joint after a switch; none if it is not possible, with the reason in the log. It allocates only for that.
+    std::optional<Kind> kind_after(const Joint &joint, const std::vector<std::string> &start, const std::vector<std::string> &stop) const;
+    bool can_switch(const std::vector<std::string> &start, const std::vector<std::string> &stop) const;
     void take_state();
     void hold_all();
     bool come_to_rest_and_disable();
