@@ -422,6 +422,8 @@ const steps = {
       await panel.take();
 
       await page.locator("button.scan").click();
+      // The second page sees what the first one has found before its own scan has begun.
+      await page.locator("#enable:disabled").waitFor({ timeout: LONG });
       await page.locator("#drives .facts", { hasText: "CANopen SDO" }).waitFor({ timeout: LONG });
       await page.locator("#enable:enabled").waitFor({ timeout: LONG });
       await page.locator("#info").click();
