@@ -90,11 +90,11 @@
 //! `controller` assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its life (bring-up by
 //! `family`, `procedure` and `canopen`; enable, program, stop, disable, leave), and `telemetry` writes down what happened.
 #![deny(unsafe_code)]
-// Some names are passed on for the tests alone, to whom types of private modules are open.
-#![cfg_attr(not(feature = "internals"), allow(unused_imports))]
+// Some names are passed on for the tests alone, to whom types of private modules are open, and some for the program alone.
+#![cfg_attr(not(all(feature = "internals", feature = "cli")), allow(unused_imports))]
 #![cfg_attr(feature = "internals", allow(unnameable_types))]
-// Some functions, and names under which they are used, are for the program alone.
-#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
+// So are some functions.
+#![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
 #[cfg(feature = "browser")]
 #[doc(hidden)]
