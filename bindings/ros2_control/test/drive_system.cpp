@@ -8,13 +8,14 @@ namespace {
 std::size_t allocations = 0;
 }
 
-void *operator new(std::size_t size) {
+// Not inlined: the compiler warns of a `free` that it sees behind a `new`.
+__attribute__((noinline)) void *operator new(std::size_t size) {
     allocations++;
     if (void *memory = std::malloc(size)) return memory;
     throw std::bad_alloc();
 }
-void operator delete(void *memory) noexcept { std::free(memory); }
-void operator delete(void *memory, std::size_t) noexcept { std::free(memory); }
+__attribute__((noinline)) void operator delete(void *memory) noexcept { std::free(memory); }
+__attribute__((noinline)) void operator delete(void *memory, std::size_t) noexcept { std::free(memory); }
 
 int main(int count, char **arguments) {
     CHECK(count == 3);
