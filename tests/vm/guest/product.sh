@@ -258,7 +258,7 @@ drives_off
 machine idle "$other_cycles"
 drives_on 70 "$leg" vcan2
 try requests_of_leg idle $idle_allowance
-try behind_adapter idle
+in_a_long_run try behind_adapter idle
 load_on vcan2
 machine load "$other_cycles"
 try requests_of_leg load $load_allowance
@@ -273,7 +273,7 @@ if [ "$TAKT_VM" != host ]; then
     drives_on 40 "$half" can1
     machine idle "$other_cycles"
     try measure "takt, SJA1000" idle "$other_cycles" $idle_allowance 1000 "$half" can1 can0
-    try measure "takt, SJA1000, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$half_2ms" can1 can0
+    in_a_long_run try measure "takt, SJA1000, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$half_2ms" can1 can0
     load_on can0
     machine load "$other_cycles"
     try measure "takt, SJA1000" load "$other_cycles" $load_allowance 1000 "$half" can1 can0
@@ -284,6 +284,6 @@ fi
 
 for table in system_calls jitter; do
     echo
-    cat "$OUT/$table.txt"
+    [ ! -f "$OUT/$table.txt" ] || cat "$OUT/$table.txt"
 done
 exit $failed
