@@ -284,7 +284,7 @@ fn a_mode_that_is_none_of_those_of_an_axis_that_can_change_is_refused() {
 }
 
 #[test]
-fn an_axis_that_cannot_change_its_mode_is_refused_every_other_one() {
+fn an_axis_that_cannot_change_its_mode_refuses_every_other_one() {
     let mut parameters = parameters(1);
     parameters.axes[0] = axis_in(ControlLaw::Position, 0, 1);
     let mut rig = Rig::of(parameters).enable();

@@ -25,8 +25,6 @@ const LISTENING_STEP_NS: Nanoseconds = 20_000_000;
 const ROUNDS: usize = 2;
 /// The highest node ID of CANopen.
 const HIGHEST_NODE: u8 = 127;
-/// The name of the protocol of CANopen nodes.
-const CANOPEN: &str = "CANopen";
 /// Before anything is asked. Drives that send heartbeats of their own do so several times in this time: some of them would take a question
 /// for a command.
 const LISTENING_FIRST_NS: Nanoseconds = 250_000_000;
@@ -227,7 +225,7 @@ impl Scan {
 
     /// Asks every node that has not answered yet for its device type (1000), and reads what those tell that answer.
     async fn ask_canopen(&mut self, devices: &mut Vec<FoundDevice>) {
-        self.session.step(CANOPEN);
+        self.session.step(canopen::PROTOCOL);
         let known = known_nodes(devices, Answered::Sdo);
         for node in self.canopen_nodes() {
             if self.session.is_interrupted() {
@@ -237,7 +235,7 @@ impl Scan {
             // A request to such a node would be one to the drive that has answered in its own protocol, or is heard.
             if !known.contains(&node)
                 && !self.is_own_drive(node)
-                && !self.would_be_taken(CANOPEN, question.id())
+                && !self.would_be_taken(canopen::PROTOCOL, question.id())
             {
                 self.session.count_request(|heard| heard.sdo_request(node));
                 self.session.send_frame(question);

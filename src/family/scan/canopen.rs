@@ -16,6 +16,8 @@ use crate::printable::printable;
 
 /// A node of which nothing more is known.
 pub const KIND: &str = "CANopen node";
+/// The name of their protocol.
+pub const PROTOCOL: &str = "CANopen";
 /// The serial number (CiA 301, 7.5.2.19).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
 /// So long a node may take to answer while it is read. It has answered before.
@@ -195,7 +197,7 @@ pub fn heard_alone(node: u8, heard: &HeardNode) -> Option<FoundDevice> {
         None if heard.has_process_data => "process data",
         None => return None,
     };
-    let mut device = FoundDevice::new(Some(node), Answered::Heard("CANopen"), format!("{KIND} ({state})"));
+    let mut device = FoundDevice::new(Some(node), Answered::Heard(PROTOCOL), format!("{KIND} ({state})"));
     if heard.state == Some(NmtState::Stopped) {
         device.remark(
             "in the NMT state stopped it has no SDO server, so that it tells nothing of itself; a configuration with it starts it",

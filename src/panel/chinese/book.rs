@@ -95,8 +95,8 @@ impl Book {
         Some(self.found(sentence, &mut HashMap::new())?.words)
     }
 
-    /// By the phrase that leaves the least as it is; of two that leave the same, the first one. What was looked up before is in `known`, so
-    /// that a sentence of many parts takes no longer than it has pairs of them.
+    /// By the phrase that leaves the least as it is; of two that leave the same, the first one. `known` has what was
+    /// looked up before: the phrases divide a sentence in many ways, and most of these have parts in common.
     fn found<'s>(&self, sentence: &'s str, known: &mut Known<'s>) -> Option<Found> {
         if sentence.len() > LONGEST {
             return None;
@@ -128,11 +128,11 @@ impl Book {
         if phrase.is_join() && parts.iter().all(Option::is_none) {
             return None;
         }
-        let left = parts.iter().zip(given).map(|(found, given)| match found {
+        let left_of = |(found, given): (&Option<Found>, &&str)| match found {
             Some(found) => found.left,
             None => given.len(),
-        });
-        let left = left.sum();
+        };
+        let left = parts.iter().zip(given).map(left_of).sum();
         let words = pieces(phrase.chinese).map(|piece| match piece {
             Piece::Text(text) => text,
             Piece::Part(_, place) => match parts.get(place) {

@@ -4,7 +4,7 @@
 # one in Python, a controller manager of ros2_control (in C++), nodes of ROS 2 over zenoh; and three hollow-shaft motors over CAN FD, whose requests take the place
 # of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT, TAKT_ZENOH, UNRULY_CLIENTS, UNRULY_PROCESSES,
 # UNRULY_C and UNRULY_ROS2 name the programs, PYTHON an interpreter with takt, ZENOH_PYTHON one with zenoh; CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long; EVERY_KIND=yes has
-# clients of every kind (otherwise only threads of a program in Rust), twenty pages of the panel and twenty monitors, and more under load; ONLY=words measures only what has them in its
+# clients of every kind (otherwise only threads of a program in Rust), twenty pages of the panel and twenty monitors, SYNC behind the adapter, and more at 2 ms and under load; ONLY=words measures only what has them in its
 # call below. Leaves product.txt (the table, and
 # when set-points and feedback were on the wire), jitter.txt (`takt jitter`), system_calls.txt, the recordings of SYNC and
 # the reports. Fails when a mean period drifts, a slot was missed, a period deviates further above what cyclictest finds than
