@@ -88,6 +88,8 @@ int main(int count, char **arguments) {
         printf(" %llu\n", (unsigned long long)state.groups[0].stream_lag_ns);
         pause_ms(5, 0);
     }
+    /* The last point comes after the lag of the stream. */
+    pause_ms(50, 0);
     done(takt_close(arm));
     return 0;
 }

@@ -46,6 +46,8 @@ int main(int count, char **arguments) try {
         arm.push_now(there).or_throw();
         pause(5, 0);
     }
+    // The last point comes after the lag of the stream.
+    pause(50, 0);
     arm.close().or_throw();
 } catch (const std::exception &problem) {
     std::fprintf(stderr, "%s\n", problem.what());
