@@ -43,8 +43,8 @@ use case::Case;
 use coverage::Coverage;
 use run::{Done, play};
 
-/// In all of the shards together.
-const CYCLES: u64 = 10_000_000;
+/// In all of the shards together: enough for every fault to have its turn in every phase.
+const CYCLES: u64 = 4_000_000;
 /// Which seeds are played depends on the first one and the number of cycles alone, not on the number of processors.
 const SHARDS: u64 = 16;
 /// Of storms in which callbacks lead the groups.
@@ -54,15 +54,15 @@ const POINT_CASES: u64 = 240;
 /// Of storms in which modes of operation are changed.
 const MODE_CASES: u64 = 120;
 /// Of storms over drives of bit fields.
-const BIT_FIELD_CASES: u64 = 600;
+const BIT_FIELD_CASES: u64 = 300;
 /// Of storms over such drives whose modes are changed.
 const BIT_FIELD_MODE_CASES: u64 = 150;
 /// The same on a machine with too little time.
-const OVERLOADED_BIT_FIELD_CASES: u64 = 200;
+const OVERLOADED_BIT_FIELD_CASES: u64 = 100;
 /// Of storms over drives that are spoken to outside of the cycle.
-const OFF_CYCLE_CASES: u64 = 300;
+const OFF_CYCLE_CASES: u64 = 150;
 /// Of storms over a drive on a serial line.
-const LINE_CASES: u64 = 200;
+const LINE_CASES: u64 = 100;
 /// A shard ends after so many failures.
 const FAILURES_AT_MOST: usize = 5;
 

@@ -226,8 +226,16 @@ try() {
     case "$*" in *"${ONLY:-}"*) "$@" || failed=1 ;; esac
 }
 
-# What is printed and not judged under load, and what the same at 1 ms has judged, takes the emulated machine minutes.
+# What is printed and not judged under load, and what another row has judged at 1 ms or on the same kind of interface, takes the emulated
+# machine minutes.
 in_a_long_run() { [ -z "${EVERY_KIND:-}" ] || "$@"; }
+leg_under_load() {
+    load_on vcan2
+    machine load "$other_cycles"
+    try requests_of_leg load $load_allowance
+    try behind_adapter load
+    load_off
+}
 
 chrt --fifo --pid 1 $$ >/dev/null
 shorten_page_lists
@@ -259,11 +267,7 @@ machine idle "$other_cycles"
 drives_on 70 "$leg" vcan2
 try requests_of_leg idle $idle_allowance
 in_a_long_run try behind_adapter idle
-load_on vcan2
-machine load "$other_cycles"
-try requests_of_leg load $load_allowance
-in_a_long_run try behind_adapter load
-load_off
+in_a_long_run leg_under_load
 drives_off
 
 # Only the emulated machine has them; another one's controllers may be in use.
