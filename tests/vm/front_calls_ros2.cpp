@@ -31,6 +31,8 @@ int main(int count, char **arguments) {
         CHECK(system.write(now, period) == return_type::OK);
         pause(5, 0);
     }
+    // The last point comes after the lag of the stream.
+    pause(50, 0);
     CHECK(system.on_deactivate(any_state) == CallbackReturn::SUCCESS);
     CHECK(system.on_cleanup(any_state) == CallbackReturn::SUCCESS);
 }
