@@ -1,6 +1,6 @@
 //! Buses whose cycle has several slots, and what the controller does around an absence.
 
-use crate::fixture::{LIMITS, PERIOD_NS, Rig, parameters, scale};
+use crate::fixture::{LIMITS, PERIOD_NS, Rig, move_to, parameters, scale};
 use takt_rt::{DriveState, EngineParameters, Id, Origin, Phase, Request, Rule};
 
 /// Three axes on a bus with a cycle in every slot, three on one with a cycle in every second.
@@ -87,7 +87,7 @@ fn from_rest_to_rest_the_axes_stay_on_a_straight_line_whatever_their_limits() {
     }
     let mut rig = Rig::of(own).enable();
     let start: Vec<f64> = rig.host.snapshot.axes[..3].iter().map(|axis| axis.position_set).collect();
-    let mut request = crate::fixture::move_to(0.5);
+    let mut request = move_to(0.5);
     let ends = [1.0, -0.4, 0.25];
     request.target[..3].copy_from_slice(&ends);
     rig.request(Request::Move(request));

@@ -1,6 +1,6 @@
 //! Nodes without a heartbeat are asked for their state: node guarding (CiA 301, 7.2.8.3.2.1).
 
-use crate::fixture::{Rig, parameters};
+use crate::fixture::{PERIOD_NS, Rig, parameters};
 use takt_rt::{
     EngineParameters, Frame, FrameKind, Id, Origin, Phase, Request, Rule, SetUpError, Supervision, node_state,
 };
@@ -28,7 +28,7 @@ fn moving() -> Rig {
 /// The cycles in which requests have left, and to which node.
 fn requests(rig: &Rig) -> Vec<(u64, u32)> {
     let requests = rig.buses[0].sent.iter().filter(|(_, frame)| frame.kind() == FrameKind::Remote);
-    requests.map(|(at_ns, frame)| (at_ns / crate::fixture::PERIOD_NS, frame.id().value())).collect()
+    requests.map(|(at_ns, frame)| (at_ns / PERIOD_NS, frame.id().value())).collect()
 }
 
 #[track_caller]

@@ -1,6 +1,6 @@
 //! Several axes of one node: process data of their own, and one node that lives, fails and is told for all of them.
 
-use crate::fixture::{Rig, parameters};
+use crate::fixture::{COUNTS_PER_TURN, PERIOD_NS, Rig, move_to, parameters};
 use takt_rt::{
     Engine, EngineParameters, EventKind, Frame, FrameKind, GroupParameters, Id, MappedObject, Origin, Phase,
     Request, Rule, SetUpError, Supervision, nmt_command, node_state,
@@ -51,11 +51,11 @@ fn of_both(rule: Rule) -> Vec<(Rule, Origin)> {
 fn each_axis_of_a_node_moves_by_itself() {
     let mut rig = enabled(two_in_one_node());
     let before = [0, 1].map(|axis| rig.drive(axis).position);
-    rig.host.group_requests.push_back((1, Request::Move(crate::fixture::move_to(0.5))));
+    rig.host.group_requests.push_back((1, Request::Move(move_to(0.5))));
     rig.run(1_500);
     assert_eq!([rig.phase_of(0), rig.phase_of(1)], [Phase::Holding; 2]);
     assert_eq!(rig.drive(0).position, before[0]);
-    let target = (0.5 * crate::fixture::COUNTS_PER_TURN / std::f64::consts::TAU).round() as i32;
+    let target = (0.5 * COUNTS_PER_TURN / std::f64::consts::TAU).round() as i32;
     assert_eq!(rig.drive(1).position, target);
 }
 
@@ -131,7 +131,7 @@ fn the_axes_of_a_node_that_process_data_do_not_reach_are_stopped_by_sdo_one_afte
     let written: Vec<(u64, u16)> = (rig.buses[0].sent.iter())
         .filter(|(_, frame)| frame.id() == Id::canopen(0x600, 1))
         .map(|(at_ns, frame)| {
-            (at_ns / crate::fixture::PERIOD_NS, u16::from_le_bytes([frame.payload()[1], frame.payload()[2]]))
+            (at_ns / PERIOD_NS, u16::from_le_bytes([frame.payload()[1], frame.payload()[2]]))
         })
         .collect();
     for index in [0x6040, 0x6840] {

@@ -1,6 +1,6 @@
 //! One command frame for two axes: each drive takes its part and passes over that of the other (dummy mapping).
 
-use crate::fixture::{Rig, axis_in, parameters, pdos};
+use crate::fixture::{COUNTS_PER_TURN, Rig, axis_in, parameters, pdos};
 use arrayvec::ArrayVec;
 use takt_rt::{
     AxisProcessData, CommandPdo, ControlLaw, Engine, EngineParameters, Frame, GroupParameters, Id,
@@ -68,7 +68,7 @@ fn two_axes_that_share_a_frame_move_and_one_frame_leaves_for_both_in_a_cycle() {
     }
     rig.run_until(Phase::Holding, 3_000);
     rig.run(1_000);
-    let at = (0.5 * crate::fixture::COUNTS_PER_TURN / std::f64::consts::TAU) as i32;
+    let at = (0.5 * COUNTS_PER_TURN / std::f64::consts::TAU) as i32;
     for axis in 0..3 {
         assert!((rig.drive(axis).position - at).abs() < 1_000, "{axis}: {}", rig.drive(axis).position);
     }

@@ -184,6 +184,14 @@ requests_of_leg() { # idle|load ALLOWANCE
     measure "takt, CAN FD leg" "$1" "$other_cycles" "$2" 1000 "$leg" vcan2 vcan2
 }
 
+leg_under_load() {
+    load_on vcan2
+    machine load "$other_cycles"
+    try requests_of_leg load $load_allowance
+    try behind_adapter load
+    load_off
+}
+
 # Both ways of waiting, as takt itself sees them.
 jitter() { # idle|load INTERFACE
     "$TAKT" jitter --bus "$2" --cycles 1000 2>/dev/null > "$OUT/jitter-$1.txt" || return
@@ -229,13 +237,6 @@ try() {
 # What is printed and not judged under load, and what another row has judged at 1 ms or on the same kind of interface, takes the emulated
 # machine minutes.
 in_a_long_run() { [ -z "${EVERY_KIND:-}" ] || "$@"; }
-leg_under_load() {
-    load_on vcan2
-    machine load "$other_cycles"
-    try requests_of_leg load $load_allowance
-    try behind_adapter load
-    load_off
-}
 
 chrt --fifo --pid 1 $$ >/dev/null
 shorten_page_lists
