@@ -3,13 +3,19 @@
 export class Takt {
   #exports;
 
-  // `module`: a WebAssembly.Module.
-  constructor(module) {
-    this.#exports = new WebAssembly.Instance(module, {}).exports;
+  // `instance`: a WebAssembly.Instance that no other Takt has.
+  constructor(instance) {
+    this.#exports = instance.exports;
   }
 
+  // `bytes`: those of takt.wasm.
   static async load(bytes) {
-    return new Takt(await WebAssembly.compile(bytes));
+    return Takt.of(await WebAssembly.compile(bytes));
+  }
+
+  // `module`: a WebAssembly.Module. Browsers refuse to instantiate a large one while the page waits.
+  static async of(module) {
+    return new Takt(await WebAssembly.instantiate(module, {}));
   }
 
   // Runs the engine again on a recording. `settings`: changed values of its configuration, as ["axes.wrist.limits.jerk=200"].

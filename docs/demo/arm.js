@@ -12,17 +12,23 @@ export class Arm {
   #takt = null;
   #streams = new Set();
 
-  // `files`: the configuration's name, and [name, text] of all files.
+  // An arm that has begun. `files`: the configuration's name, and [name, text] of all files.
+  static async of(module, files) {
+    const arm = new Arm(module, files);
+    await arm.start();
+    return arm;
+  }
+
   constructor(module, files) {
     this.#module = module;
     this.#files = files;
-    this.start();
   }
 
   // Begins anew; open pages connect again.
-  start() {
-    this.#takt = new Takt(this.#module);
-    this.#takt.start(this.#files.main, this.#files.files);
+  async start() {
+    const takt = await Takt.of(this.#module);
+    takt.start(this.#files.main, this.#files.files);
+    this.#takt = takt;
     for (const end of [...this.#streams]) end();
   }
 
@@ -31,8 +37,8 @@ export class Arm {
   }
 
   // A recording has an engine of its own.
-  replay(name, recording, settings) {
-    return new Takt(this.#module).replay(name, recording, settings);
+  async replay(name, recording, settings) {
+    return (await Takt.of(this.#module)).replay(name, recording, settings);
   }
 
   fetch(path, { body, signal } = {}) {

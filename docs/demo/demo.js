@@ -114,10 +114,10 @@ class Demo {
     }
   }
 
-  #again() {
+  async #again() {
+    await this.#arm.start();
     this.#broken.clear();
     this.#boxes.replaceChildren();
-    this.#arm.start();
     this.#show();
   }
 
@@ -161,7 +161,7 @@ class Demo {
     // The words come before the work, which holds the page up.
     await new Promise((shown) => setTimeout(shown, 50));
     try {
-      const { identical, cycles, compared, differing, first_difference: first } = this.#arm.replay(file.name, bytes, setting ? [setting] : []);
+      const { identical, cycles, compared, differing, first_difference: first } = await this.#arm.replay(file.name, bytes, setting ? [setting] : []);
       put(this.#result, identical || !first ? word("identical", cycles) : word("differs", differing, compared, first.slot, first.what, first.recorded, first.replayed));
     } catch (error) {
       put(this.#result, error.message);
@@ -174,7 +174,7 @@ async function begin() {
   const packed = Uint8Array.from(atob(document.getElementById("takt-wasm").textContent.trim()), (letter) => letter.charCodeAt(0));
   const unpacked = new Response(packed).body.pipeThrough(new DecompressionStream("gzip"));
   const module = await WebAssembly.compile(await new Response(unpacked).arrayBuffer());
-  const arm = new Arm(module, JSON.parse(document.getElementById("takt-files").textContent));
+  const arm = await Arm.of(module, JSON.parse(document.getElementById("takt-files").textContent));
   window.fetch = async (path, options) => arm.fetch(path, options);
   new Demo(document.getElementById("demo"), arm);
   await import("./panel.js");

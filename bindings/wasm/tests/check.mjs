@@ -10,11 +10,11 @@ import { pathToFileURL } from "node:url";
 
 const [moduleFolder, recordings, takt] = process.argv.slice(2).map((name) => path.resolve(name));
 const { Takt } = await import(pathToFileURL(path.join(moduleFolder, "takt.mjs")));
-const module = new WebAssembly.Module(readFileSync(path.join(moduleFolder, "takt.wasm")));
+const module = await WebAssembly.compile(readFileSync(path.join(moduleFolder, "takt.wasm")));
 
-function check(sentence, body) {
+async function check(sentence, body) {
   const began = performance.now();
-  body();
+  await body();
   console.log(`${sentence} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
 }
 
@@ -22,35 +22,41 @@ const recorded = readdirSync(recordings).filter((name) => name.endsWith(".mcap")
 assert.equal(recorded.length, 5, `recorded: ${recorded}`);
 
 for (const name of recorded) {
-  check(`the replay of ${name} is that of the recording, bit for bit`, () => {
-    const report = new Takt(module).replay(name, readFileSync(path.join(recordings, name)));
+  await check(`the replay of ${name} is that of the recording, bit for bit`, async () => {
+    const report = (await Takt.of(module)).replay(name, readFileSync(path.join(recordings, name)));
     assert.ok(report.identical && report.compared > 500 && report.differing === 0 && report.missing === 0, JSON.stringify(report, null, 1));
   });
 }
 
-check("a changed value gives the same other motion as on this machine, to the last digit", () => {
+await check("a changed value gives the same other motion as on this machine, to the last digit", async () => {
   const file = path.join(recordings, "first.mcap");
   const setting = "axes.joint.limits.velocity=20 deg/s";
   const here = JSON.parse(execFileSync(takt, ["replay", file, "--set", setting, "--json"]));
-  const report = new Takt(module).replay("first.mcap", readFileSync(file), [setting]);
+  const report = (await Takt.of(module)).replay("first.mcap", readFileSync(file), [setting]);
   assert.ok(!report.identical && report.differing > 100);
   // The command adds what it is of.
   for (const [key, value] of Object.entries(report)) assert.deepEqual(value, here[key], key);
 });
 
-check("what cannot be replayed is refused in words", () => {
-  assert.throws(() => new Takt(module).replay("x.mcap", new Uint8Array([1, 2, 3])), /not an MCAP file/);
+await check("what cannot be replayed is refused in words", async () => {
+  const takt = await Takt.of(module);
+  assert.throws(() => takt.replay("x.mcap", new Uint8Array([1, 2, 3])), /not an MCAP file/);
   const file = readFileSync(path.join(recordings, "first.mcap"));
-  assert.throws(() => new Takt(module).replay("first.mcap", file, ["axes.nobody.limits.velocity=1"]), /nobody/);
+  assert.throws(() => takt.replay("first.mcap", file, ["axes.nobody.limits.velocity=1"]), /nobody/);
 });
 
 // An arm as the page has it: the newest state, and all events.
 class Arm {
   events = [];
   problems = [];
-  #takt = new Takt(module);
+  #takt;
 
-  constructor(config) {
+  static async of(config) {
+    return new Arm(await Takt.of(module), config);
+  }
+
+  constructor(takt, config) {
+    this.#takt = takt;
     this.#takt.start("arm.toml", [["arm.toml", readFileSync(config, "utf8")]], 1_700_000_000_000);
     this.machine = JSON.parse(this.#takt.machine());
     this.pass(1);
@@ -78,8 +84,8 @@ class Arm {
 const six = "configs/arm6-erob.toml";
 const move = (axis, to) => ({ do: "move", axis, to, relative: false, velocity: 1, acceleration: 1 });
 
-check("the simulated arm moves where it is told to, and jogs while it is told to", () => {
-  const arm = new Arm(six);
+await check("the simulated arm moves where it is told to, and jogs while it is told to", async () => {
+  const arm = await Arm.of(six);
   assert.equal(arm.machine.axes.length, 6);
   assert.equal(arm.phase, "holding");
   arm.takt.command(move(1, 0.3));
@@ -119,8 +125,8 @@ for (const [what, rule, isState, isMended] of [
   ["torque_off", /drive/, false, true],
   ["bus_off", /bus/, true, false],
 ]) {
-  check(`${what}: the arm stops, the black box says why, and it moves again ${isMended ? "when that is mended" : "in a new run alone"}`, () => {
-    const arm = new Arm(six);
+  await check(`${what}: the arm stops, the black box says why, and it moves again ${isMended ? "when that is mended" : "in a new run alone"}`, async () => {
+    const arm = await Arm.of(six);
     arm.takt.command(move(1, 0.8));
     arm.pass(300);
     arm.takt.break(what, 1);
@@ -153,19 +159,19 @@ for (const [what, rule, isState, isMended] of [
   });
 }
 
-check("two arms that are told the same do the same, bit for bit", () => {
-  const run = () => {
-    const arm = new Arm(six);
+await check("two arms that are told the same do the same, bit for bit", async () => {
+  const run = async () => {
+    const arm = await Arm.of(six);
     const states = [];
     arm.takt.command(move(2, 0.4));
     for (let looks = 0; looks < 50; looks += 1) states.push(JSON.stringify(arm.pass(40).state));
     return states;
   };
-  assert.deepEqual(run(), run());
+  assert.deepEqual(await run(), await run());
 });
 
-check("an arm of six axes passes its time faster than the clock on the wall", () => {
-  const arm = new Arm(six);
+await check("an arm of six axes passes its time faster than the clock on the wall", async () => {
+  const arm = await Arm.of(six);
   const began = performance.now();
   arm.pass(5000);
   const factor = 5000 / (performance.now() - began);

@@ -130,15 +130,15 @@ busybox insmod "$OUT/../share/error_counters.ko" || exit
 controllers_up
 drives_on 40 "$half" can1
 configured_by_takt
-warned
+in_a_long_run warned
 passive transmit 16
-passive receive 128
+in_a_long_run passive receive 128
 bus_off "bus-off, restart after $restart_ms ms" 1 "ERROR-ACTIVE 0 0"
 moves_again "bus-off and restart"
 goes_on_after_bus_off
-stays_off
-goes_down_and_up "controller down and up" "$half" can0 base=can0
-flood "flood of identifier 001 from the drives' controller" can1 "$half" base=can0
-flood "flood of identifier 001 from takt's controller" can0 "$half" base=can0
+in_a_long_run stays_off
+in_a_long_run goes_down_and_up "controller down and up" "$half" can0 base=can0
+in_a_long_run flood "flood of identifier 001 from the drives' controller" can1 "$half" base=can0
+in_a_long_run flood "flood of identifier 001 from takt's controller" can0 "$half" base=can0
 drives_off
 exit $failed

@@ -109,8 +109,6 @@ beside_a_running_one
 stranger "stranger's SYNC" "SYNC \(identifier 080\)" 080 ""
 stranger "stranger's heartbeat" "the heartbeat of node 127, .* \(identifier 77F\)" 77F 05
 stranger "stranger's set-points" "set-points for node 1 \(identifier 201\)" 201 0F0000000000
-begin "motion after the strangers" 2 "$arm" $both
-end borne
 taken_over
 after_kill
 drives_off
