@@ -48,19 +48,19 @@ const CYCLES: u64 = 4_000_000;
 /// Which seeds are played depends on the first one and the number of cycles alone, not on the number of processors.
 const SHARDS: u64 = 16;
 /// Of storms in which callbacks lead the groups.
-const CALLBACK_CASES: u64 = 120;
+const CALLBACK_CASES: u64 = 60;
 /// Cases of the test whose streams command every kind of point.
-const POINT_CASES: u64 = 240;
+const POINT_CASES: u64 = 120;
 /// Of storms in which modes of operation are changed.
-const MODE_CASES: u64 = 120;
+const MODE_CASES: u64 = 60;
 /// Of storms over drives of bit fields.
-const BIT_FIELD_CASES: u64 = 300;
+const BIT_FIELD_CASES: u64 = 150;
 /// Of storms over such drives whose modes are changed.
-const BIT_FIELD_MODE_CASES: u64 = 150;
+const BIT_FIELD_MODE_CASES: u64 = 75;
 /// The same on a machine with too little time.
 const OVERLOADED_BIT_FIELD_CASES: u64 = 100;
 /// Of storms over drives that are spoken to outside of the cycle.
-const OFF_CYCLE_CASES: u64 = 150;
+const OFF_CYCLE_CASES: u64 = 75;
 /// Of storms over a drive on a serial line.
 const LINE_CASES: u64 = 100;
 /// A shard ends after so many failures.
