@@ -4,7 +4,7 @@
 # one in Python, a controller manager of ros2_control (in C++), nodes of ROS 2 over zenoh; and three hollow-shaft motors over CAN FD, whose requests take the place
 # of SYNC. SYNC behind an SLCAN adapter, on a pseudo-terminal, is printed and not judged. TAKT, TAKT_ZENOH, UNRULY_CLIENTS, UNRULY_PROCESSES,
 # UNRULY_C and UNRULY_ROS2 name the programs, PYTHON an interpreter with takt, ZENOH_PYTHON one with zenoh; CYCLES, LOAD_CYCLES and OTHER_CYCLES set how long; EVERYTHING=yes has
-# clients of every kind (otherwise only threads of a program in Rust, under load), twenty pages of the panel and twenty monitors, SYNC behind the adapter, the 2 ms grid, and more idle and under load; ONLY=words measures only what has them in its
+# clients of every kind (otherwise only threads of a program in Rust, idle), twenty pages of the panel and twenty monitors, SYNC behind the adapter, the 2 ms grid, and more idle and under load; ONLY=words measures only what has them in its
 # call below. Leaves product.txt (the table, and
 # when set-points and feedback were on the wire), jitter.txt (`takt jitter`), system_calls.txt, the recordings of SYNC and
 # the reports. Fails when a mean period drifts, a slot was missed, a period deviates further above what cyclictest finds than
@@ -192,6 +192,14 @@ leg_under_load() {
     load_off
 }
 
+controllers_under_load() {
+    load_on can0
+    machine load "$other_cycles"
+    try measure "takt, SJA1000" load "$other_cycles" $load_allowance 1000 "$half" can1 can0
+    try measure "takt, SJA1000, 2 ms" load "$other_cycles" $load_allowance 2000 "$half_2ms" can1 can0
+    load_off
+}
+
 # Both ways of waiting, as takt itself sees them.
 jitter() { # idle|load INTERFACE
     "$TAKT" jitter --bus "$2" --cycles 1000 2>/dev/null > "$OUT/jitter-$1.txt" || return
@@ -246,7 +254,7 @@ drives_on 70 "$arm" vcan0 vcan1
 try measure "takt" idle "$cycles" $idle_allowance 1000 "$arm" vcan0 vcan0 vcan1
 [ -z "${COMPARE:-}" ] || try measure "takt, sleep only" idle "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 in_a_long_run try measure "takt, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
-in_a_long_run beside_clients idle $idle_allowance
+beside_clients idle $idle_allowance
 try system_calls
 in_a_long_run try jitter idle vcan0
 
@@ -255,7 +263,7 @@ machine load "$load_cycles"
 try measure "takt" load "$load_cycles" $load_allowance 1000 "$arm" vcan0 vcan0 vcan1
 [ -z "${COMPARE:-}" ] || try measure "takt, sleep only" load "$(at_most_ten_thousand "$other_cycles")" $any 1000 "$arm_sleep" vcan0 vcan0 vcan1
 in_a_long_run try measure "takt, 2 ms" load "$other_cycles" $load_allowance 2000 "$arm_2ms" vcan0 vcan0 vcan1
-beside_clients load $load_allowance
+in_a_long_run beside_clients load $load_allowance
 in_a_long_run try jitter load vcan0
 load_off
 drives_off
@@ -272,14 +280,10 @@ if [ "$TAKT_VM" != host ]; then
     controllers_up
     # Below the interrupts, as drives are that have a processor of their own.
     drives_on 40 "$half" can1
-    in_a_long_run machine idle "$other_cycles"
-    in_a_long_run try measure "takt, SJA1000" idle "$other_cycles" $idle_allowance 1000 "$half" can1 can0
+    machine idle "$other_cycles"
+    try measure "takt, SJA1000" idle "$other_cycles" $idle_allowance 1000 "$half" can1 can0
     in_a_long_run try measure "takt, SJA1000, 2 ms" idle "$other_cycles" $idle_allowance 2000 "$half_2ms" can1 can0
-    load_on can0
-    machine load "$other_cycles"
-    try measure "takt, SJA1000" load "$other_cycles" $load_allowance 1000 "$half" can1 can0
-    in_a_long_run try measure "takt, SJA1000, 2 ms" load "$other_cycles" $load_allowance 2000 "$half_2ms" can1 can0
-    load_off
+    in_a_long_run controllers_under_load
     drives_off
 fi
 
