@@ -131,11 +131,11 @@ controllers_up
 drives_on 40 "$half" can1
 configured_by_takt
 in_a_long_run warned
-passive transmit 16
+in_a_long_run passive transmit 16
 in_a_long_run passive receive 128
 bus_off "bus-off, restart after $restart_ms ms" 1 "ERROR-ACTIVE 0 0"
 moves_again "bus-off and restart"
-goes_on_after_bus_off
+in_a_long_run goes_on_after_bus_off
 in_a_long_run stays_off
 in_a_long_run goes_down_and_up "controller down and up" "$half" can0 base=can0
 in_a_long_run flood "flood of identifier 001 from the drives' controller" can1 "$half" base=can0

@@ -21,7 +21,7 @@ vcan_up vcan0
 vcan_up vcan1
 drives_on 70 "$arm" vcan0 vcan1
 goes_down_and_up "interface down and up" "$arm" vcan1 $both
-other_master "another master's SYNC" vcan0 080#
+in_a_long_run other_master "another master's SYNC" vcan0 080#
 in_a_long_run other_master "another master's NMT stop" vcan1 000#0200
 flood "flood of identifier 001 on vcan0" vcan0 "$arm" $both
 drives_off

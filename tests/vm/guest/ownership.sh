@@ -107,9 +107,9 @@ vcan_up vcan1
 drives_on 70 "$arm" vcan0 vcan1
 beside_a_running_one
 stranger "stranger's SYNC" "SYNC \(identifier 080\)" 080 ""
-stranger "stranger's heartbeat" "the heartbeat of node 127, .* \(identifier 77F\)" 77F 05
-stranger "stranger's set-points" "set-points for node 1 \(identifier 201\)" 201 0F0000000000
+in_a_long_run stranger "stranger's heartbeat" "the heartbeat of node 127, .* \(identifier 77F\)" 77F 05
+in_a_long_run stranger "stranger's set-points" "set-points for node 1 \(identifier 201\)" 201 0F0000000000
 taken_over
-after_kill
+in_a_long_run after_kill
 drives_off
 exit $failed

@@ -119,12 +119,12 @@ chrt --fifo --pid 1 $$ >/dev/null
 vcan_up vcan0
 vcan_up vcan1
 drives_on 70 "$arm" vcan0 vcan1
-frozen
+in_a_long_run frozen
 killed "kill -9, eRob" "$arm" 201 base=vcan0=1,2,3 wrist=vcan1=4,5,6
 begin "motion of the same eRobs after it" 2 "$arm" $both
 end borne
 in_a_long_run disk_hangs
-disk_is_full
+in_a_long_run disk_is_full
 in_a_long_run disk_turns_read_only
 in_a_long_run recording_is_removed
 in_a_long_run disk_is_loaded
