@@ -2,8 +2,8 @@
 
 guest=tests/vm/guest
 
-# in_a_long_run COMMAND...: with EVERYTHING=yes alone. What resembles another check that every test run has takes the emulated machine half a
-# minute, and with all of it a test run would take twice as long.
+# in_a_long_run COMMAND...: with EVERYTHING=yes alone. What resembles another check that every test run has takes the emulated machine a
+# minute, and with all of it a test run would take half an hour longer.
 in_a_long_run() { [ -z "${EVERYTHING:-}" ] || "$@"; }
 
 # vcan_up INTERFACE [MTU]: brings a virtual interface up; one with 72 bytes takes CAN FD frames.
