@@ -288,23 +288,17 @@ fn put_time(unix_ns: Nanoseconds, encoder: &mut CdrEncoder) -> &mut CdrEncoder {
     encoder.i32((unix_ns / NANOSECONDS_PER_SECOND) as i32).u32((unix_ns % NANOSECONDS_PER_SECOND) as u32)
 }
 
-/// Encodes a [`JOINT_STATE`] of the axes with these names.
-pub fn encode_joint_state(
-    unix_ns: Nanoseconds,
-    names: &[String],
-    record: &CycleRecord,
-    encoder: &mut CdrEncoder,
-) {
-    let axes = record.axes().get(..names.len()).unwrap_or(record.axes());
+/// Encodes a [`JOINT_STATE`] of these axes, each with its name.
+pub fn encode_joint_state(unix_ns: Nanoseconds, axes: &[(&str, &AxisRecord)], encoder: &mut CdrEncoder) {
     put_time(unix_ns, encoder.begin()).string("").u32(axes.len() as u32);
-    names.iter().take(axes.len()).for_each(|name| {
+    axes.iter().for_each(|(name, _)| {
         encoder.string(name);
     });
     let quantities: [fn(&AxisRecord) -> f64; 3] =
         [|axis| axis.position, |axis| axis.velocity.into(), |axis| axis.torque.into()];
     for quantity in quantities {
         encoder.u32(axes.len() as u32);
-        axes.iter().for_each(|axis| {
+        axes.iter().for_each(|(_, axis)| {
             encoder.f64(quantity(axis));
         });
     }

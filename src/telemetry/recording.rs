@@ -327,14 +327,20 @@ impl Recording {
         self.open_bytes >= CHUNK_BYTES || now_ns.saturating_sub(opened_ns) >= CHUNK_NS
     }
 
+    /// Writes the axes whose position is known. A drive that has not reported yet has the statusword 0.
     fn joint_states(&mut self, record: &CycleRecord) -> McapResult<()> {
         let CycleTiming { slot, slot_start_ns, .. } = record.timing;
-        if slot_start_ns < self.next_joint_states_ns || self.axis_names.is_empty() {
+        if slot_start_ns < self.next_joint_states_ns {
+            return Ok(());
+        }
+        let named = self.axis_names.iter().map(String::as_str).zip(record.axes());
+        let known: Vec<_> = named.filter(|(_, axis)| axis.statusword != 0).collect();
+        if known.is_empty() {
             return Ok(());
         }
         self.next_joint_states_ns = slot_start_ns + JOINT_STATES_NS;
         let time = self.wall_clock.unix_ns(slot_start_ns);
-        messages::encode_joint_state(time, &self.axis_names, record, &mut self.encoder);
+        messages::encode_joint_state(time, &known, &mut self.encoder);
         self.write(self.joint_channel, slot, slot_start_ns)
     }
 

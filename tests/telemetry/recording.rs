@@ -156,11 +156,19 @@ fn a_recording_has_an_index_and_the_description_of_the_machine() {
 }
 
 #[test]
-fn programs_of_ros_2_find_all_joints_and_the_events_in_words() {
+fn programs_of_ros_2_find_all_joints_that_have_reported_and_the_events_in_words() {
     let recording = record();
     let joints = messages(&recording, "/joint_states");
     let times: Vec<u64> = joints.iter().map(|(time, _)| time - UNIX_AT_ZERO_NS - EPOCH_NS).collect();
     assert_eq!(times, [0, 10 * CYCLE_NS]);
+    let names: Vec<&str> =
+        joints[0].1.keys().filter(|name| !name.starts_with("header")).map(|name| &**name).collect();
+    assert_eq!(
+        names,
+        ["effort[0]", "name[0]", "position[0]", "velocity[0]"],
+        "the first one has not reported"
+    );
+    assert_eq!(joints[0].1["name[0]"], Value::Text("slide".to_owned()));
     let (axes, fields) = (cycle(10).axes, &joints[1].1);
     let expected = [
         ("header.stamp.sec", number(1_700_000_000)),

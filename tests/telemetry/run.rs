@@ -83,7 +83,10 @@ pub fn options(recording: Option<RecordingDestination>) -> LoggerOptions {
     }
 }
 
-/// A cycle in which every field has a different value. The first drive has not reported for a cycle.
+/// The first drive reports from this cycle on.
+const FIRST_REPORT: u64 = 10;
+
+/// A cycle in which every field has a different value. The first drive is a cycle late.
 pub fn cycle(slot: u64) -> CycleRecord {
     let mut axes = [AxisRecord::default(); MAX_AXES];
     for (axis, record) in axes.iter_mut().take(2).enumerate() {
@@ -100,7 +103,7 @@ pub fn cycle(slot: u64) -> CycleRecord {
             following_error: 0.0625 * slot as f32,
             controlword: 0x0F,
             drive_state: DriveState::OperationEnabled,
-            statusword: 0x1637,
+            statusword: if axis == 0 && slot < FIRST_REPORT { 0 } else { 0x1637 },
             error_code: 0x7305,
             feedback_age: 1 - axis as u16,
             command_raw: -(slot as i32),
