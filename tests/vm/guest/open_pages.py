@@ -1,6 +1,6 @@
-"""Pages of a panel as browsers keep them open: each reads its states and confirms them. The first one enables the arm and moves an axis to and fro.
+"""Pages of a panel as browsers keep them open: each reads its states and confirms them. The first one moves an axis to and fro.
 
-    python3 open_pages.py PORT PAGES AXES
+    python3 open_pages.py PORT PAGES
 
 Prints a line when every page is open and the axes move. Ended by SIGTERM, it prints how many states the pages have had, and fails
 if one has had none, or if a page was lost before.
@@ -98,12 +98,12 @@ def main():
     for page in pages:
         page.is_open.wait(PATIENCE_S)
     first = pages[0]
-    first.until(lambda state: all(group["phase"] == "disabled" for group in state["groups"]))
-    first.command("/api/control", {"do": "take"})
-    first.command("/api/command", {"do": "enable", "group": None})
+    # `takt run --panel` has enabled the arm.
     first.until(lambda state: all(group["phase"] == "holding" for group in state["groups"]))
+    first.command("/api/control", {"do": "take"})
     here = first.newest["axes"][0]["position_set"]
-    first.command("/api/command", {"do": "reciprocate", "axis": 0, "between": [here, here + 0.3], "velocity": 0.5, "acceleration": 0.5})
+    motion = {"do": "reciprocate", "axis": 0, "between": [here, here + 0.3], "velocity": 0.5, "acceleration": 0.5}
+    first.command("/api/command", {"number": 1, "command": motion})
     print(f"{count} pages are open, and an axis moves", flush=True)
     is_over.wait()
     losses = [page.loss for page in pages if page.loss]
