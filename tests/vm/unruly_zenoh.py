@@ -1,6 +1,7 @@
 """Nodes of ROS 2 over zenoh that behave badly beside a served controller, for the jitter measurements of the laboratory.
 
-One publishes ten trajectories a second, each of the next half second, and stalls for a third of a second after every 0.7 s. One publishes in
+One publishes ten trajectories a second, each of the next 1.1 s, and stalls for a third of a second after every 0.7 s. What
+comes too late finds the arm at rest, and begins anew from there. One publishes in
 bursts, as fast as it can, what must be refused: positions beyond every limit, and bytes that are no message. One takes a twentieth of a second
 for each joint state. The bridge is killed (`kill -9`) every two seconds, and started again. Bursts and kills begin when the arm moves.
 
@@ -26,8 +27,14 @@ from node import JOINTS, STATES, STORE, TRAJECTORIES, listening, trajectory  # n
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 LIFE_OF_A_BRIDGE_S = 2.0
+# Those that have room on both sides.
+LED = JOINTS[:3]
 # rad: an arm that is so far from its first place has moved.
 MOVED = 0.005
+# rad: an arm that has moved by less in a third of a second is at rest.
+AT_REST = 0.0005
+# s: the points of a trajectory. The first one leaves time for what comes a little late, the last one for coming to rest.
+AHEAD_S = (0.3, 0.5, 0.7, 1.1)
 
 
 def offset(since_s):
@@ -38,7 +45,7 @@ def offset(since_s):
 class Unruly:
     def __init__(self, session):
         self.publisher = session.declare_publisher(TRAJECTORIES)
-        self.newest, self.home, self.begun = None, None, None
+        self.newest, self.first, self.last, self.home, self.begun = None, None, None, None, None
         self.is_over, self.has_moved = threading.Event(), threading.Event()
         self.sent, self.unfit, self.killed, self.failures = 0, 0, 0, []
         self.subscribers = [
@@ -56,15 +63,18 @@ class Unruly:
         if self.newest is None:
             time.sleep(0.1)
             return
-        if self.home is None:
-            self.home, self.begun = self.position(), time.monotonic()
+        here = self.position()[: len(LED)]
+        self.first = self.first or here
+        if self.last is None or max(abs(now - before) for now, before in zip(here, self.last)) < AT_REST:
+            self.home, self.begun = here, time.monotonic()
         for _ in range(7):
             since = time.monotonic() - self.begun
-            points = [(ahead, [home + offset(since + ahead) for home in self.home]) for ahead in (0.1, 0.2, 0.3, 0.4, 0.5)]
-            self.publisher.put(trajectory(JOINTS, points))
+            points = [(ahead, [home + offset(since + ahead) for home in self.home]) for ahead in AHEAD_S]
+            self.publisher.put(trajectory(LED, points))
             self.sent += 1
             time.sleep(0.1)
-        if abs(self.position()[0] - self.home[0]) > MOVED:
+        self.last = self.position()[: len(LED)]
+        if abs(self.last[0] - self.first[0]) > MOVED:
             self.has_moved.set()
         time.sleep(0.333)
 
