@@ -54,14 +54,14 @@ impl Place {
     /// second late.
     fn start_and_wait_for_motion(&self) -> Child {
         let mut child = self.start(takt());
-        while !self.is_in_motion() {
+        while !self.is_well_under_way() {
             assert_eq!(child.try_wait().unwrap(), None, "the run has ended before the arm moved");
             thread::sleep(Duration::from_millis(20));
         }
         child
     }
 
-    fn is_in_motion(&self) -> bool {
+    fn is_well_under_way(&self) -> bool {
         let Ok(mut files) = fs::read_dir(self.runs()) else { return false };
         let recorded = files.next().and_then(|file| Recorded::open(&file.unwrap().path()).ok());
         let cycles = recorded.and_then(|recorded| recorded.cycles(&(0..=u64::MAX)).ok()).unwrap_or_default();
