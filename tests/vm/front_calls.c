@@ -54,6 +54,7 @@ int main(int count, char **arguments) {
     done(takt_open(count > 1 ? arguments[1] : "arm.toml", NULL, &arm));
     done(takt_read_state(arm, &state));
     for (unsigned axis = 0; axis < state.axis_count; axis++) home[axis] = state.axes[axis].position_set;
+    fputs("calls begin\n", stderr);
     for (int number = 0; number < CALLS; number++) {
         pause_ms(5, number);
         noted("move");

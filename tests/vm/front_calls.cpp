@@ -14,6 +14,7 @@ int main(int count, char **arguments) try {
         there[0] += by;
         return there;
     };
+    calls_begin();
     for (int number = 0; number < calls; number++) {
         pause(5, number);
         const auto there = away(number % 2 == 0 ? step : 0.0);

@@ -12,6 +12,10 @@ inline void pause(int milliseconds, int number) {
     std::this_thread::sleep_for(std::chrono::microseconds(milliseconds * 1000 + number * 37 % 100 * 10));
 }
 
+inline void calls_begin() {
+    std::fputs("calls begin\n", stderr);
+}
+
 /// A command, and CLOCK_REALTIME.
 inline void noted(const char *command, const std::string &more = {}) {
     const auto at = std::chrono::system_clock::now().time_since_epoch();

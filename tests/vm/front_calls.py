@@ -27,6 +27,7 @@ def main(config, *options):
     buses = dict(option.split("=") for option in options if option != "--bus")
     with takt.Arm(config, buses=buses) as arm:
         home, first = arm.state.position_set, np.eye(1, len(arm.state.position_set))[0]
+        print("calls begin", file=sys.stderr)
         for number in range(CALLS):
             pause(5, number)
             there = home + first * (STEP if number % 2 == 0 else 0)

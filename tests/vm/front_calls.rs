@@ -2,7 +2,8 @@
 //! (`guest/front_latency.sh`).
 //!
 //! A hundred times a small move is commanded at rest, then a hundred times a stop at full speed, then a hundred times a stream has a point elsewhere. The
-//! first axis moves. Each line is a command, and CLOCK_REALTIME before the call; that of a point has the lag of the stream as well.
+//! first axis moves. Each line is a command, and CLOCK_REALTIME before the call; that of a point has the lag of the stream as well. "calls begin" on
+//! stderr comes before the first.
 //!
 //!     front_calls CONFIG --bus NAME=INTERFACE...       a handle of a controller of its own
 //!     front_calls connect NAME                         a client of `takt run --serve NAME`
@@ -84,6 +85,7 @@ fn call(front: &Front, home: &[f64]) -> Result {
         there[0] += by;
         there
     };
+    eprintln!("calls begin");
     for number in 0..CALLS {
         pause(5, number);
         let there = away(if number % 2 == 0 { STEP } else { 0.0 });

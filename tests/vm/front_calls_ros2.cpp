@@ -18,6 +18,7 @@ int main(int count, char **arguments) {
     const rclcpp::Time now(0);
     double position = manager.state("joint1/position");
     manager.command("joint1/position", position);
+    calls_begin();
     for (int number = 0; number < calls; number++) {
         for (int cycle = 0; cycle < (number == 0 ? 20 : 4); cycle++) {
             CHECK(system.read(now, period) == return_type::OK && system.write(now, period) == return_type::OK);

@@ -38,6 +38,7 @@ def main(endpoint):
         # Until it has seen who subscribes.
         pause(500)
         home = state.position[0]
+        print("calls begin", file=sys.stderr)
         for number in range(CALLS):
             message = trajectory(JOINTS[:1], [(0.008, [home + (STEP if number % 2 == 0 else 0)])])
             pause(15, number)

@@ -1,8 +1,8 @@
-# From a call of each front to the wire, in cycles: the programs beside this folder call a hundred times and note when (front_calls.*), a listener
-# sees SYNC and the set-points with the kernel's times, and front_latency.py counts. Idle, and under load; three axes on a virtual interface. The first axis may accelerate so
-# fast that the first cycle of a motion is more than a count of its encoder. TAKT, TAKT_ZENOH, PYTHON and ZENOH_PYTHON name
-# programs; those of the fronts are in CALLS. ONLY=words calls only fronts with them in their call below. Leaves front_latency.txt.
-# Fails when a call came to nothing, or could not be judged.
+# From a call of each front to the wire, in cycles: the programs beside this folder call a hundred times and note when (front_calls.*), a
+# listener sees SYNC and the set-points with the kernel's times, and front_latency.py counts. Three axes on a virtual interface, idle and
+# under load, which begins with the calls. The first axis may accelerate so fast that the first cycle of a motion is more than a count of its
+# encoder. TAKT, TAKT_ZENOH, PYTHON and ZENOH_PYTHON name programs; those of the fronts are in CALLS. ONLY=words calls only fronts with
+# them in their call below. Leaves front_latency.txt. Fails when a call came to nothing, or could not be judged.
 . tests/vm/guest/laboratory.sh
 arm=$OUT/latency.toml
 steep='velocity = "0.5 rad/s", acceleration = "400 rad/s^2", jerk = "1000000 rad/s^3"'
@@ -14,11 +14,16 @@ failed=0 condition=
 # What a front's own program has called, beside a listener.
 called() { # NAME PROGRAM...
     case "$*" in *"${ONLY:-}"*) ;; *) return 0 ;; esac
-    local name=$1 witness status
+    local name=$1 witness program status
     shift
     candump -L -r 4000000 vcan0,080:7FF,201:7FF > "$OUT/front.wire" & witness=$!
     chrt --fifo --pid 1 $witness
-    "$@" > "$OUT/front.calls" 2> "$OUT/front.txt"; status=$?
+    "$@" > "$OUT/front.calls" 2> "$OUT/front.txt" & program=$!
+    # Interpreters take minutes to begin under load.
+    until grep -q 'calls begin' "$OUT/front.txt"; do kill -0 $program || break; sleep 0.1; done
+    [ $condition = idle ] || load_on vcan0
+    wait $program; status=$?
+    load_off
     kill $witness; wait $witness
     echo "$name, $condition" | tee -a "$OUT/front_latency.txt"
     [ $status = 0 ] && python3 $guest/front_latency.py "$OUT/front.calls" "$OUT/front.wire" 2>> "$OUT/front.txt" | tee -a "$OUT/front_latency.txt"
@@ -39,7 +44,8 @@ over_zenoh() { # PROGRAM...
     local endpoint=tcp/127.0.0.1:7447 bridge status
     chrt --other 0 "$TAKT_ZENOH" "$served" --connect $endpoint --listen tcp/127.0.0.1:0 --domain 0 2> "$OUT/bridge.txt" & bridge=$!
     "$@" $endpoint; status=$?
-    kill -INT $bridge; wait $bridge
+    # bash has its background processes ignore SIGINT, and the bridge leaves that as it is.
+    kill $bridge; wait $bridge
     return $status
 }
 export -f over_zenoh
@@ -62,9 +68,7 @@ vcan_up vcan0
 drives_on 70 "$arm" vcan0
 [ "${CONDITION:-}" = load ] || fronts idle
 if [ "${CONDITION:-}" != idle ]; then
-    load_on vcan0
     fronts load
-    load_off
 fi
 drives_off
 exit $failed

@@ -126,8 +126,12 @@ beside_clients() { # idle|load ALLOWANCE
 attended() { # NAME idle|load ALLOWANCE VISITORS OPTION...
     local name=$1 load=$2 allowance=$3 visitors=$4 log=$OUT/$4-$2 run found status=0
     shift 4
+    # Until they are at work: under load, an interpreter takes minutes to begin.
+    load_off
     chrt --other 0 "$TAKT" run "$arm" --bus base=vcan0 --bus wrist=vcan1 --require-realtime --record "$log.mcap" "$@" > "$log.txt" 2>&1 & run=$!
-    "${visitors}_come" "$log" $run && record vcan0 "$other_cycles" "$log.log" || status=1
+    "${visitors}_come" "$log" $run || status=1
+    [ "$load" = idle ] || load_on vcan0
+    [ $status = 0 ] && record vcan0 "$other_cycles" "$log.log" || status=1
     "${visitors}_go" || status=1
     # 130: ended by Ctrl-C, as a person does.
     kill -INT $run; wait $run
