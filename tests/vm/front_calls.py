@@ -55,6 +55,8 @@ def main(config, *options):
                 noted("point", f" {lag_ns}")
                 stream.push(there)
                 pause(5)
+            # The last point comes after the lag of the stream.
+            pause(50)
 
 
 main(*sys.argv[1:])

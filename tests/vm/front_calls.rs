@@ -14,7 +14,7 @@ use std::error::Error;
 use std::thread::sleep;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use takt::{Controller, Phase, StopCategory, connect};
+use takt::{Controller, MotionId, Phase, StopCategory, connect};
 
 use run_arguments::arguments;
 
@@ -28,7 +28,8 @@ const PATIENCE: Duration = Duration::from_secs(30);
 
 /// What is called, whoever carries it out.
 struct Front<'a> {
-    move_to: &'a dyn Fn(&[f64]) -> Result,
+    move_to: &'a dyn Fn(&[f64]) -> Result<MotionId>,
+    wait: &'a dyn Fn(MotionId) -> Result,
     stop: &'a dyn Fn() -> Result,
     begin_stream: &'a dyn Fn() -> Result,
     push_now: &'a dyn Fn(&[f64]) -> Result,
@@ -50,7 +51,8 @@ fn of_this_process() -> Result {
     let (stream, handle) = (arm.stream(), arm.handle());
     call(
         &Front {
-            move_to: &|there| Ok(handle.move_to(there).map(drop)?),
+            move_to: &|there| Ok(handle.move_to(there)?),
+            wait: &|motion| Ok(handle.wait(motion, PATIENCE)?),
             stop: &|| Ok(handle.stop(StopCategory::Two)?),
             begin_stream: &|| Ok(handle.begin_stream()?),
             push_now: &|there| Ok(stream.push_now(there)?),
@@ -69,7 +71,8 @@ fn of_another_process(name: &str) -> Result {
     let stream = arm.stream();
     call(
         &Front {
-            move_to: &|there| Ok(arm.move_to(there).map(drop)?),
+            move_to: &|there| Ok(arm.move_to(there)?),
+            wait: &|motion| Ok(arm.wait(motion, PATIENCE)?),
             stop: &|| Ok(arm.stop(StopCategory::Two)?),
             begin_stream: &|| Ok(arm.begin_stream()?),
             push_now: &|there| Ok(stream.push_now(there)?),
@@ -100,8 +103,7 @@ fn call(front: &Front, home: &[f64]) -> Result {
         (front.stop)()?;
     }
     pause(5, 0);
-    (front.move_to)(home)?;
-    sleep(Duration::from_millis(100));
+    (front.wait)((front.move_to)(home)?)?;
     (front.begin_stream)()?;
     for _ in 0..20 {
         (front.push_now)(home)?;
@@ -119,6 +121,8 @@ fn call(front: &Front, home: &[f64]) -> Result {
         (front.push_now)(&there)?;
         pause(5, 0);
     }
+    // The last point comes after the lag of the stream.
+    pause(50, 0);
     (front.stop)()
 }
 

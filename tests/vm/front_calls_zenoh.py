@@ -47,9 +47,10 @@ def main(endpoint):
         for number in range(CALLS):
             there = trajectory(JOINTS[:1], [(1.5, [home + (FAR if number % 2 == 0 else -FAR)])])
             stop = trajectory([], [])
-            pause(15, number)
+            pause(50, number)
             publisher.put(there)
-            pause(15, number)
+            # It takes a moment until the axis is fast enough that its stop shows.
+            pause(150, number)
             noted("stop")
             publisher.put(stop)
         pause(200)
