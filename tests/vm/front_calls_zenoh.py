@@ -1,5 +1,5 @@
-"""Trajectories over zenoh, as a node of ROS 2 sends them, with CLOCK_REALTIME before each: a hundred moves, and a hundred stops in motion
-(a trajectory without points). `takt-zenoh` connects to the endpoint where this listens.
+"""Trajectories over zenoh, as a node of ROS 2 sends them, with CLOCK_REALTIME before each: fifty moves, and fifty stops in motion
+(a trajectory without points). They are so far apart that each has arrived before the next one, under load as well. `takt-zenoh` connects to the endpoint where this listens.
 
     python3 front_calls_zenoh.py ENDPOINT
 """
@@ -14,7 +14,7 @@ import zenoh
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bindings/zenoh/tests"))
 from node import JOINTS, STATES, STORE, TRAJECTORIES, listening, trajectory  # noqa: E402
 
-CALLS = 100
+CALLS = 50
 STEP, FAR = 0.0005, 0.3
 PATIENCE_S = 60
 
@@ -41,16 +41,16 @@ def main(endpoint):
         print("calls begin", file=sys.stderr)
         for number in range(CALLS):
             message = trajectory(JOINTS[:1], [(0.008, [home + (STEP if number % 2 == 0 else 0)])])
-            pause(15, number)
+            pause(150, number)
             noted("move")
             publisher.put(message)
         for number in range(CALLS):
             there = trajectory(JOINTS[:1], [(1.5, [home + (FAR if number % 2 == 0 else -FAR)])])
             stop = trajectory([], [])
-            pause(50, number)
-            publisher.put(there)
-            # It takes a moment until the axis is fast enough that its stop shows.
             pause(150, number)
+            publisher.put(there)
+            # At first the axis is so slow that its stop would not show.
+            pause(300, number)
             noted("stop")
             publisher.put(stop)
         pause(200)

@@ -32,7 +32,8 @@ use output::{ScannedBus, Watcher};
 /// Modbus slaves for registers; devices without a node ID are found by LSS. Nodes that only send are heard. Only reads are sent:
 /// nothing moves, and nothing is written to a drive.
 #[derive(Args, Debug)]
-#[command(after_help = only_with_consent())]
+// Deferred: every other command would read the descriptions of all drives before it begins.
+#[command(defer = |command| command.after_help(only_with_consent()))]
 pub struct Arguments {
     /// The interface: can0, vcan0 …, slcan:/dev/ttyACM0, rs485-canfd:/dev/ttyUSB0; serial:/dev/ttyUSB0[@RATE] for Modbus (may be given
     /// again)

@@ -38,7 +38,8 @@ print(value)' "$folder/$1.json" "${@:2}"
 
 beside_a_running_one() {
     local holder="has a master already: process [0-9]+"
-    begin "run that others try to disturb" 20 "$arm" $both
+    # Twice as long as all of them take: each second of a run is ten of the machine that emulates it.
+    begin "run that others try to disturb" 8 "$arm" $both
     in_motion vcan0
     refused "second takt run" "$holder.*--take-over" run "$arm" $buses --duration 1
     refused "takt run on one of its buses" "vcan1 $holder" run "$arm" --bus wrist=vcan1 --duration 1
