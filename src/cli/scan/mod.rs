@@ -32,8 +32,6 @@ use output::{ScannedBus, Watcher};
 /// Modbus slaves for registers; devices without a node ID are found by LSS. Nodes that only send are heard. Only reads are sent:
 /// nothing moves, and nothing is written to a drive.
 #[derive(Args, Debug)]
-// Deferred: every other command would read the descriptions of all drives before it begins.
-#[command(defer = |command| command.after_help(only_with_consent()))]
 pub struct Arguments {
     /// The interface: can0, vcan0 …, slcan:/dev/ttyACM0, rs485-canfd:/dev/ttyUSB0; serial:/dev/ttyUSB0[@RATE] for Modbus (may be given
     /// again)
@@ -83,7 +81,11 @@ pub struct Arguments {
     json: bool,
 }
 
-/// For the help: what is asked with the consent of a person alone.
+/// The command with the end of its help: what is asked with the consent of a person alone. The descriptions of all drives are read for it.
+pub fn with_end_of_help(command: clap::Command) -> clap::Command {
+    command.after_help(only_with_consent())
+}
+
 fn only_with_consent() -> String {
     let protocols = family::all().into_iter().flat_map(|family| family.own_protocols());
     let asked: Vec<String> = protocols
