@@ -181,6 +181,17 @@ impl Page {
         assert_eq!(self.command(command), (200, json!({ "done": true })), "{command}");
     }
 
+    /// Gives a command, no more often than a page may, until it is carried out.
+    pub fn does_in_the_end(&mut self, command: &Value) {
+        let begun = Instant::now();
+        while let (status, value) = self.command(command)
+            && status != 200
+        {
+            assert!(begun.elapsed() < LONG, "{command}: {value}");
+            thread::sleep(Duration::from_millis(100));
+        }
+    }
+
     pub fn is_refused(&mut self, command: &Value, with: u16, key: &str) -> String {
         let (status, value) = self.command(command);
         assert_eq!((status, value["error"].as_str()), (with, Some(key)), "{command}: {value}");
