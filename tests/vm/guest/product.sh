@@ -229,7 +229,7 @@ behind_adapter() { # idle|load
 system_calls() {
     local tracing=/sys/kernel/tracing status
     mountpoint -q $tracing || mount -t tracefs tracefs $tracing
-    chrt --other 0 "$TAKT" run "$arm" --bus base=vcan0 --bus wrist=vcan1 --require-realtime --duration 1 > "$OUT/traced.txt" 2>&1 & local run=$!
+    chrt --other 0 "$TAKT" run "$arm" --bus base=vcan0 --bus wrist=vcan1 --require-realtime --duration 4 > "$OUT/traced.txt" 2>&1 & local run=$!
     sleep 3
     echo 'comm == "takt-rt"' > $tracing/events/raw_syscalls/sys_enter/filter
     echo 1 > $tracing/events/raw_syscalls/sys_enter/enable
