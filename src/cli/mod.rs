@@ -59,7 +59,7 @@ fn command() -> clap::Command {
             // clap leaves out in the usage of an action what stands before it and is not always needed.
             drive.mut_subcommands(|action| with_usage_behind(action, "takt drive [CONFIG [AXIS]]"))
         })
-        // When it is called: the others would take four times as long to begin.
+        // When it is called: every other command would read the descriptions of all drives before it begins.
         .mut_subcommand("scan", |scan| scan.defer(scan::with_end_of_help))
 }
 

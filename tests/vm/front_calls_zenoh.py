@@ -1,5 +1,6 @@
 """Trajectories over zenoh, as a node of ROS 2 sends them, with CLOCK_REALTIME before each: fifty moves, and fifty stops in motion
-(a trajectory without points). They are so far apart that each has arrived before the next one, under load as well. `takt-zenoh` connects to the endpoint where this listens.
+(a trajectory without points). They are so far apart that each has arrived before the next one, under load as well. `takt-zenoh`
+connects to the endpoint where this listens.
 
     python3 front_calls_zenoh.py ENDPOINT
 """

@@ -1,4 +1,4 @@
-# From a call of each front to the wire, in cycles: the programs beside this folder call a hundred times and note when (front_calls.*), a
+# From a call of each front to the wire, in cycles: the programs beside this folder call again and again and note when (front_calls.*), a
 # listener sees SYNC and the set-points with the kernel's times, and front_latency.py counts. Three axes on a virtual interface, idle and
 # under load, which begins with the calls. The first axis may accelerate so fast that the first cycle of a motion is more than a count of its
 # encoder. TAKT, TAKT_ZENOH, PYTHON and ZENOH_PYTHON name programs; those of the fronts are in CALLS. ONLY=words calls only fronts with
@@ -67,8 +67,6 @@ shorten_page_lists
 vcan_up vcan0
 drives_on 70 "$arm" vcan0
 [ "${CONDITION:-}" = load ] || fronts idle
-if [ "${CONDITION:-}" != idle ]; then
-    fronts load
-fi
+[ "${CONDITION:-}" = idle ] || fronts load
 drives_off
 exit $failed
