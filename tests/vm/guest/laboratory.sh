@@ -21,6 +21,8 @@ shorten_page_lists() {
 controllers_up() {
     local interface
     for interface in can0 can1; do
+        # Only a controller that is down takes a bit rate.
+        ip link set "$interface" down
         ip link set "$interface" up type can bitrate 1000000 restart-ms 100
     done
     interrupts_first
