@@ -89,7 +89,7 @@ const TELL: [&str; 6] = [
     "src/cli/log.rs",
     "src/controller/lines/thread.rs",
     "src/controller/session.rs",
-    "src/controller/supervisor.rs",
+    "src/controller/supervisor/mod.rs",
     "src/family/bring_up/stages.rs",
     "src/telemetry/announce.rs",
 ];

@@ -8,16 +8,18 @@
 //! [`Supervisor::poll`] is called repeatedly with the host's side of the channels. It never blocks. So it runs beside the
 //! real-time thread, and also between the cycles of a run in virtual time.
 
+mod ending;
+mod phases;
+mod start_up;
+
 use std::collections::VecDeque;
 
 use takt_rt::{
-    AxisSnapshot, BusState, Frame, Phase, Request, RequestEnvelope, RequestTarget, Rule, Snapshot,
-    StopCategory, StopReason,
+    AxisSnapshot, BusState, Frame, Request, RequestEnvelope, RequestTarget, Snapshot, StopCategory,
 };
-
 use tracing::{info, warn};
 
-use super::arrival::{ARRIVAL_NS, Arrival};
+use super::arrival::Arrival;
 use super::assemble::enabled_from_ns;
 use super::lines::Lines;
 use super::off_cycle::OffCycleDrives;
@@ -28,15 +30,12 @@ use crate::config::Config;
 use crate::family;
 use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
+use phases::fault_stop;
 
 /// A stage must be completed within this time, where every drive can be enabled at once. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
-/// The drives of serial lines have this time for the last requests, of which a silent one gets one every 500 ms.
-const LINES_NS: u64 = 1_000_000_000;
 /// From one question of a client to the next: one frame of a bus in a cycle is for all services, and those of the controller go on.
 const QUESTION_SPACING_NS: u64 = 2_000_000;
-/// The drives settle on their last set-point for this time, before they are disabled and the brakes engage.
-const SETTLE_NS: u64 = 300_000_000;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -273,147 +272,11 @@ impl Supervisor {
             Stage::ResetFaults => self.reset_faults(now_ns, elapsed_ns, snapshot),
             Stage::Enable => self.enable(now_ns, elapsed_ns, snapshot),
             Stage::Run => self.run(now_ns, snapshot),
-            Stage::Settle { until_ns } => {
-                let is_moving = is_any(snapshot, |phase| {
-                    matches!(phase, Phase::Moving | Phase::Streaming | Phase::Stopping)
-                });
-                let missed = self.missed_target(snapshot);
-                let is_waited_for = (is_moving && elapsed_ns <= self.stage_timeout_ns)
-                    || (missed.is_some() && elapsed_ns <= ARRIVAL_NS);
-                if let Some(stop) = fault_stop(snapshot) {
-                    self.end(now_ns, Outcome::Stopped(stop));
-                } else if is_waited_for {
-                    self.stage = Stage::Settle { until_ns: now_ns + SETTLE_NS };
-                } else if is_moving || missed.is_some() || now_ns >= until_ns {
-                    self.outcome = missed.or(self.outcome.take());
-                    // A client may still be moving the group: disabling stops it first.
-                    self.begin_disable(now_ns);
-                }
-            }
-            Stage::Disable => {
-                if is_every_group_off(snapshot) {
-                    self.note_fault_while_disabling(snapshot);
-                    self.begin_shut_down(now_ns);
-                } else if elapsed_ns > self.stage_timeout_ns {
-                    let phase = stuck_phase(snapshot, |phase| !is_off(phase));
-                    self.outcome.get_or_insert(Outcome::Stuck { phase });
-                    self.begin_shut_down(now_ns);
-                }
-            }
+            Stage::Settle { until_ns } => self.settle(now_ns, elapsed_ns, until_ns, snapshot),
+            Stage::Disable => self.disable(now_ns, elapsed_ns, snapshot),
             Stage::ShutDown => self.shut_down(now_ns, elapsed_ns, snapshot, host),
-            Stage::RemovePower => {
-                // The last controlwords take effect at the next SYNC, and may wait for the bus. So the loop goes on until the
-                // group is disabled.
-                let is_off = is_every_group_off(snapshot) && elapsed_ns > 0;
-                if is_off && self.are_told_to_stop(elapsed_ns, snapshot) || elapsed_ns > self.stage_timeout_ns
-                {
-                    self.request(Request::Shutdown);
-                    self.enter(Stage::Done, now_ns);
-                }
-            }
+            Stage::RemovePower => self.remove_power(now_ns, elapsed_ns, snapshot),
             Stage::Done => {}
-        }
-    }
-
-    fn configure(&mut self, now_ns: u64, host: &mut HostSide) {
-        self.bring_up.poll(now_ns, &mut service_sender(host));
-        match self.bring_up.outcome() {
-            None => {}
-            Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
-            Some(Ok(facts)) => {
-                for (axis, facts) in (0..).zip(&facts) {
-                    if let Some(data) = &facts.process_data {
-                        self.request(data.request(axis));
-                    }
-                    if let Some(torque) = facts.rated_torque {
-                        self.request(Request::RatedTorque { axis, torque });
-                    }
-                }
-                self.facts = facts;
-                // The first part of the bring-up has succeeded, so the second part can begin.
-                let _ = self.bring_up.start();
-                self.enter(Stage::Start, now_ns);
-            }
-        }
-    }
-
-    fn start(&mut self, now_ns: u64, host: &mut HostSide) {
-        self.bring_up.poll(now_ns, &mut service_sender(host));
-        match self.bring_up.outcome() {
-            None => {}
-            Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
-            Some(Ok(facts)) => {
-                // Some drives send feedback by process data only after they have received a target.
-                let told = (0..).zip(&facts).zip(&self.tells_position).filter(|(_, tells)| **tells);
-                let positions: Vec<_> = told
-                    .map(|((axis, facts), _)| Request::Position { axis, counts: facts.position_counts })
-                    .collect();
-                positions.into_iter().for_each(|position| self.request(position));
-                // Every node is operational now. Each answers the first SYNC, or is a drive that always answers late.
-                self.request(Request::Sync(true));
-                self.request(Request::Activate);
-                self.enter(Stage::Activate, now_ns);
-            }
-        }
-    }
-
-    fn activate(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
-        let silent = self.axes_of(snapshot).iter().position(|axis| !axis.is_heard);
-        match silent {
-            // A client may have begun to enable the group before this poll.
-            None if self.after_bring_up == AfterBringUp::StayDisabled
-                && is_any(snapshot, |phase| !is_off(phase)) =>
-            {
-                self.enter(Stage::Run, now_ns);
-            }
-            None if !is_any(snapshot, |phase| phase != Phase::Disabled) => {
-                if self.faulted(snapshot).is_some() {
-                    self.request(Request::ResetFaults);
-                    self.enter(Stage::ResetFaults, now_ns);
-                } else {
-                    self.go_on_without_faults(now_ns);
-                }
-            }
-            Some(axis) if elapsed_ns > self.stage_timeout_ns => self.end(now_ns, Outcome::NotHeard { axis }),
-            _ if elapsed_ns > self.stage_timeout_ns => {
-                let phase = stuck_phase(snapshot, |phase| phase != Phase::Disabled);
-                self.end(now_ns, Outcome::Stuck { phase });
-            }
-            _ => {}
-        }
-    }
-
-    fn reset_faults(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
-        match self.faulted(snapshot) {
-            None => self.go_on_without_faults(now_ns),
-            Some((axis, code)) if elapsed_ns > self.stage_timeout_ns / 4 => {
-                self.end(now_ns, Outcome::FaultPersists { axis, code });
-            }
-            Some(_) => {}
-        }
-    }
-
-    fn go_on_without_faults(&mut self, now_ns: u64) {
-        match self.after_bring_up {
-            AfterBringUp::Enable => {
-                self.request(Request::Enable);
-                self.enter(Stage::Enable, now_ns);
-            }
-            AfterBringUp::StayDisabled => self.enter(Stage::Run, now_ns),
-        }
-    }
-
-    fn enable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
-        // A client may already have moved the group before this poll.
-        let is_enabled = !is_any(snapshot, |phase| !is_in_operation(phase));
-        if let Some(stop) = fault_stop(snapshot).filter(|_| !(self.is_serving && is_enabled)) {
-            self.end(now_ns, Outcome::Stopped(stop));
-        } else if is_enabled {
-            self.deadline_ns = self.duration_ns.map(|duration_ns| now_ns + duration_ns);
-            self.enter(Stage::Run, now_ns);
-        } else if elapsed_ns > self.stage_timeout_ns {
-            let phase = stuck_phase(snapshot, |phase| !is_in_operation(phase));
-            self.end(now_ns, Outcome::Stuck { phase });
         }
     }
 
@@ -445,102 +308,6 @@ impl Supervisor {
         }
         if let Some(outcome) = ending.or(are_finished.then_some(Outcome::Finished)) {
             self.end(now_ns, outcome);
-        }
-    }
-
-    fn handle_interrupt(&mut self, now_ns: u64) {
-        match (self.interrupt, self.stage) {
-            (None, _) | (_, Stage::Done | Stage::RemovePower) => {}
-            (Some(Interrupt::Immediate), _) => {
-                self.request(Request::InhibitEnable);
-                self.request(Request::Stop(StopCategory::Zero));
-                self.outcome.get_or_insert(Outcome::Interrupted);
-                self.enter(Stage::RemovePower, now_ns);
-            }
-            (Some(Interrupt::Controlled), Stage::Settle { .. } | Stage::Disable | Stage::ShutDown) => {}
-            (Some(Interrupt::Controlled), Stage::Run) => {
-                self.request(Request::Stop(StopCategory::Two));
-                self.end(now_ns, Outcome::Interrupted);
-            }
-            (Some(Interrupt::Controlled), _) => self.end(now_ns, Outcome::Interrupted),
-        }
-    }
-
-    /// The joint that the finished program has left off its target, if there is one. A program that was cut off by its
-    /// duration has no target that counts.
-    fn missed_target(&self, snapshot: &Snapshot) -> Option<Outcome> {
-        let has_finished = self.outcome == Some(Outcome::Finished) && self.duration_ns.is_none();
-        if has_finished { self.arrival.missed(&self.targets(), snapshot) } else { None }
-    }
-
-    /// Begins the end of the run, from any stage.
-    fn end(&mut self, now_ns: u64, outcome: Outcome) {
-        let was_running = matches!(self.stage, Stage::Run);
-        let has_been_active = !matches!(self.stage, Stage::Configure | Stage::Start);
-        self.outcome.get_or_insert(outcome);
-        if was_running && !matches!(self.outcome, Some(Outcome::Stopped(_))) {
-            self.enter(Stage::Settle { until_ns: now_ns + SETTLE_NS }, now_ns);
-        } else if has_been_active {
-            self.begin_disable(now_ns);
-        } else {
-            self.begin_shut_down(now_ns);
-        }
-    }
-
-    fn begin_disable(&mut self, now_ns: u64) {
-        // In this order, so that no client can enable the group after it has been disabled.
-        self.request(Request::InhibitEnable);
-        self.request(Request::Disable);
-        self.enter(Stage::Disable, now_ns);
-    }
-
-    /// A fault during disabling is the outcome of a run that was without faults before.
-    fn note_fault_while_disabling(&mut self, snapshot: &Snapshot) {
-        let fault = fault_stop(snapshot).filter(|stop| stop.phase == Phase::Disabling);
-        if let (Some(stop), Some(Outcome::Finished | Outcome::Interrupted)) = (fault, &self.outcome) {
-            self.outcome = Some(Outcome::Stopped(stop));
-        }
-    }
-
-    fn begin_shut_down(&mut self, now_ns: u64) {
-        self.enter(Stage::ShutDown, now_ns);
-    }
-
-    /// Whether the drives that would go on without the controller have been told to stop for long enough, and the newest reply of
-    /// none shows torque.
-    fn are_told_to_stop(&self, elapsed_ns: u64, snapshot: &Snapshot) -> bool {
-        if is_any(snapshot, |phase| phase == Phase::Passive) {
-            // None has been told to start.
-            return true;
-        }
-        self.axes_of(snapshot).iter().zip(&self.least_shut_down_ns).all(|(axis, least_ns)| {
-            let has_torque = axis.drive_state.has_torque() && axis.feedback_age == 0;
-            *least_ns == 0 || elapsed_ns >= *least_ns && !has_torque
-        })
-    }
-
-    fn shut_down(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {
-        self.shutdown.poll(now_ns, &mut service_sender(host));
-        let outcome = self.shutdown.outcome();
-        let unsettled = self.off_cycle.lines().unsettled();
-        let is_awaited = !unsettled.is_empty() && elapsed_ns <= LINES_NS;
-        let is_over = outcome.is_some() && !is_awaited && self.are_told_to_stop(elapsed_ns, snapshot);
-        if is_over || elapsed_ns > self.stage_timeout_ns {
-            match outcome {
-                Some(Err(error)) if !self.facts.is_empty() => {
-                    let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
-                    self.unreached = silent.map(|failure| failure.axis).collect();
-                }
-                Some(Ok(facts)) => {
-                    let codes = facts.iter().map(|facts| facts.error_code.0).enumerate();
-                    self.drive_errors = codes.filter(|(_, code)| *code != 0).collect();
-                }
-                _ => {}
-            }
-            self.unreached.extend(unsettled);
-            self.request(Request::Sync(false));
-            self.request(Request::Shutdown);
-            self.enter(Stage::Done, now_ns);
         }
     }
 
@@ -619,35 +386,6 @@ impl Supervisor {
         );
         Progress { what, fraction, is_ending }
     }
-}
-
-/// The first stop for a fault, of any group.
-fn fault_stop(snapshot: &Snapshot) -> Option<StopReason> {
-    let stops = snapshot.groups().iter().filter_map(|group| group.stop);
-    stops.filter(|stop| stop.rule() != Rule::Requested).min_by_key(|stop| stop.slot)
-}
-
-/// Whether a group is in such a phase.
-fn is_any(snapshot: &Snapshot, is_such: impl Fn(Phase) -> bool) -> bool {
-    snapshot.groups().iter().any(|group| is_such(group.phase))
-}
-
-fn is_off(phase: Phase) -> bool {
-    matches!(phase, Phase::Disabled | Phase::Passive)
-}
-
-fn is_in_operation(phase: Phase) -> bool {
-    matches!(phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping)
-}
-
-fn is_every_group_off(snapshot: &Snapshot) -> bool {
-    !is_any(snapshot, |phase| !is_off(phase))
-}
-
-/// The phase of the first group that is in one which it should have left.
-fn stuck_phase(snapshot: &Snapshot, should_be_left: impl Fn(Phase) -> bool) -> Phase {
-    let mut groups = snapshot.groups().iter().map(|group| group.phase);
-    groups.find(|phase| should_be_left(*phase)).unwrap_or_default()
 }
 
 /// Passes the frames of a procedure to the service channel. If the channel is full, the frame is lost as on a disturbed bus,

@@ -1,0 +1,157 @@
+//! The end of a run, from any stage: it settles, is disabled, and the drives are shut down; or the power is removed at once.
+
+use takt_rt::{Phase, Request, Snapshot, StopCategory};
+
+use super::phases::{fault_stop, is_any, is_every_group_off, is_off, stuck_phase};
+use super::{Stage, Supervisor, service_sender};
+use crate::channels::HostSide;
+use crate::controller::arrival::ARRIVAL_NS;
+use crate::controller::outcome::{Interrupt, Outcome};
+
+/// The drives of serial lines have this time for the last requests, of which a silent one gets one every 500 ms.
+const LINES_NS: u64 = 1_000_000_000;
+/// The drives settle on their last set-point for this time, before they are disabled and the brakes engage.
+const SETTLE_NS: u64 = 300_000_000;
+
+impl Supervisor {
+    pub(super) fn handle_interrupt(&mut self, now_ns: u64) {
+        match (self.interrupt, self.stage) {
+            (None, _) | (_, Stage::Done | Stage::RemovePower) => {}
+            (Some(Interrupt::Immediate), _) => {
+                self.request(Request::InhibitEnable);
+                self.request(Request::Stop(StopCategory::Zero));
+                self.outcome.get_or_insert(Outcome::Interrupted);
+                self.enter(Stage::RemovePower, now_ns);
+            }
+            (Some(Interrupt::Controlled), Stage::Settle { .. } | Stage::Disable | Stage::ShutDown) => {}
+            (Some(Interrupt::Controlled), Stage::Run) => {
+                self.request(Request::Stop(StopCategory::Two));
+                self.end(now_ns, Outcome::Interrupted);
+            }
+            (Some(Interrupt::Controlled), _) => self.end(now_ns, Outcome::Interrupted),
+        }
+    }
+
+    /// Begins the end of the run, from any stage.
+    pub(super) fn end(&mut self, now_ns: u64, outcome: Outcome) {
+        let was_running = matches!(self.stage, Stage::Run);
+        let has_been_active = !matches!(self.stage, Stage::Configure | Stage::Start);
+        self.outcome.get_or_insert(outcome);
+        if was_running && !matches!(self.outcome, Some(Outcome::Stopped(_))) {
+            self.enter(Stage::Settle { until_ns: now_ns + SETTLE_NS }, now_ns);
+        } else if has_been_active {
+            self.begin_disable(now_ns);
+        } else {
+            self.begin_shut_down(now_ns);
+        }
+    }
+
+    /// Waits until the joints rest on their last set-points.
+    pub(super) fn settle(&mut self, now_ns: u64, elapsed_ns: u64, until_ns: u64, snapshot: &Snapshot) {
+        let is_moving =
+            is_any(snapshot, |phase| matches!(phase, Phase::Moving | Phase::Streaming | Phase::Stopping));
+        let missed = self.missed_target(snapshot);
+        let is_waited_for = (is_moving && elapsed_ns <= self.stage_timeout_ns)
+            || (missed.is_some() && elapsed_ns <= ARRIVAL_NS);
+        if let Some(stop) = fault_stop(snapshot) {
+            self.end(now_ns, Outcome::Stopped(stop));
+        } else if is_waited_for {
+            self.stage = Stage::Settle { until_ns: now_ns + SETTLE_NS };
+        } else if is_moving || missed.is_some() || now_ns >= until_ns {
+            self.outcome = missed.or(self.outcome.take());
+            // A client may still be moving the group: disabling stops it first.
+            self.begin_disable(now_ns);
+        }
+    }
+
+    /// The joint that the finished program has left off its target, if there is one. A program that was cut off by its
+    /// duration has no target that counts.
+    fn missed_target(&self, snapshot: &Snapshot) -> Option<Outcome> {
+        let has_finished = self.outcome == Some(Outcome::Finished) && self.duration_ns.is_none();
+        if has_finished { self.arrival.missed(&self.targets(), snapshot) } else { None }
+    }
+
+    fn begin_disable(&mut self, now_ns: u64) {
+        // In this order, so that no client can enable the group after it has been disabled.
+        self.request(Request::InhibitEnable);
+        self.request(Request::Disable);
+        self.enter(Stage::Disable, now_ns);
+    }
+
+    pub(super) fn disable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
+        if is_every_group_off(snapshot) {
+            self.note_fault_while_disabling(snapshot);
+            self.begin_shut_down(now_ns);
+        } else if elapsed_ns > self.stage_timeout_ns {
+            let phase = stuck_phase(snapshot, |phase| !is_off(phase));
+            self.outcome.get_or_insert(Outcome::Stuck { phase });
+            self.begin_shut_down(now_ns);
+        }
+    }
+
+    /// A fault during disabling is the outcome of a run that was without faults before.
+    fn note_fault_while_disabling(&mut self, snapshot: &Snapshot) {
+        let fault = fault_stop(snapshot).filter(|stop| stop.phase == Phase::Disabling);
+        if let (Some(stop), Some(Outcome::Finished | Outcome::Interrupted)) = (fault, &self.outcome) {
+            self.outcome = Some(Outcome::Stopped(stop));
+        }
+    }
+
+    fn begin_shut_down(&mut self, now_ns: u64) {
+        self.enter(Stage::ShutDown, now_ns);
+    }
+
+    pub(super) fn shut_down(
+        &mut self,
+        now_ns: u64,
+        elapsed_ns: u64,
+        snapshot: &Snapshot,
+        host: &mut HostSide,
+    ) {
+        self.shutdown.poll(now_ns, &mut service_sender(host));
+        let outcome = self.shutdown.outcome();
+        let unsettled = self.off_cycle.lines().unsettled();
+        let is_awaited = !unsettled.is_empty() && elapsed_ns <= LINES_NS;
+        let is_over = outcome.is_some() && !is_awaited && self.are_told_to_stop(elapsed_ns, snapshot);
+        if is_over || elapsed_ns > self.stage_timeout_ns {
+            match outcome {
+                Some(Err(error)) if !self.facts.is_empty() => {
+                    let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
+                    self.unreached = silent.map(|failure| failure.axis).collect();
+                }
+                Some(Ok(facts)) => {
+                    let codes = facts.iter().map(|facts| facts.error_code.0).enumerate();
+                    self.drive_errors = codes.filter(|(_, code)| *code != 0).collect();
+                }
+                _ => {}
+            }
+            self.unreached.extend(unsettled);
+            self.request(Request::Sync(false));
+            self.request(Request::Shutdown);
+            self.enter(Stage::Done, now_ns);
+        }
+    }
+
+    pub(super) fn remove_power(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
+        // The last controlwords take effect at the next SYNC, and may wait for the bus. So the loop goes on until the
+        // group is disabled.
+        let is_off = is_every_group_off(snapshot) && elapsed_ns > 0;
+        if is_off && self.are_told_to_stop(elapsed_ns, snapshot) || elapsed_ns > self.stage_timeout_ns {
+            self.request(Request::Shutdown);
+            self.enter(Stage::Done, now_ns);
+        }
+    }
+
+    /// Whether the drives that would go on without the controller have been told to stop for long enough, and the newest reply of
+    /// none shows torque.
+    fn are_told_to_stop(&self, elapsed_ns: u64, snapshot: &Snapshot) -> bool {
+        if is_any(snapshot, |phase| phase == Phase::Passive) {
+            // None has been told to start.
+            return true;
+        }
+        self.axes_of(snapshot).iter().zip(&self.least_shut_down_ns).all(|(axis, least_ns)| {
+            let has_torque = axis.drive_state.has_torque() && axis.feedback_age == 0;
+            *least_ns == 0 || elapsed_ns >= *least_ns && !has_torque
+        })
+    }
+}

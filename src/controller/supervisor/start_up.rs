@@ -1,0 +1,112 @@
+//! From the first frame to enabled drives.
+
+use takt_rt::{Phase, Request, Snapshot};
+
+use super::phases::{fault_stop, is_any, is_in_operation, is_off, stuck_phase};
+use super::{AfterBringUp, Stage, Supervisor, service_sender};
+use crate::channels::HostSide;
+use crate::controller::outcome::Outcome;
+
+impl Supervisor {
+    pub(super) fn configure(&mut self, now_ns: u64, host: &mut HostSide) {
+        self.bring_up.poll(now_ns, &mut service_sender(host));
+        match self.bring_up.outcome() {
+            None => {}
+            Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
+            Some(Ok(facts)) => {
+                for (axis, facts) in (0..).zip(&facts) {
+                    if let Some(data) = &facts.process_data {
+                        self.request(data.request(axis));
+                    }
+                    if let Some(torque) = facts.rated_torque {
+                        self.request(Request::RatedTorque { axis, torque });
+                    }
+                }
+                self.facts = facts;
+                // The first part of the bring-up has succeeded, so the second part can begin.
+                let _ = self.bring_up.start();
+                self.enter(Stage::Start, now_ns);
+            }
+        }
+    }
+
+    pub(super) fn start(&mut self, now_ns: u64, host: &mut HostSide) {
+        self.bring_up.poll(now_ns, &mut service_sender(host));
+        match self.bring_up.outcome() {
+            None => {}
+            Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
+            Some(Ok(facts)) => {
+                // Some drives send feedback by process data only after they have received a target.
+                let told = (0..).zip(&facts).zip(&self.tells_position).filter(|(_, tells)| **tells);
+                let positions: Vec<_> = told
+                    .map(|((axis, facts), _)| Request::Position { axis, counts: facts.position_counts })
+                    .collect();
+                positions.into_iter().for_each(|position| self.request(position));
+                // Every node is operational now. Each answers the first SYNC, or is a drive that always answers late.
+                self.request(Request::Sync(true));
+                self.request(Request::Activate);
+                self.enter(Stage::Activate, now_ns);
+            }
+        }
+    }
+
+    pub(super) fn activate(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
+        let silent = self.axes_of(snapshot).iter().position(|axis| !axis.is_heard);
+        match silent {
+            // A client may have begun to enable the group before this poll.
+            None if self.after_bring_up == AfterBringUp::StayDisabled
+                && is_any(snapshot, |phase| !is_off(phase)) =>
+            {
+                self.enter(Stage::Run, now_ns);
+            }
+            None if !is_any(snapshot, |phase| phase != Phase::Disabled) => {
+                if self.faulted(snapshot).is_some() {
+                    self.request(Request::ResetFaults);
+                    self.enter(Stage::ResetFaults, now_ns);
+                } else {
+                    self.go_on_without_faults(now_ns);
+                }
+            }
+            Some(axis) if elapsed_ns > self.stage_timeout_ns => self.end(now_ns, Outcome::NotHeard { axis }),
+            _ if elapsed_ns > self.stage_timeout_ns => {
+                let phase = stuck_phase(snapshot, |phase| phase != Phase::Disabled);
+                self.end(now_ns, Outcome::Stuck { phase });
+            }
+            _ => {}
+        }
+    }
+
+    pub(super) fn reset_faults(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
+        match self.faulted(snapshot) {
+            None => self.go_on_without_faults(now_ns),
+            Some((axis, code)) if elapsed_ns > self.stage_timeout_ns / 4 => {
+                self.end(now_ns, Outcome::FaultPersists { axis, code });
+            }
+            Some(_) => {}
+        }
+    }
+
+    fn go_on_without_faults(&mut self, now_ns: u64) {
+        match self.after_bring_up {
+            AfterBringUp::Enable => {
+                self.request(Request::Enable);
+                self.enter(Stage::Enable, now_ns);
+            }
+            AfterBringUp::StayDisabled => self.enter(Stage::Run, now_ns),
+        }
+    }
+
+    pub(super) fn enable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
+        // A client may already have moved the group before this poll.
+        let is_enabled = !is_any(snapshot, |phase| !is_in_operation(phase));
+        if let Some(stop) = fault_stop(snapshot).filter(|_| !(self.is_serving && is_enabled)) {
+            self.end(now_ns, Outcome::Stopped(stop));
+        } else if is_enabled {
+            self.deadline_ns = self.duration_ns.map(|duration_ns| now_ns + duration_ns);
+            self.enter(Stage::Run, now_ns);
+        } else if elapsed_ns > self.stage_timeout_ns {
+            let phase = stuck_phase(snapshot, |phase| !is_in_operation(phase));
+            self.end(now_ns, Outcome::Stuck { phase });
+        }
+    }
+}
