@@ -1,10 +1,10 @@
-//! When the control loops and the plant of a simulated drive run: at 8 kHz, and exactly up to SYNC. They are a third of what a simulated
+//! When the control loops and the plant of a simulated drive run: at 4 kHz, and exactly up to SYNC. They are nearly a third of what a simulated
 //! cycle costs. So what they call in each step is marked `#[inline]`, which lets it be compiled into them from another module.
 
 use takt_rt::Nanoseconds;
 
 /// One step.
-const STEP_NS: Nanoseconds = 125_000;
+const STEP_NS: Nanoseconds = 250_000;
 
 /// The loops of a drive.
 pub trait ControlLoops {

@@ -44,33 +44,35 @@ impl WireLength {
 
     fn classic(frame: &Frame) -> Self {
         let (head, head_bits) = classic_head(frame);
-        let mut crc = Crc15::default();
-        // The register starts at zero, so leading zero bits change nothing and any alignment is right. A head has up to 39 bits.
-        let [_, _, _, head_bytes @ ..] = head.to_be_bytes();
-        for byte in head_bytes {
-            crc.push(byte);
-        }
-        for &byte in frame.payload() {
-            crc.push(byte);
-        }
         let payload_bits = 8 * frame.payload().len() as u32;
         let payload = u128::from(frame.first_word().swap_bytes()) >> (64 - payload_bits);
-        let bits = (u128::from(head) << payload_bits | payload) << 15 | u128::from(crc.0);
+        let covered = u128::from(head) << payload_bits | payload;
+        let covered_bits = head_bits + payload_bits;
+        let mut crc = Crc15::default();
+        // The register starts at zero, so leading zero bits change nothing and any alignment is right.
+        for byte in last_bytes(&covered.to_be_bytes(), covered_bits) {
+            crc.push(*byte);
+        }
+        let stuffed_bits = covered_bits + 15;
+        let before = ALTERNATING << stuffed_bits;
+        let bits = before | covered << 15 | u128::from(crc.0);
         let mut stuffing = Stuffing::default();
-        stuffing.push(bits, head_bits + payload_bits + 15);
-        let nominal_bits = head_bits + payload_bits + 15 + stuffing.stuffed + TAIL_BITS;
+        for byte in last_bytes(&bits.to_be_bytes(), stuffed_bits) {
+            stuffing.push_byte(*byte);
+        }
+        let nominal_bits = stuffed_bits + stuffing.stuffed + TAIL_BITS;
         Self { nominal_bits, data_bits: 0, stuff_bits: stuffing.stuffed }
     }
 
     fn flexible(frame: &Frame, has_bit_rate_switch: bool) -> Self {
         let (head, head_bits) = flexible_head(frame, has_bit_rate_switch);
         let mut stuffing = Stuffing::default();
-        stuffing.push(head.into(), head_bits);
+        stuffing.push(head, head_bits);
         let head_stuffed = stuffing.stuffed;
         // ESI (error active: dominant) and the length code.
         stuffing.push(length_code(frame.length()).into(), 1 + 4);
         for &byte in frame.payload() {
-            stuffing.push(byte.into(), 8);
+            stuffing.push_byte(byte);
         }
         // Five equal bits at the very end are broken by the first fixed stuff bit, not by one of their own.
         let body_stuffed = stuffing.stuffed - head_stuffed - u32::from(stuffing.is_just_stuffed);
@@ -86,6 +88,14 @@ impl WireLength {
             Self { nominal_bits: outer_bits + body_bits, data_bits: 0, stuff_bits }
         }
     }
+}
+
+/// Bits before a frame that fill its first byte: they end with a recessive one, so that the start bit begins a run, and need no stuffing.
+const ALTERNATING: u128 = u128::MAX / 3;
+
+/// The bytes with the low `bits` bits of a number, the highest first.
+fn last_bytes(number: &[u8; 16], bits: u32) -> &[u8] {
+    &number[number.len() - bits.div_ceil(8) as usize..]
 }
 
 /// The time of so many bits, rounded up to whole nanoseconds.
@@ -188,20 +198,19 @@ const fn after_byte(mut run: u8, byte: u8) -> u8 {
 
 impl Stuffing {
     /// Takes the low `count` bits of `bits`, the highest of them first.
-    fn push(&mut self, bits: u128, count: u32) {
-        let mut rest = bits.checked_shl(u128::BITS - count).unwrap_or(0);
-        for _ in 0..count % 8 {
-            (self.run, self.is_just_stuffed) = after_bit(self.run, (rest >> (u128::BITS - 1)) as u8);
+    fn push(&mut self, bits: u64, count: u32) {
+        for bit in (0..count).rev() {
+            (self.run, self.is_just_stuffed) = after_bit(self.run, (bits >> bit & 1) as u8);
             self.stuffed += u32::from(self.is_just_stuffed);
-            rest <<= 1;
         }
-        for _ in 0..count / 8 {
-            let after = STUFFING_TABLE[usize::from(self.run)][(rest >> (u128::BITS - 8)) as usize];
-            self.run = after & 0xF;
-            self.is_just_stuffed = after & 0x10 != 0;
-            self.stuffed += u32::from(after >> 5);
-            rest <<= 8;
-        }
+    }
+
+    /// Takes eight bits, the highest first.
+    fn push_byte(&mut self, byte: u8) {
+        let after = STUFFING_TABLE[usize::from(self.run)][usize::from(byte)];
+        self.run = after & 0xF;
+        self.is_just_stuffed = after & 0x10 != 0;
+        self.stuffed += u32::from(after >> 5);
     }
 }
 
@@ -288,7 +297,7 @@ mod tests {
     #[test]
     fn alternating_bits_need_no_stuffing_and_equal_ones_the_most() {
         let mut stuffing = Stuffing::default();
-        stuffing.push(0x5555_5555_5555_5555, 64);
+        stuffing.push(ALTERNATING as u64, 64);
         assert_eq!(stuffing.stuffed, 0);
         let mut stuffing = Stuffing::default();
         stuffing.push(0, 25);

@@ -138,7 +138,8 @@ fn csp_also_works_with_event_driven_rpdos() {
             worst = worst.max((position - 100 * (cycle - 2) - 33).abs());
         }
     }
-    assert!(worst <= 13, "{worst}");
+    // How far the joint goes in a step of the loops: 250 µs.
+    assert!(worst <= 25, "{worst}");
 }
 
 #[test]
@@ -166,7 +167,8 @@ fn cst_accelerates_the_inertia_with_the_torque_minus_friction() {
         bench.cycle(0x0F, 400);
     }
     let velocity = bench.observe().velocity;
-    assert!((velocity - 5.6 * (1.0 - (-3.75f64 * 9.95e-3).exp())).abs() < 0.003, "{velocity}");
+    // SYNC takes 51 µs, so the last whole step of the loops ends 9.75 ms after the one that set the torque.
+    assert!((velocity - 5.6 * (1.0 - (-3.75f64 * 9.75e-3).exp())).abs() < 0.001, "{velocity}");
     assert!((bench.observe().torque - 12.4).abs() < 1e-9);
 }
 

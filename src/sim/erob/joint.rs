@@ -3,7 +3,7 @@
 mod device;
 mod loops;
 
-use takt_rt::{DriveState, Frame, Nanoseconds, OperationMode};
+use takt_rt::{DriveState, Frame, Nanoseconds, OperationMode, statusword};
 
 use super::ErobParameters;
 use super::device::{Change, ErobDevice};
@@ -27,7 +27,7 @@ use crate::sim::servo::Servo;
 
 /// Rated torque for one ampere, from the ratings of the 80H120I (31 N·m at 6.3 A).
 const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;
-/// From a new value of 6060 until the drive is in that mode and 6061 shows it: two steps of its loops, and less than an SDO exchange. In
+/// From a new value of 6060 until the drive is in that mode and 6061 shows it: a step of its loops, and less than an SDO exchange. In
 /// the manual's sequences the next SDO reads the new mode.
 const MODE_CHANGE_NS: Nanoseconds = 250_000;
 /// From an SDO request to its reply, as measured on real units.
@@ -65,6 +65,8 @@ pub struct ErobJoint {
     injected: Option<DriveFault>,
     defects: JointDefects,
     coming_mode: Option<ComingMode>,
+    /// Bits 10 to 13 of the statusword, as the mode has set them in the last step.
+    mode_bits: u16,
     /// 607A before the last RPDO.
     target_before: i64,
     /// The time up to which the loops have run.
@@ -108,6 +110,7 @@ impl ErobJoint {
             injected: None,
             defects: JointDefects::default(),
             coming_mode: None,
+            mode_bits: statusword::BIT_12,
             target_before: 0,
             stepped_ns: 0,
             now_ns: 0,
@@ -206,9 +209,7 @@ impl ErobJoint {
     }
 
     fn statusword(&self) -> u16 {
-        // Bits 10 to 13 are those of the last step; the state may have changed since.
-        let bits = self.canopen.dictionary.number(at::STATUSWORD) as u16 & 0x3C00;
-        self.device.statusword(bits)
+        self.device.statusword(self.mode_bits)
     }
 
     /// Sets the turn count to 0.

@@ -1,6 +1,6 @@
 //! Steps the control loops and the joint.
 
-use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
+use takt_rt::{DriveState, NANOSECONDS_PER_SECOND, Nanoseconds, statusword};
 
 use super::ErobJoint;
 use crate::sim::erob::objects::at;
@@ -39,7 +39,8 @@ impl ControlLoops for ErobJoint {
         }
         let word = self.device.controlword();
         let bits = self.motion.status_bits(actual, word, &self.canopen.dictionary, duration_s);
-        self.canopen.dictionary.set(at::STATUSWORD, self.device.statusword(bits).into());
+        self.mode_bits =
+            if self.device.state() == DriveState::OperationEnabled { bits } else { statusword::BIT_12 };
     }
 }
 
