@@ -72,6 +72,9 @@ pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
 /// phrase of their own. They are numbered in the order of the English sentence.
 pub type ChinesePhrase = (&'static str, &'static str);
 
+/// A name or words in the meaning of a frame, in English and in Chinese.
+pub type ChineseTerm = (&'static str, &'static str);
+
 /// Describes frames in words.
 pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
 
@@ -236,6 +239,11 @@ pub trait Family: ConfiguredFamily {
     /// What the family says, in Chinese, beside what drives share: its errors and their cures, what fails in commissioning, what a scan
     /// remarks. A sentence without a phrase stays English.
     fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
+        vec![]
+    }
+
+    /// Names and words in the meanings of its frames, in Chinese, beside those of CANopen and CiA 402.
+    fn chinese_terms(&self) -> Vec<ChineseTerm> {
         vec![]
     }
 

@@ -4,6 +4,8 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::chinese::Words;
+
 /// Frames that are kept: those of more than half a second of two busy buses. A page asks four times a second.
 const KEPT: usize = 16_384;
 /// Frames that a page is given at once.
@@ -23,7 +25,7 @@ pub struct FrameView {
     /// As in a candump log: `181#3712`.
     pub frame: String,
     /// What it means.
-    pub words: String,
+    pub words: Words,
 }
 
 /// Which frames a page wants.
@@ -32,7 +34,7 @@ pub struct FrameView {
 pub struct Wanted {
     /// Those after the one with this number.
     after: u64,
-    /// A part of the frame, of its meaning, or of both with a space between them, in any case; empty for all.
+    /// A part of the frame, of its meaning in either language, or of both with a space between them, in any case; empty for all.
     #[serde(default)]
     filter: String,
 }
@@ -78,9 +80,7 @@ impl Frames {
     pub fn wanted(&self, wanted: &Wanted) -> FramesView {
         let number = wanted.after;
         let filter = wanted.filter.trim().to_lowercase();
-        let is_wanted = |frame: &&FrameView| {
-            filter.is_empty() || format!("{} {}", frame.frame, frame.words).to_lowercase().contains(&filter)
-        };
+        let is_wanted = |frame: &&FrameView| filter.is_empty() || frame.words.contain(&frame.frame, &filter);
         let begin = self.kept.partition_point(|frame| frame.number <= number);
         let kept = (self.kept.len() - begin) as u64;
         let new: Vec<&FrameView> = self.kept.range(begin..).filter(is_wanted).collect();
@@ -106,7 +106,7 @@ mod tests {
             bus: 0,
             direction: '<',
             frame: "181#3712".to_owned(),
-            words: String::new(),
+            words: Words::none(),
         };
         (0..3).for_each(|time| frames.push(frame(f64::from(time))));
         let after = |after| Wanted { after, ..Wanted::default() };
@@ -126,18 +126,17 @@ mod tests {
     fn what_a_page_does_not_want_takes_no_room() {
         let mut frames = Frames::default();
         for number in 0..10_000 {
-            let (frame, words) =
-                if number == 77 { ("081#1043", "Emergency of joint") } else { ("080#", "SYNC") };
+            let (frame, words) = if number == 77 { ("081#1043", "alarm 3") } else { ("080#", "SYNC") };
             frames.push(FrameView {
                 number: 0,
                 time: 0.0,
                 bus: 0,
                 direction: '<',
                 frame: frame.to_owned(),
-                words: words.to_owned(),
+                words: Words::of(words),
             });
         }
-        for filter in ["emerg", " 081#1043 EMER", "81#"] {
+        for filter in ["alarm", "报警", " 081#1043 ALARM", "81#"] {
             let view = frames.wanted(&Wanted { after: 0, filter: filter.to_owned() });
             assert_eq!((view.frames.len(), view.lost, view.last), (1, 0, 10_000), "{filter}");
         }

@@ -16,6 +16,7 @@ use takt_rt::StopCategory;
 use tokio::sync::oneshot;
 
 use super::access::Access;
+use super::chinese::Words;
 use super::command::{Command, CommandRefusal, target_of};
 use super::frames::{FrameView, Frames, Wanted};
 use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, locked, message, page_key};
@@ -160,7 +161,8 @@ impl Server {
             let reader = feed.reader();
             while self.are_frames_wanted() {
                 let Ok(OnBus { bus, what }) = reader.wait(LOOK) else { continue };
-                let words = decoders.get_mut(bus).map(|decoder| decoder.decode(&what.frame).line());
+                let words =
+                    decoders.get_mut(bus).map(|decoder| Words::of_meaning(&decoder.decode(&what.frame)));
                 let age_ns = self.controller.now_ns().saturating_sub(what.at_ns);
                 let mut frames = locked(&self.frames);
                 frames.lose(reader.take_lost());
@@ -170,7 +172,7 @@ impl Server {
                     bus,
                     direction: if what.is_sent { '>' } else { '<' },
                     frame: format!("{:?}", what.frame),
-                    words: words.unwrap_or_default(),
+                    words: words.unwrap_or_else(Words::none),
                 });
             }
         }

@@ -155,10 +155,15 @@ async function looksRight(panel, name) {
 
 // What takt says on a Chinese page: Han, and no English words but those of names and what stands in backticks.
 function isChinese(words) {
+  assert.match(words, /[\u4e00-\u9fff]/, words);
+  hasNoEnglish(words);
+}
+
+// A frame may mean a name alone, such as SYNC.
+function hasNoEnglish(words) {
   const outside = words.split("`").filter((_, place) => place % 2 === 0).join(" ");
   const english = outside.match(/[a-z]{3,}\d*/g) ?? [];
-  assert.match(words, /[\u4e00-\u9fff]/, words);
-  assert.deepEqual(english.filter((word) => !/^(joint\d|rad|base|wrist|takt|modes)$/.test(word)), [], words);
+  assert.deepEqual(english.filter((word) => !/^(joint\d|rad|deg|base|wrist|takt|modes)$/.test(word)), [], words);
 }
 
 const steps = {
@@ -312,6 +317,10 @@ const steps = {
     assert.equal(await page.locator("#frames li").count(), 0, "it has not been started");
     await page.locator("#monitor-on").click();
     await page.locator("#frames li", { hasText: "statusword" }).first().waitFor({ timeout: LONG });
+    await page.locator("#language").click();
+    await page.locator("#frames li", { hasText: "状态字" }).first().waitFor({ timeout: LONG });
+    for (const words of await page.locator("#frames li span").allTextContents()) hasNoEnglish(words);
+    await page.locator("#language").click();
     await page.fill("#monitor-filter", "joint6");
     await panel.until("frames of joint6 alone", () => {
       const rows = [...document.querySelectorAll("#frames li")];

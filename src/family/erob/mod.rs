@@ -10,6 +10,7 @@
 //! - `simulated`: the module that stands in for an axis.
 
 pub mod chinese;
+pub mod chinese_terms;
 pub mod following;
 pub mod module;
 pub mod motion;

@@ -27,8 +27,8 @@ use takt_rt::{Frame, Id, Nanoseconds};
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
 use super::{
-    ChinesePhrase, Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol, SettingUp,
-    UNWATCHED_SHUT_DOWN_NS, erob,
+    ChinesePhrase, ChineseTerm, Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol,
+    SettingUp, UNWATCHED_SHUT_DOWN_NS, erob,
 };
 use crate::canopen::function_code;
 use crate::canopen::objects::DEVICE_TYPE;
@@ -135,6 +135,10 @@ impl Family for ErobCan {
 
     fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
         erob::chinese::PHRASES.to_vec()
+    }
+
+    fn chinese_terms(&self) -> Vec<ChineseTerm> {
+        erob::chinese_terms::TERMS.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

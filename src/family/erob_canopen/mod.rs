@@ -11,7 +11,7 @@ pub use facts::FACTS;
 use takt_rt::Frame;
 
 use super::scan::{FoundDevice, StartingKeys};
-use super::{ChinesePhrase, Family, OtherProtocol, SettingUp, erob, erob_can};
+use super::{ChinesePhrase, ChineseTerm, Family, OtherProtocol, SettingUp, erob, erob_can};
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
@@ -84,6 +84,10 @@ impl Family for ErobCanopen {
 
     fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
         erob::chinese::PHRASES.to_vec()
+    }
+
+    fn chinese_terms(&self) -> Vec<ChineseTerm> {
+        erob::chinese_terms::TERMS.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

@@ -1,6 +1,6 @@
 //! What the family says, in Chinese.
 
-use crate::family::ChinesePhrase;
+use crate::family::{ChinesePhrase, ChineseTerm};
 
 /// English and Chinese.
 pub const PHRASES: &[ChinesePhrase] = &[
@@ -76,6 +76,62 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("servo alarm", "伺服报警"),
     ("voltage output", "电压输出"),
     ("quick stop allowed", "允许快速停止"),
+];
+
+/// Names and words in the meanings of frames.
+pub const TERMS: &[ChineseTerm] = &[
+    // Objects.
+    ("Modbus enable", "Modbus 使能"),
+    ("drive output enable", "驱动输出使能"),
+    ("flux-weakening angle", "弱磁角度"),
+    ("DIR polarity", "DIR 极性"),
+    ("electronic gear numerator", "电子齿轮分子"),
+    ("electronic gear denominator", "电子齿轮分母"),
+    ("incremental position", "增量位置"),
+    ("alarm code", "报警代码"),
+    ("system temperature", "系统温度"),
+    ("system output PWM", "系统输出 PWM"),
+    ("parameter save flag", "参数保存标志"),
+    ("device address", "设备地址"),
+    ("maximum output at standstill", "静止时最大输出"),
+    ("special function", "特殊功能"),
+    ("CAN sync control word", "CAN 同步控制字"),
+    ("maximum allowed current", "最大允许电流"),
+    ("multi-turn battery level", "多圈电池电量"),
+    ("actual velocity", "实际速度"),
+    ("actual current", "实际电流"),
+    ("system voltage", "系统电压"),
+    ("motor acceleration", "电机加速度"),
+    ("velocity loop proportional gain", "速度环比例增益"),
+    ("velocity loop integration time", "速度环积分时间"),
+    ("position loop proportional gain", "位置环比例增益"),
+    ("velocity feed-forward", "速度前馈"),
+    ("digital input state", "数字输入状态"),
+    // Bits of statusword and controlword.
+    ("homing complete", "回零完成"),
+    ("homing error", "回零错误"),
+    ("allow quick stop", "允许快速停止"),
+    ("allow operation", "允许运行"),
+    ("run to the new set-point", "运行到新设定点"),
+    ("target effective immediately", "目标立即生效"),
+    ("no bit", "无置位"),
+    // Values.
+    ("CANopen interpolation", "CANopen 插补"),
+    ("no mode", "无此模式"),
+    ("held until SYNC", "保持到 SYNC"),
+    ("not stored", "未保存"),
+    ("stored", "已保存"),
+    ("pulse and direction", "脉冲加方向"),
+    ("follow an encoder (A/B)", "跟随编码器 (A/B)"),
+    ("velocity by PWM duty cycle", "由 PWM 占空比给定速度"),
+    ("return to the multi-turn zero at power-up", "上电时返回多圈零点"),
+    ("the motor moves by itself", "电机会自行运动"),
+    ("interpolation over CANopen", "通过 CANopen 插补"),
+    ("turn to", "转到"),
+    ("at power-up", "（上电时）"),
+    ("communication control from power-up", "上电即通信控制"),
+    ("multi-turn zero, step 1", "多圈零点，第 1 步"),
+    ("multi-turn zero, step 2", "多圈零点，第 2 步"),
 ];
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub(crate) use process_data::answers_sync;
 use takt_rt::Frame;
 
 use super::scan::{FoundDevice, StartingKeys};
-use super::{ChinesePhrase, Family, MappingMatch, SettingUp};
+use super::{ChinesePhrase, ChineseTerm, Family, MappingMatch, SettingUp};
 use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
@@ -89,6 +89,10 @@ impl Family for YzAim {
 
     fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
         chinese::PHRASES.to_vec()
+    }
+
+    fn chinese_terms(&self) -> Vec<ChineseTerm> {
+        chinese::TERMS.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

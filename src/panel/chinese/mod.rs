@@ -9,6 +9,10 @@ mod book;
 mod commands;
 mod drive_errors;
 mod events;
+#[cfg(feature = "panel")]
+mod frame_terms;
+#[cfg(feature = "panel")]
+mod glossary;
 mod procedures;
 mod refusals;
 mod rejections;
@@ -16,6 +20,9 @@ mod scans;
 mod stops;
 
 use serde::Serialize;
+
+#[cfg(feature = "panel")]
+use crate::monitor::Decoded;
 
 /// A sentence in both languages.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -30,6 +37,29 @@ impl Words {
         let en = english.into();
         let zh = book::book().chinese(&en).unwrap_or_else(|| en.clone());
         Self { en, zh }
+    }
+
+    /// What a frame means.
+    #[cfg(feature = "panel")]
+    pub fn of_meaning(decoded: &Decoded) -> Self {
+        // Names of axes stay. Others who are concerned are `node 3` or the controller.
+        let names = decoded.who.split(", ").filter(|_| !decoded.axes.is_empty());
+        let zh = decoded.line_in("：", |part| glossary::glossary().chinese(part, names.clone()));
+        Self { en: decoded.line(), zh }
+    }
+
+    /// What stands for itself in both languages.
+    #[cfg(feature = "panel")]
+    pub fn none() -> Self {
+        Self { en: String::new(), zh: String::new() }
+    }
+
+    /// Whether either of the languages has this part, which is in small letters.
+    #[cfg(feature = "panel")]
+    pub fn contain(&self, before: &str, part: &str) -> bool {
+        [&self.en, &self.zh]
+            .into_iter()
+            .any(|words| format!("{before} {words}").to_lowercase().contains(part))
     }
 }
 

@@ -4,6 +4,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use takt_rt::Frame;
 
+use super::super::super::chinese::Words;
 use super::super::super::frames::FrameView;
 use super::super::super::gate::locked;
 use super::super::Bench;
@@ -51,7 +52,7 @@ impl<'a> Watcher<'a> {
         let frame: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
         push(
             self.bench,
-            FrameView { direction, bus: self.bus, frame, number: 0, time: 0.0, words: String::new() },
+            FrameView { direction, bus: self.bus, frame, number: 0, time: 0.0, words: Words::none() },
         );
     }
 
@@ -83,7 +84,7 @@ pub(super) fn keep(
     frame: &Frame,
 ) -> Option<String> {
     let decoded = decoder.decode(frame);
-    let words = decoded.line();
+    let words = Words::of_meaning(&decoded);
     push(bench, FrameView { direction, bus, frame: format!("{frame:?}"), number: 0, time: 0.0, words });
     (direction == '<' && decoded.shows_torque == Some(true)).then_some(decoded.who)
 }
