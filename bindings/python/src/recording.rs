@@ -100,6 +100,8 @@ impl Recorder {
     fn end(&self, tape: &Arc<Tape>) {
         let mut tapes = lock(&self.0.tapes);
         tapes.retain(|own| !own.ptr_eq(&Arc::downgrade(tape)) && own.strong_count() > 0);
+        // The thread that writes may have looked before, and be about to write.
+        lock(&tape.columns).has_ended = true;
         self.0.any.store(!tapes.is_empty(), Ordering::Release);
     }
 }
@@ -125,6 +127,7 @@ struct Columns {
     slots: Vec<u64>,
     /// Of each quantity, a row for each cycle.
     values: [Vec<f64>; QUANTITIES.len()],
+    has_ended: bool,
 }
 
 impl Tape {
@@ -139,7 +142,7 @@ impl Tape {
 
     fn add<T>(&self, slot: u64, at_ns: u64, axes: &[T], of: [fn(&T) -> f64; QUANTITIES.len()]) {
         let mut columns = lock(&self.columns);
-        if columns.times.len() >= self.at_most {
+        if columns.has_ended || columns.times.len() >= self.at_most {
             return;
         }
         columns.times.push(seconds(at_ns));
