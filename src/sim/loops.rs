@@ -1,5 +1,5 @@
-//! When the control loops and the plant of a simulated drive run: at 4 kHz, and exactly up to SYNC. They are nearly a third of what a simulated
-//! cycle costs. So what they call in each step is marked `#[inline]`, which lets it be compiled into them from another module.
+//! When the control loops and the plant of a simulated CANopen drive run: at 4 kHz, and exactly up to SYNC. They are nearly a third of what a
+//! simulated cycle costs. So what they call in each step is marked `#[inline]`, which lets it be compiled into them from another module.
 
 use takt_rt::Nanoseconds;
 

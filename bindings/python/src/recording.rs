@@ -127,6 +127,7 @@ struct Columns {
     slots: Vec<u64>,
     /// Of each quantity, a row for each cycle.
     values: [Vec<f64>; QUANTITIES.len()],
+    /// Nothing more is written.
     has_ended: bool,
 }
 

@@ -117,7 +117,6 @@ pub const TERMS: &[ChineseTerm] = &[
     ("no bit", "无置位"),
     // Values.
     ("CANopen interpolation", "CANopen 插补"),
-    ("no mode", "无此模式"),
     ("held until SYNC", "保持到 SYNC"),
     ("not stored", "未保存"),
     ("stored", "已保存"),

@@ -226,10 +226,8 @@ fn part_at(text: &str) -> Option<(Part, usize)> {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
-    use std::path::Path;
-
     use super::*;
+    use crate::panel::chinese::tests::source;
 
     fn parts(sentence: &'static str) -> Vec<(bool, usize)> {
         let part = |piece| match piece {
@@ -283,24 +281,7 @@ mod tests {
     /// A phrase whose English sentence is said nowhere is one that was left behind when the sentence was changed.
     #[test]
     fn each_phrase_is_for_a_sentence_that_the_source_has() {
-        fn add(folder: &Path, to: &mut String) {
-            for entry in fs::read_dir(folder).unwrap() {
-                let path = entry.unwrap().path();
-                let is_of_phrases = path.ends_with("panel/chinese")
-                    || path.file_name().is_some_and(|name| name == "chinese.rs");
-                match path.is_dir() {
-                    _ if is_of_phrases => {}
-                    true => add(&path, to),
-                    false => to.push_str(&fs::read_to_string(&path).unwrap_or_default()),
-                }
-            }
-        }
-        let mut source = String::new();
-        for folder in ["src", "rt/src"] {
-            add(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut source);
-        }
-        let source = source.replace("\\\"", "\"").replace("\\\n", "\n");
-        let source = source.split_whitespace().collect::<Vec<_>>().join(" ");
+        let source = source();
         for (english, chinese) in phrases() {
             for text in Phrase::new((english, chinese)).english {
                 assert!(source.contains(text.trim()), "{text:?} of {english:?} is said nowhere");

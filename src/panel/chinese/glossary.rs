@@ -119,28 +119,30 @@ impl Chinese {
         self.text.push_str(text);
     }
 
-    /// The signs of Chinese are as wide as their spaces.
+    /// The signs of Chinese are as wide as their spaces, but for those between numbers.
     fn sign(&mut self, sign: char) {
         match sign {
             '[' => self.is_in_list = true,
             ']' => self.is_in_list = false,
-            ' ' if !self.is_in_list => {
-                let wide = match self.text.pop() {
-                    Some(':') => '：',
-                    Some(';') => '；',
-                    Some(',') => '，',
-                    Some(other) => {
-                        self.text.push(other);
-                        ' '
-                    }
-                    None => ' ',
-                };
-                self.text.push(wide);
-                return;
-            }
             _ => {}
         }
-        self.text.push(sign);
+        let before = self.text.chars().next_back().filter(|_| sign == ' ' && !self.is_in_list);
+        if let Some(wide) = before.and_then(wide) {
+            self.text.pop();
+            self.text.push(wide);
+        } else {
+            self.text.push(sign);
+        }
+    }
+}
+
+/// What stands in Chinese for a sign and a space.
+const fn wide(sign: char) -> Option<char> {
+    match sign {
+        ':' => Some('：'),
+        ';' => Some('；'),
+        ',' => Some('，'),
+        _ => None,
     }
 }
 
@@ -159,10 +161,11 @@ mod tests {
     use crate::erob_can::parameter::{Parameter as _, Values};
     use crate::monitor::BusDecoder;
     use crate::panel::chinese::Words;
+    use crate::panel::chinese::tests::source;
 
     /// Names of protocols, units and the like, which are the same in Chinese.
     const KEPT: &str = "rad rad/s rad/s² m m/s mm/s Nm N·m mN·m count/s count/s² kbit/s bit/s ms min r/min save load deg deg/s deg/s² CiA eRob \
-                        Modbus CANopen EtherCAT";
+                        Modbus CANopen EtherCAT boot-up stopped operational pre-operational";
 
     /// The English words that are left in a Chinese meaning.
     fn left(chinese: &str, names: &[&str]) -> Vec<String> {
@@ -218,22 +221,8 @@ mod tests {
     }
 
     #[test]
-    fn each_term_stands_once_in_a_table_and_is_said_by_the_source() {
-        fn add(folder: &Path, to: &mut String) {
-            for entry in fs::read_dir(folder).unwrap() {
-                let path = entry.unwrap().path();
-                let name = path.file_name().unwrap().to_string_lossy().into_owned();
-                match path.is_dir() {
-                    _ if name.contains("chinese") => {}
-                    true => add(&path, to),
-                    false => to.push_str(&fs::read_to_string(&path).unwrap_or_default()),
-                }
-            }
-        }
-        let mut source = String::new();
-        for folder in ["src", "rt/src"] {
-            add(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut source);
-        }
+    fn each_term_stands_once_in_the_book_and_the_tables_and_is_said_by_the_source() {
+        let source = source();
         let mut problems = vec![];
         let mut check = |table: &[ChineseTerm], others: &BTreeSet<&str>| {
             let mut own = BTreeSet::new();
@@ -250,7 +239,9 @@ mod tests {
             }
             own
         };
-        let general = check(frame_terms::TERMS, &BTreeSet::new());
+        let phrases: BTreeSet<&str> = book::phrases().into_iter().map(|(english, _)| english).collect();
+        let mut general = check(frame_terms::TERMS, &phrases);
+        general.extend(phrases);
         for family in family::all() {
             check(&family.chinese_terms(), &general);
         }

@@ -65,6 +65,9 @@ impl Words {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::path::Path;
+
     use super::*;
     use crate::telemetry::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 
@@ -98,6 +101,27 @@ mod tests {
             buses: vec![bus],
             groups: ["left", "right", "slide"].map(str::to_owned).to_vec(),
         }
+    }
+
+    /// All that takt may say: the source without the tables of Chinese, each space of any length one.
+    pub(super) fn source() -> String {
+        fn add(folder: &Path, to: &mut String) {
+            for entry in fs::read_dir(folder).unwrap() {
+                let path = entry.unwrap().path();
+                let name = path.file_name().unwrap().to_string_lossy().into_owned();
+                match path.is_dir() {
+                    _ if name.contains("chinese") => {}
+                    true => add(&path, to),
+                    false => to.push_str(&fs::read_to_string(&path).unwrap_or_default()),
+                }
+            }
+        }
+        let mut source = String::new();
+        for folder in ["src", "rt/src"] {
+            add(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut source);
+        }
+        let source = source.replace("\\\"", "\"").replace("\\\n", "\n");
+        source.split_whitespace().collect::<Vec<_>>().join(" ")
     }
 
     /// Fails unless a sentence of takt is Chinese, but for names, units, and what stands in backticks.
