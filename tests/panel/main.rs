@@ -1,7 +1,6 @@
 //! The panel's server, as a browser, another site and a lost page meet it. The page itself is driven by `tests/panel/run`.
 
 mod access;
-mod bench;
 mod open_page;
 
 use std::sync::Arc;

@@ -1,6 +1,7 @@
 //! The simulated bus and the simulated drives from the point of view of a master.
 
 mod bench;
+mod canopen_pdo_reader;
 mod cia402;
 mod device;
 mod lengths;
@@ -15,3 +16,4 @@ mod rows;
 mod sdo;
 mod vectors;
 mod yz_aim;
+mod yz_aim_vectors;

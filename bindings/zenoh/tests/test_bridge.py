@@ -18,7 +18,8 @@ from node import JOINTS, STATES, STORE, TRAJECTORIES, key, listening, trajectory
 from ruamel.yaml import YAML
 
 ROOT = Path(__file__).resolve().parents[3]
-PROGRAMS = Path(os.environ["TAKT_PROGRAMS"])
+TAKT = os.environ["TAKT"]
+TAKT_ZENOH = os.environ["TAKT_ZENOH"]
 PATIENCE = 60.0
 
 
@@ -63,7 +64,7 @@ def peer():
 @pytest.fixture(scope="module")
 def arm(tmp_path_factory):
     folder = tmp_path_factory.mktemp("arm")
-    served = start([PROGRAMS / "takt", "run", ROOT / "configs/arm6-erob.toml", "--serve", folder / "arm"], folder / "takt.txt")
+    served = start([TAKT, "run", ROOT / "configs/arm6-erob.toml", "--serve", folder / "arm"], folder / "takt.txt")
     served.wait_for("served by the name")
     yield folder / "arm"
     end(served)
@@ -74,7 +75,7 @@ def bridge(arm, peer, tmp_path_factory):
     _, endpoint = peer
     said = tmp_path_factory.mktemp("bridge") / "said.txt"
     listen = "tcp/127.0.0.1:0"
-    words = [PROGRAMS / "takt-zenoh", arm, "--connect", endpoint, "--listen", listen, "--domain", "0"]
+    words = [TAKT_ZENOH, arm, "--connect", endpoint, "--listen", listen, "--domain", "0"]
     program = start(words, said)
     program.wait_for("publishes /joint_states")
     yield program
@@ -204,7 +205,7 @@ def test_the_commands_of_the_page_move_the_arm(peer, tmp_path):
 
     def program(line):
         words = [here.get(word, ROOT / word if word.startswith("configs/") else word) for word in shlex.split(line, comments=True)]
-        return [PROGRAMS / Path(words[0]).name, *words[1:]]
+        return [{"takt": TAKT, "takt-zenoh": TAKT_ZENOH}[Path(words[0]).name], *words[1:]]
 
     run, connect = (program(line) for line in robot.splitlines() if line.startswith("target/release/"))
     echo, publish = (shlex.split(line) for line in other.splitlines() if line.startswith("ros2 topic"))

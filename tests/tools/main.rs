@@ -1,0 +1,5 @@
+//! Commissioning and scans.
+
+mod canopen_lss;
+mod commission;
+mod scan;
