@@ -59,7 +59,7 @@
 //! | `takt::realtime` | what the operating system has refused to the real-time thread | `step` |
 //!
 //! # To read takt
-//! Each folder uses only what stands below it in this picture (`tests/arrows.rs` proves it):
+//! Each folder uses only what stands below it in this picture (`tests/repository/arrows.rs` proves it):
 //!
 //! ```text
 //! internals                           what the tests see beyond the public face

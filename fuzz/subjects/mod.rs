@@ -1,5 +1,5 @@
 //! The functions that are fuzzed. They take arbitrary bytes and panic if a property does not hold. The fuzz targets call them.
-//! A test (`tests/fuzz_corpus.rs`) also calls them, with the files of `fuzz/seeds` and with random bytes.
+//! A test (`tests/repository/fuzz_corpus.rs`) also calls them, with the files of `fuzz/seeds` and with random bytes.
 
 pub mod bus_logs;
 pub mod configuration;

@@ -1,4 +1,4 @@
-//! From a call of a handle to the wire, in cycles: counted in virtual time, where nothing else is late. `bindings/c/tests/latency.rs` and
+//! From a call of a handle to the wire, in cycles: counted in virtual time, where nothing else is late. `bindings/c/tests/c_api/latency.rs` and
 //! `bindings/python/tests/test_latency.py` count the same of the other fronts.
 
 use std::path::Path;

@@ -74,7 +74,7 @@ fn a_client_at_100_hz_and_one_at_1_khz_never_cause_a_stop_on_a_loaded_machine() 
     }
 }
 
-/// As above. `cargo test --release --test stream_clients -- --ignored --nocapture`
+/// As above. `cargo test --release --test library stream_clients -- --ignored --nocapture`
 #[test]
 #[ignore = "takes twenty minutes"]
 fn they_never_cause_one_in_ten_minutes_either() {

@@ -55,7 +55,7 @@ fn the_readme_stays_short() {
     assert!(words < 1_200, "{words} words: details belong into docs/");
 }
 
-/// `tests/examples.rs` runs it.
+/// `tests/library/examples.rs` runs it.
 #[test]
 fn the_program_for_another_process_is_an_example() {
     let page = fs::read_to_string(root().join("docs/another-process.md")).unwrap();
