@@ -6,21 +6,22 @@
 //! ```
 
 use std::path::Path;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use takt::{AxisPoint, Config, Controller, OperationMode, Phase, SessionOptions, StopCategory};
+use takt::{AxisPoint, Config, Controller, Handle, OperationMode, Phase, SessionOptions, StopCategory};
 
 const PATIENCE: Duration = Duration::from_secs(10);
 
 fn main() -> takt::Result {
     let path = std::env::args().nth(1).unwrap_or_else(|| "configs/erob-modes/erob-changing.toml".to_owned());
-    run(Config::load(Path::new(&path))?)
+    let arm = Controller::start(Config::load(Path::new(&path))?, SessionOptions::default())?;
+    run(&arm)?;
+    arm.finish()?;
+    Ok(())
 }
 
 /// Takes the first joint through its three modes, and leaves it where it began.
-pub fn run(config: Config) -> takt::Result {
-    let arm = Controller::start(config, SessionOptions::default())?;
+pub fn run(arm: &Handle) -> takt::Result {
     let home = arm.move_to(&[0.5])?;
     arm.wait(home, PATIENCE)?;
 
@@ -30,23 +31,22 @@ pub fn run(config: Config) -> takt::Result {
         println!("{error}");
     }
 
-    change(&arm, OperationMode::CyclicSynchronousVelocity)?;
-    stream(&arm, AxisPoint::Velocity(0.3))?;
+    change(arm, OperationMode::CyclicSynchronousVelocity)?;
+    stream(arm, AxisPoint::Velocity(0.3))?;
 
-    change(&arm, OperationMode::CyclicSynchronousTorque)?;
+    change(arm, OperationMode::CyclicSynchronousTorque)?;
     // A spring of 60 N·m/rad, and 3 N·m against the weight of the joint.
     let here = arm.state().axes()[0].position;
-    stream(&arm, AxisPoint::position(here).with_impedance(60.0, 8.0).with_torque(3.0))?;
+    stream(arm, AxisPoint::position(here).with_impedance(60.0, 8.0).with_torque(3.0))?;
 
-    change(&arm, OperationMode::CyclicSynchronousPosition)?;
+    change(arm, OperationMode::CyclicSynchronousPosition)?;
     let back = arm.move_to(&[0.0])?;
     arm.wait(back, PATIENCE)?;
-    arm.finish()?;
     Ok(())
 }
 
 /// Disables the joint, changes its mode, and enables it again.
-fn change(arm: &Controller, mode: OperationMode) -> takt::Result {
+fn change(arm: &Handle, mode: OperationMode) -> takt::Result {
     arm.disable()?;
     arm.wait_for(Phase::Disabled, PATIENCE)?;
     let change = arm.change_mode(mode)?;
@@ -58,13 +58,12 @@ fn change(arm: &Controller, mode: OperationMode) -> takt::Result {
     Ok(())
 }
 
-/// Streams a point for half a second, and stops.
-fn stream(arm: &Controller, point: AxisPoint) -> takt::Result {
+/// Streams a point every ten cycles, for half a second at 1 kHz, and stops.
+fn stream(arm: &Handle, point: AxisPoint) -> takt::Result {
     arm.begin_stream()?;
-    let begun = Instant::now();
-    while begun.elapsed() < Duration::from_millis(500) {
+    for _ in 0..50 {
         arm.stream().push_now(&[point])?;
-        thread::sleep(Duration::from_millis(10));
+        arm.advance(10)?;
     }
     let joint = arm.state().axes[0];
     println!("at {:.3} rad, {:.2} rad/s, {:.1} N·m", joint.position, joint.velocity, joint.torque_set);

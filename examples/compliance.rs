@@ -6,19 +6,19 @@
 //! ```
 
 use std::path::Path;
-use std::thread;
-use std::time::{Duration, Instant};
 
-use takt::{AxisPoint, Config, Controller, SessionOptions};
+use takt::{AxisPoint, Config, Controller, Handle, SessionOptions};
 
 fn main() -> takt::Result {
     let path = std::env::args().nth(1).unwrap_or_else(|| "configs/erob-modes/erob-cst.toml".to_owned());
-    run(Config::load(Path::new(&path))?)
+    let arm = Controller::start(Config::load(Path::new(&path))?, SessionOptions::default())?;
+    run(&arm)?;
+    arm.finish()?;
+    Ok(())
 }
 
-/// Streams half a second of each kind to the first joint. The others stay where they are.
-pub fn run(config: Config) -> takt::Result {
-    let arm = Controller::start(config, SessionOptions::default())?;
+/// Streams each kind to the first joint, a point every ten cycles, for half a second at 1 kHz. The others stay where they are.
+pub fn run(arm: &Handle) -> takt::Result {
     let home: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set).collect();
     // A spring of 60 N·m/rad and a damper of 8 N·m·s/rad. `[axis.torque_loop] stiffness_max` and `damping_max` limit both.
     let soft = AxisPoint::position(home[0] + 0.1).with_impedance(60.0, 8.0);
@@ -32,12 +32,11 @@ pub fn run(config: Config) -> takt::Result {
         // A joint that moves is not stopped by a change of the kind: it goes on from where it is, as fast as it is.
         ("velocity", AxisPoint::Velocity(-0.2)),
     ] {
-        let begun = Instant::now();
-        while begun.elapsed() < Duration::from_millis(500) {
-            let mut points: Vec<AxisPoint> = home.iter().map(|position| (*position).into()).collect();
-            points[0] = point;
+        let mut points: Vec<AxisPoint> = home.iter().map(|position| (*position).into()).collect();
+        points[0] = point;
+        for _ in 0..50 {
             arm.stream().push_now(&points)?;
-            thread::sleep(Duration::from_millis(10));
+            arm.advance(10)?;
         }
         let state = arm.state();
         let joint = &state.axes()[0];
@@ -49,6 +48,5 @@ pub fn run(config: Config) -> takt::Result {
     if let Err(error) = arm.stream().push_now(&too_stiff) {
         println!("refused: {error}");
     }
-    arm.finish()?;
     Ok(())
 }

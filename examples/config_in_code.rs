@@ -8,10 +8,11 @@ use std::time::Duration;
 
 use takt::config::{Axis, Bus, Interface, Limits};
 use takt::family;
-use takt::{Config, Controller, SessionOptions};
+use takt::{Config, Controller, Handle, SessionOptions};
 
 fn main() -> takt::Result {
-    run(config())
+    let arm = Controller::start(config(), SessionOptions::default())?;
+    run(&arm)
 }
 
 /// Everything that is not named has the default of a file, and is checked by the same rules.
@@ -35,8 +36,7 @@ pub fn config() -> Config {
 }
 
 /// Moves both joints.
-pub fn run(config: Config) -> takt::Result {
-    let arm = Controller::start(config, SessionOptions::default())?;
+pub fn run(arm: &Handle) -> takt::Result {
     let motion = arm.move_to(&[0.5, -0.5])?;
     arm.wait(motion, Duration::from_secs(10))?;
     println!("arrived");

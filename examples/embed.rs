@@ -7,19 +7,23 @@
 use std::path::Path;
 use std::time::Duration;
 
-use takt::{Config, Controller, MoveOptions, SessionOptions};
+use takt::{Config, Controller, Handle, MoveOptions, SessionOptions};
 
 fn main() -> takt::Result {
     let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
-    run(Config::load(Path::new(&path))?)
-}
-
-/// Moves every axis to the middle of its travel, and to a tenth of its travel above it.
-pub fn run(config: Config) -> takt::Result {
-    let arm = Controller::start(config, SessionOptions::default())?;
+    let arm = Controller::start(Config::load(Path::new(&path))?, SessionOptions::default())?;
     for refused in arm.realtime().refused() {
         println!("the loop is less punctual than it could be: {refused:?}");
     }
+    run(&arm)?;
+    // Dropping the controller would do the same, without the result.
+    let session = arm.finish()?;
+    println!("{:?}", session.outcome);
+    Ok(())
+}
+
+/// Moves every axis to the middle of its travel, and to a tenth of its travel above it.
+pub fn run(arm: &Handle) -> takt::Result {
     let pose = |part: f64| -> Vec<f64> {
         let limits = arm.axes().iter().map(|axis| axis.limits);
         limits.map(|of| of.position_min + part * (of.position_max - of.position_min)).collect()
@@ -40,8 +44,5 @@ pub fn run(config: Config) -> takt::Result {
             axis.name, now.position, now.following_error
         );
     }
-    // Dropping the controller would do the same, without the result.
-    let session = arm.finish()?;
-    println!("{:?}", session.outcome);
     Ok(())
 }

@@ -8,7 +8,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use takt::{CallbackOptions, Config, Controller, SessionOptions};
+use takt::{CallbackOptions, Config, Controller, Handle, SessionOptions};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 /// The torque of gravity at each joint, a quarter turn from where it hangs: N·m. A real arm needs its model here.
@@ -19,15 +19,21 @@ const POSE: [f64; 6] = [0.4, -0.5, 0.6, -1.0, 0.5, 0.8];
 
 fn main() -> takt::Result {
     let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob-cst.toml".to_owned());
-    run(Config::load(Path::new(&path))?).map(drop)
+    let config = with_gravity(Config::load(Path::new(&path))?);
+    let arm = Controller::start(config, SessionOptions::default())?;
+    run(&arm).map(drop)
 }
 
-/// Lets the arm float for two seconds. Returns how far the joint has moved that has moved farthest.
-pub fn run(mut config: Config) -> takt::Result<f64> {
+/// Adds the weight of the joints to their simulation.
+pub fn with_gravity(mut config: Config) -> Config {
     for (axis, gravity) in config.axes.iter_mut().zip(GRAVITY) {
         axis.simulated.gravity = gravity;
     }
-    let arm = Controller::start(config, SessionOptions::default())?;
+    config
+}
+
+/// Lets the arm float for two seconds. Returns how far the joint has moved that has moved farthest.
+pub fn run(arm: &Handle) -> takt::Result<f64> {
     arm.wait(arm.move_to(&POSE)?, PATIENCE)?;
     let before = arm.state();
 

@@ -6,21 +6,20 @@
 //! ```
 
 use std::path::Path;
-use std::thread;
 use std::time::Duration;
 
-use takt::{Config, Controller, SessionOptions, TrajectoryPoint};
+use takt::{Config, Controller, Handle, SessionOptions, TrajectoryPoint};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn main() -> takt::Result {
     let path = std::env::args().nth(1).unwrap_or_else(|| "configs/arm6-erob.toml".to_owned());
-    run(Config::load(Path::new(&path))?)
+    let arm = Controller::start(Config::load(Path::new(&path))?, SessionOptions::default())?;
+    run(&arm)
 }
 
 /// Executes a trajectory, slower in between, and goes back through waypoints.
-pub fn run(config: Config) -> takt::Result {
-    let arm = Controller::start(config, SessionOptions::default())?;
+pub fn run(arm: &Handle) -> takt::Result {
     let home: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set).collect();
     let from_home = |offset: f64| -> Vec<f64> { home.iter().map(|home| home + offset).collect() };
     let point =
@@ -31,7 +30,7 @@ pub fn run(config: Config) -> takt::Result {
     let motion = arm.execute(&points)?;
     arm.set_speed(motion, 0.5)?;
     arm.pause(motion)?;
-    thread::sleep(Duration::from_millis(200));
+    arm.advance(200)?;
     if let Some(progress) = arm.trajectory_progress(motion) {
         println!("paused near {:.2} s of {:.2} s", progress.path_s, progress.of_s);
     }

@@ -1,8 +1,13 @@
-//! The programs of `examples/`, on simulated drives. Each module is the source of the program.
+//! The programs of `examples/`, on simulated drives: in virtual time where a program moves the arm of a handle, and in real time where
+//! it starts a controller with faults, threads or a server. Each module is the source of the program.
 
 use std::path::Path;
+use std::time::Duration;
 
-use takt::{Config, Scenario};
+use takt::{
+    Config, Controller, Handle, Outcome, Scenario, ServeOptions, SessionOptions, Snapshot, VirtualController,
+    serve,
+};
 
 /// The programs that read the configuration of an arm, or of a joint.
 macro_rules! programs {
@@ -37,50 +42,58 @@ fn config(name: &str) -> Config {
     config
 }
 
+/// Does a program's work with a controller in virtual time.
+#[track_caller]
+fn in_virtual_time<T>(config: &Config, work: impl FnOnce(&Handle) -> takt::Result<T>) -> T {
+    let arm = VirtualController::start(config, None).unwrap();
+    let done = work(&arm).unwrap();
+    assert_eq!(arm.finish(), Outcome::Finished);
+    done
+}
+
 #[test]
 fn the_first_program_moves_an_arm() {
-    embed::run(config("arm6-erob.toml")).unwrap();
+    in_virtual_time(&config("arm6-erob.toml"), embed::run);
 }
 
 #[test]
 fn a_joint_is_soft_then_driven_by_a_torque_and_then_turns() {
-    compliance::run(config("erob-modes/erob-cst.toml")).unwrap();
+    in_virtual_time(&config("erob-modes/erob-cst.toml"), compliance::run);
 }
 
 #[test]
 fn a_joint_is_taken_through_its_three_modes() {
-    change_mode::run(config("erob-modes/erob-changing.toml")).unwrap();
+    in_virtual_time(&config("erob-modes/erob-changing.toml"), change_mode::run);
 }
 
 #[test]
 fn a_configuration_in_code_moves_two_joints() {
-    config_in_code::run(config_in_code::config()).unwrap();
+    in_virtual_time(&config_in_code::config(), config_in_code::run);
 }
 
 #[test]
 fn drives_that_plan_by_themselves_get_velocities_and_torques() {
-    profile_modes::run(config("erob-modes/erob-pv.toml")).unwrap();
-    profile_modes::run(config("erob-modes/erob-pt.toml")).unwrap();
+    in_virtual_time(&config("erob-modes/erob-pv.toml"), profile_modes::run);
+    in_virtual_time(&config("erob-modes/erob-pt.toml"), profile_modes::run);
 }
 
 #[test]
 fn an_arm_is_moved_through_another_process() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("arm").display().to_string();
-    let arm = takt::Controller::start(config("arm6-erob.toml"), takt::SessionOptions::default()).unwrap();
-    let _server = takt::serve(arm.handle(), &name, takt::ServeOptions::default()).unwrap();
+    let arm = Controller::start(config("arm6-erob.toml"), SessionOptions::default()).unwrap();
+    let _server = serve(arm.handle(), &name, ServeOptions::default()).unwrap();
     let before = arm.state().axes[0].position_set;
     remote::run(&name).unwrap();
     // The point of the stream is followed after the program has gone.
-    let patience = std::time::Duration::from_secs(30);
-    let there =
-        |state: &takt::Snapshot| ((state.axes[0].position_set - before - 0.06).abs() < 1e-6).then_some(());
+    let patience = Duration::from_secs(30);
+    let there = |state: &Snapshot| ((state.axes[0].position_set - before - 0.06).abs() < 1e-6).then_some(());
     assert!(arm.wait_until(patience, there).is_ok(), "{}", arm.state().axes[0].position_set - before);
 }
 
 #[test]
 fn a_circle_is_streamed() {
-    stream::run(config("arm6-erob.toml")).unwrap();
+    in_virtual_time(&config("arm6-erob.toml"), stream::run);
 }
 
 #[test]
@@ -103,12 +116,15 @@ fn a_program_runs_in_virtual_time() {
 
 #[test]
 fn a_trajectory_is_executed_slowed_down_and_paused() {
-    trajectory::run(config("arm6-erob.toml")).unwrap();
+    in_virtual_time(&config("arm6-erob.toml"), trajectory::run);
 }
 
 #[test]
 fn an_arm_that_carries_its_own_weight_floats() {
-    let farthest = gravity_compensation::run(config("arm6-erob-cst.toml")).unwrap();
+    let farthest = in_virtual_time(
+        &gravity_compensation::with_gravity(config("arm6-erob-cst.toml")),
+        gravity_compensation::run,
+    );
     assert!(farthest < 0.05, "it has moved by {farthest} rad");
 }
 
