@@ -9,7 +9,7 @@ use takt::config::{
 };
 use takt::family;
 use takt::internals::controller::assemble;
-use takt::{Controller, VirtualRun};
+use takt::{Controller, Outcome, VirtualController, VirtualRun};
 
 fn sound() -> Config {
     Config::parse("arm6-erob.toml", include_str!("../../configs/arm6-erob.toml")).unwrap()
@@ -369,16 +369,14 @@ fn every_configuration_that_comes_with_takt_is_valid() {
 fn no_axis_whatever_its_mode_is_sent_where_it_cannot_be() {
     let text = include_str!("../../configs/erob-modes/erob-pv.toml");
     let mut config = Config::parse("erob-pv.toml", text).unwrap();
-    config.telemetry.is_recorded = false;
-    config.telemetry.black_box_ns = None;
     config.program = Program { repeat: 1, moves: vec![] };
-    let controller = Controller::start(config, SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&config, None).unwrap();
     for target in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e9, -1e9] {
         assert!(controller.move_to(&[target]).is_err(), "{target}");
     }
     let there = controller.move_to(&[0.0]).unwrap();
     controller.wait(there, Duration::from_secs(10)).unwrap();
-    controller.finish().unwrap();
+    assert_eq!(controller.finish(), Outcome::Finished);
 }
 
 fn limits() -> Limits {
@@ -452,13 +450,12 @@ fn a_configuration_made_in_code_has_the_defaults_of_a_file() {
 #[test]
 fn a_configuration_made_in_code_moves_an_arm() {
     let joint = |name: &str, node| Axis::new(name, 0, node, family::EROB_CANOPEN, limits());
-    let mut config = Config::new(
+    let config = Config::new(
         "arm",
         vec![Bus::new("can", Interface::Simulated)],
         vec![joint("shoulder", 1), Axis { reversed: true, ..joint("elbow", 2) }],
     );
-    config.telemetry.is_recorded = false;
-    let arm = Controller::start(config, SessionOptions::default()).unwrap();
+    let arm = VirtualController::start(&config, None).unwrap();
     let motion = arm.move_to(&[0.3, 0.2]).unwrap();
     assert_eq!(arm.wait(motion, Duration::from_secs(30)), Ok(()));
 }

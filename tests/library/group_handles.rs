@@ -1,21 +1,18 @@
-//! A gripper beside an arm, from a program: `configs/arm-and-gripper.toml`.
+//! A gripper beside an arm, from a program, in virtual time: `configs/arm-and-gripper.toml`.
 
 use std::path::Path;
 use std::time::Duration;
 
-use takt::VirtualRun;
 use takt::internals::RunInside;
-use takt::{AxisPoint, CommandError, Config, Controller, SessionOptions, TrajectoryPoint};
-use takt::{MotionError, Outcome};
+use takt::{
+    AxisPoint, CommandError, Config, MotionError, Outcome, TrajectoryPoint, VirtualController, VirtualRun,
+};
 use takt_rt::{ControlLaw, EventKind, OperationMode, Phase, Rule, StopCategory, StreamState};
 
 const LONG: Duration = Duration::from_secs(20);
 
 fn config() -> Config {
-    let mut config = Config::load(Path::new("configs/arm-and-gripper.toml")).unwrap();
-    config.telemetry.is_recorded = false;
-    config.telemetry.black_box_ns = None;
-    config
+    Config::load(Path::new("configs/arm-and-gripper.toml")).unwrap()
 }
 
 #[test]
@@ -35,7 +32,7 @@ fn the_program_moves_the_arm_while_the_gripper_opens_and_closes() {
 
 #[test]
 fn a_torque_that_expires_stops_the_gripper_and_the_arm_arrives() {
-    let controller = Controller::start(config(), SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&config(), None).unwrap();
     let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
     let mut events = controller.events();
     let motion = arm.move_to(&[0.6, -0.3, 0.4]).unwrap();
@@ -56,13 +53,12 @@ fn a_torque_that_expires_stops_the_gripper_and_the_arm_arrives() {
     gripper.reset_faults().unwrap();
     gripper.enable().unwrap();
     gripper.wait_for(Phase::Holding, LONG).unwrap();
-    let session = controller.finish().unwrap();
-    assert_eq!(session.outcome, Outcome::Finished);
+    assert_eq!(controller.finish(), Outcome::Finished);
 }
 
 #[test]
 fn a_stop_of_the_arm_stops_the_gripper_too_and_not_the_other_way_round() {
-    let controller = Controller::start(config(), SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&config(), None).unwrap();
     let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
     controller.torque(3, 1.0, LONG).unwrap();
     let motion = arm.move_to(&[1.0, -0.5, 0.5]).unwrap();
@@ -75,12 +71,12 @@ fn a_stop_of_the_arm_stops_the_gripper_too_and_not_the_other_way_round() {
     arm.wait_for(Phase::Disabled, LONG).unwrap();
     gripper.wait_for(Phase::Disabled, LONG).unwrap();
     assert!(matches!(controller.wait(motion, LONG), Err(MotionError::Stopped(_))));
-    controller.finish().unwrap();
+    assert_eq!(controller.finish(), Outcome::Finished);
 }
 
 #[test]
 fn what_is_meant_for_one_group_says_so_where_it_cannot_be_for_all() {
-    let controller = Controller::start(config(), SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&config(), None).unwrap();
     let unknown = controller.group("hand").err().unwrap();
     assert_eq!(unknown.to_string(), "there is no group \"hand\": the groups are: arm, gripper");
     let of_all = controller.move_to(&[0.1, 0.1, 0.1, 0.1]).unwrap();
@@ -89,7 +85,7 @@ fn what_is_meant_for_one_group_says_so_where_it_cannot_be_for_all() {
     let arm = controller.group("arm").unwrap();
     assert!(matches!(arm.move_to(&[0.1; 4]), Err(CommandError::Count { given: 4, axes: 3 })));
     assert_eq!(arm.axes(), [0, 1, 2]);
-    controller.finish().unwrap();
+    assert_eq!(controller.finish(), Outcome::Finished);
 }
 
 /// As the configuration, with a gripper that follows positions.
@@ -105,7 +101,7 @@ fn the_mode_of_one_group_is_changed_while_the_other_moves() {
     let mut config = with_positions();
     let velocity = ControlLaw::Velocity { position_gain: 20.0 };
     config.axes[3] = config.axes[3].clone().with_other_modes(vec![velocity]);
-    let controller = Controller::start(config, SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&config, None).unwrap();
     let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
     let csv = OperationMode::CyclicSynchronousVelocity;
     let of_all = controller.change_mode(csv).unwrap();
@@ -125,14 +121,14 @@ fn the_mode_of_one_group_is_changed_while_the_other_moves() {
     controller.wait(motion, LONG).unwrap();
     let modes: Vec<i8> = controller.state().axes().iter().map(|axis| axis.mode_set).collect();
     assert_eq!(modes, [8, 8, 8, 9]);
-    controller.finish().unwrap();
+    assert_eq!(controller.finish(), Outcome::Finished);
 }
 
 const MILLISECOND_NS: u64 = 1_000_000;
 
 #[test]
 fn each_group_follows_a_stream_of_its_own() {
-    let controller = Controller::start(with_positions(), SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&with_positions(), None).unwrap();
     let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
     arm.begin_stream().unwrap();
     let now_ns = controller.now_ns();
@@ -158,12 +154,12 @@ fn each_group_follows_a_stream_of_its_own() {
         assert!((axis.position_set - expected).abs() < 1e-3, "{axis:?} for {expected}");
     }
     assert_eq!((arm.stream().report().counts.points, gripper.stream().report().counts.points), (40, 2));
-    controller.finish().unwrap();
+    assert_eq!(controller.finish(), Outcome::Finished);
 }
 
 #[test]
 fn a_group_is_carried_along_a_trajectory_while_the_other_one_streams() {
-    let controller = Controller::start(with_positions(), SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&with_positions(), None).unwrap();
     let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
     arm.begin_stream().unwrap();
     let point = TrajectoryPoint { time_s: 0.8, positions: vec![0.2], ..TrajectoryPoint::default() };
@@ -186,16 +182,14 @@ fn a_group_is_carried_along_a_trajectory_while_the_other_one_streams() {
 
     let refused = controller.move_through(&[vec![0.1; 4]]).unwrap_err();
     assert_eq!(refused.to_string(), "it is for one group, and must name it: arm, gripper");
-    controller.finish().unwrap();
+    assert_eq!(controller.finish(), Outcome::Finished);
 }
 
 #[test]
 fn the_only_group_of_a_configuration_is_stopped_by_its_name() {
     let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
-    config.telemetry.is_recorded = false;
-    config.telemetry.black_box_ns = None;
     config.groups = vec![takt::config::Group { name: "joint".to_owned(), axes: vec![0], stops_with: vec![] }];
-    let controller = Controller::start(config, SessionOptions::default()).unwrap();
+    let controller = VirtualController::start(&config, None).unwrap();
     let joint = controller.group("joint").unwrap();
     let motion = joint.move_to(&[0.5]).unwrap();
     joint.wait_for(Phase::Moving, LONG).unwrap();
@@ -204,5 +198,5 @@ fn the_only_group_of_a_configuration_is_stopped_by_its_name() {
     joint.wait_for(Phase::Disabled, LONG).unwrap();
     joint.enable().unwrap();
     joint.wait_for(Phase::Holding, LONG).unwrap();
-    controller.finish().unwrap();
+    assert_eq!(controller.finish(), Outcome::Finished);
 }

@@ -1,19 +1,16 @@
-//! Trajectories by the handle of an embedded controller, on simulated buses in real time.
+//! Trajectories by the handle of an embedded controller, on simulated buses in virtual time.
 
 use std::path::Path;
 use std::time::Duration;
 
 use takt::trajectory::{RateError, TrajectoryError, TrajectoryPoint};
-use takt::{CommandError, Config, Controller, MotionError, Phase, SessionOptions, StopCategory};
+use takt::{CommandError, Config, Handle, MotionError, Outcome, Phase, StopCategory, VirtualController};
 
 const PATIENCE: Duration = Duration::from_secs(30);
 
-fn start() -> Controller {
+fn start() -> VirtualController {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
-    let mut config = Config::load(&path).unwrap();
-    config.telemetry.is_recorded = false;
-    config.telemetry.black_box_ns = None;
-    Controller::start(config, SessionOptions::default()).unwrap()
+    VirtualController::start(&Config::load(&path).unwrap(), None).unwrap()
 }
 
 /// All joints by so much from these positions. The fourth has no room in the other direction.
@@ -21,12 +18,12 @@ fn beside(positions: &[f64], way: f64) -> Vec<f64> {
     positions.iter().enumerate().map(|(joint, at)| if joint == 3 { at - way } else { at + way }).collect()
 }
 
-fn here(arm: &Controller) -> Vec<f64> {
+fn here(arm: &Handle) -> Vec<f64> {
     arm.state().axes[..6].iter().map(|axis| axis.position_set).collect()
 }
 
 /// All joints by so much from where they are, at this time.
-fn point(arm: &Controller, time_s: f64, way: f64) -> TrajectoryPoint {
+fn point(arm: &Handle, time_s: f64, way: f64) -> TrajectoryPoint {
     TrajectoryPoint { time_s, positions: beside(&here(arm), way), ..TrajectoryPoint::default() }
 }
 
@@ -37,8 +34,7 @@ fn a_trajectory_is_carried_out_paused_slowed_down_resumed_and_replaced() {
     let points = [point(&arm, 0.5, 0.1), point(&arm, 2.0, 0.3)];
     let motion = arm.execute(&points).unwrap();
     arm.pause(motion).unwrap();
-    let at_rest =
-        |arm: &Controller| arm.trajectory_progress(motion).is_some_and(|progress| progress.rate == 0.0);
+    let at_rest = |arm: &Handle| arm.trajectory_progress(motion).is_some_and(|progress| progress.rate == 0.0);
     arm.wait_until(PATIENCE, |_| at_rest(&arm).then_some(())).unwrap();
     let paused = arm.state();
     assert_eq!(paused.groups[0].phase, Phase::Moving);
@@ -62,7 +58,7 @@ fn a_trajectory_is_carried_out_paused_slowed_down_resumed_and_replaced() {
     assert_eq!(arm.wait(first, PATIENCE), Err(MotionError::Replaced));
     assert_eq!(arm.wait(second, PATIENCE), Ok(()));
     assert_eq!((arm.state().groups[0].phase, arm.state().groups[0].stop), (Phase::Holding, None));
-    arm.finish().unwrap();
+    assert_eq!(arm.finish(), Outcome::Finished);
 }
 
 #[test]
@@ -89,7 +85,7 @@ fn what_breaks_a_limit_is_refused_before_anything_moves_and_a_stop_ends_what_mov
         let motion = arm.execute(&[point(&arm, 0.05, 0.0)]).unwrap();
         assert_eq!(arm.wait(motion, PATIENCE), Ok(()));
     }
-    arm.finish().unwrap();
+    assert_eq!(arm.finish(), Outcome::Finished);
 }
 
 #[test]
@@ -106,5 +102,5 @@ fn waypoints_are_passed_by_the_handle_too() {
     assert_eq!(arm.wait(first, PATIENCE), Err(MotionError::Replaced));
     assert_eq!(arm.wait(second, PATIENCE), Ok(()));
     assert!((here(&arm)[5] - from[5] - 0.3).abs() < 1e-12);
-    arm.finish().unwrap();
+    assert_eq!(arm.finish(), Outcome::Finished);
 }

@@ -1,6 +1,7 @@
 //! What a program embeds: configurations, drives, controllers and their handles.
 
 mod bit_fields;
+mod callbacks;
 mod canopen_bring_up;
 mod cia402_family;
 mod cia402_nodes;
@@ -24,6 +25,7 @@ mod handle;
 mod handle_trajectory;
 mod interface_lock;
 mod new_family;
+mod real_time;
 mod realtime_survives;
 #[path = "../vectors/rows.rs"]
 mod rows;

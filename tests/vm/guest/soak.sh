@@ -19,7 +19,7 @@ soak() {
     while now=$(resident_kib $run 2>/dev/null) && [ -n "$now" ]; do
         late=$now
         # An MCAP file ends with an index of its chunks, which is collected on the way: a thousandth of the file, in an
-        # array that doubles. What else the heap holds is the same at any time (tests/memory.rs), but the pieces of a
+        # array that doubles. What else the heap holds is the same at any time (tests/allocation/memory.rs), but the pieces of a
         # chunk, 300 kB, and the blocks of the journal do not lie in it as those before did.
         allowed=$(($(recorded_kib) / 500 + 512))
         sleep 0.5

@@ -1,9 +1,6 @@
-//! The simulated bus runs inside the real-time thread, so after its construction it takes no heap memory, whatever
+//! The simulated bus runs inside the real-time thread, so after its construction it does not call the heap, whatever
 //! happens on it.
-#![allow(unsafe_code, reason = "a global allocator that counts cannot be written without")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::Arc;
 
 use takt::Port;
@@ -21,39 +18,7 @@ use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Defect, Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// The system's allocator, with a count for each thread.
-struct Counting;
-
-// SAFETY: every call is handed on unchanged to the system's allocator; the count touches no memory of the heap.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller keeps the contract of `alloc`, which is the same here.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: `pointer` came from `System` with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: `pointer` came from `System` with this layout, and the caller keeps the contract of `realloc`.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-fn allocations() -> u64 {
-    ALLOCATIONS.with(Cell::get)
-}
+use crate::heap;
 
 const JOINT: JointParameters = JointParameters {
     inertia: 0.4,
@@ -175,11 +140,11 @@ fn a_second_of_drives_made_from_a_data_sheet_takes_no_heap_memory() {
 }
 
 fn live_without_memory(drive: fn(u8) -> Box<dyn Drive>) {
-    let before = allocations();
+    let before = heap().calls;
     let drives = [1, 2, 3].map(drive).into();
     let mut bus =
         SimulatedBus::with_drives(WireBitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
-    let built = allocations();
+    let built = heap().calls;
     assert!(built > before, "the allocator counts");
     let mut received = 0;
     live(&mut bus, &mut received, |bus, cycle| match cycle {
@@ -188,7 +153,7 @@ fn live_without_memory(drive: fn(u8) -> Box<dyn Drive>) {
         700 => bus.silence(3, true).unwrap(),
         _ => {}
     });
-    assert_eq!(allocations(), built);
+    assert_eq!(heap().calls, built);
     // Two thousand TPDOs and more, so it was not silence that needed no memory.
     assert!(received > 2_000, "{received}");
     assert_eq!(bus.observe(1).unwrap().error_code, 0x7305);
@@ -216,7 +181,7 @@ fn a_second_of_interpolation_with_alarms_and_power_cycles_takes_no_heap_memory()
     let drives = [1, 2, 3].map(servo).into();
     let mut bus =
         SimulatedBus::with_drives(WireBitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
-    let built = allocations();
+    let built = heap().calls;
     let mut batch = ReceiveBatch::new();
     let mut received = 0;
     for cycle in 0..500u64 {
@@ -246,7 +211,7 @@ fn a_second_of_interpolation_with_alarms_and_power_cycles_takes_no_heap_memory()
         bus.receive(now_ns + 1_999_000, &mut batch);
         received += batch.len();
     }
-    assert_eq!(allocations(), built);
+    assert_eq!(heap().calls, built);
     assert!(received > 2_000, "{received}");
     assert_eq!(bus.observe(1).unwrap().error_code, 0x14);
     assert!(bus.observe(3).unwrap().position_counts > 30_000);
@@ -297,10 +262,10 @@ fn a_second_with_faults_of_every_kind_takes_no_heap_memory() {
         all_progress.push(Arc::clone(&progress));
         port = Port::Faulty(Box::new(FaultyPort::new(port, &fault, Arc::default(), progress)));
     }
-    let built = allocations();
+    let built = heap().calls;
     let mut received = 0;
     live(&mut port, &mut received, |_, _| {});
-    assert_eq!(allocations(), built);
+    assert_eq!(heap().calls, built);
     assert!(received > 1_000, "{received}");
     for (progress, effect) in all_progress.iter().zip(every_effect()) {
         assert!(progress.began_ns().is_some() && !progress.is_impossible(), "{effect:?}");

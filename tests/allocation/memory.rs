@@ -1,10 +1,9 @@
 //! The memory of a run does not grow with its duration, with a recording or without.
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use takt::Port;
 use takt::VirtualRun;
@@ -14,35 +13,7 @@ use takt::telemetry::{
     BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingDestination, RecordingOptions, WallClock,
 };
 
-/// Bytes that all threads together hold on the heap.
-static HELD_BYTES: AtomicI64 = AtomicI64::new(0);
-
-/// The system's allocator with a count of the bytes that are held.
-struct Accounting;
-
-// SAFETY: every call is passed on unchanged to the system's allocator; counting touches no memory of the heap.
-unsafe impl GlobalAlloc for Accounting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        HELD_BYTES.fetch_add(layout.size() as i64, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`, which is the same here.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        HELD_BYTES.fetch_sub(layout.size() as i64, Ordering::Relaxed);
-        // SAFETY: `pointer` came from `System` with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        HELD_BYTES.fetch_add(size as i64 - layout.size() as i64, Ordering::Relaxed);
-        // SAFETY: `pointer` came from `System` with this layout, and the caller keeps the contract of `realloc`.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Accounting = Accounting;
+use crate::heap;
 
 /// A writer that keeps only the length of a recording.
 #[derive(Clone, Default)]
@@ -90,7 +61,7 @@ fn held_every_minute(minutes: usize, recording: Option<RecordingDestination>) ->
         assert!(run.step(), "the run has ended in cycle {cycle}: {:?}", run.supervisor().outcome());
         logger.drain();
         if cycle.is_multiple_of(60_000) {
-            held.push(HELD_BYTES.load(Ordering::Relaxed));
+            held.push(heap().held_bytes);
         }
     }
     let summary = logger.finish();
@@ -98,7 +69,6 @@ fn held_every_minute(minutes: usize, recording: Option<RecordingDestination>) ->
     held
 }
 
-/// This is one test, because all threads share the count.
 #[test]
 fn the_memory_of_a_run_grows_only_by_the_index_of_its_recording() {
     let held = held_every_minute(3, None);

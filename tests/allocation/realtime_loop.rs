@@ -1,8 +1,7 @@
 //! The loop in its real-time thread on its ports allocates nothing and causes no page fault.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
@@ -19,76 +18,41 @@ use takt_rt::Frame;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusHealth, BusPort, Clock, ReceiveBatch};
 
-thread_local! {
-    static IS_WATCHED: Cell<bool> = const { Cell::new(false) };
+use crate::heap;
+
+/// Notes after each of its calls how often the loop has used the heap since the first one, which the loop makes before its first SYNC.
+/// What the thread does at its end is not of the loop.
+struct Watched {
+    port: Port,
+    calls_at_begin: Option<u64>,
+    calls_in_loop: Arc<AtomicU64>,
 }
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-/// [`ALLOCATIONS`] at the last call of a port. Later allocations belong to the end of the thread, not to the loop.
-static SEEN_BY_LOOP: AtomicU64 = AtomicU64::new(0);
-
-/// Counts the calls of the watched thread to the allocator: allocating, reallocating and freeing.
-struct Counting;
-
-impl Counting {
-    fn count() {
-        if IS_WATCHED.with(Cell::get) {
-            ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        }
-    }
-}
-
-// SAFETY: every call is passed on unchanged to the system's allocator, and counting touches no memory of the heap.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        Self::count();
-        // SAFETY: the caller keeps the same contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        Self::count();
-        // SAFETY: the caller keeps the same contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        Self::count();
-        // SAFETY: the caller keeps the same contract.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
-/// Starts to watch its thread at the first call, which the loop makes before its first SYNC.
-struct Watched(Port);
 
 impl Watched {
-    fn watch() {
-        IS_WATCHED.with(|flag| flag.set(true));
-        SEEN_BY_LOOP.store(ALLOCATIONS.load(Ordering::Relaxed), Ordering::Relaxed);
+    fn note(&mut self) {
+        let calls = heap().calls;
+        let at_begin = *self.calls_at_begin.get_or_insert(calls);
+        self.calls_in_loop.fetch_max(calls - at_begin, Ordering::Relaxed);
     }
 }
 
 impl BusPort for Watched {
     fn send(&mut self, now_ns: u64, frames: &[Frame]) -> usize {
-        Self::watch();
-        self.0.send(now_ns, frames)
+        self.note();
+        self.port.send(now_ns, frames)
     }
 
     fn receive(&mut self, now_ns: u64, batch: &mut ReceiveBatch) {
-        Self::watch();
-        self.0.receive(now_ns, batch);
+        self.note();
+        self.port.receive(now_ns, batch);
     }
 
     fn unconfirmed(&mut self, now_ns: u64) -> usize {
-        self.0.unconfirmed(now_ns)
+        self.port.unconfirmed(now_ns)
     }
 
     fn health(&mut self) -> BusHealth {
-        self.0.health()
+        self.port.health()
     }
 }
 
@@ -102,10 +66,11 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
     let mut clock = MonotonicClock::default();
     let started_ns = clock.now_ns();
     let mut traces = vec![];
+    let calls_in_loop = Arc::<AtomicU64>::default();
     let ports = (0..config.buses.len()).map(|bus| {
         let (port, trace) = Port::open(&config, bus).unwrap().traced(&config.buses[bus].name);
         traces.push(trace);
-        Watched(port)
+        Watched { port, calls_at_begin: None, calls_in_loop: Arc::clone(&calls_in_loop) }
     });
     let work = LoopParts {
         engine: assemble::engine(&config).unwrap(),
@@ -141,7 +106,7 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
 
     assert_eq!(supervisor.outcome(), Some(&Outcome::Finished));
     assert!(log.statistics.cycles > 1_000, "{} cycles", log.statistics.cycles);
-    assert_eq!(SEEN_BY_LOOP.load(Ordering::Relaxed), 0);
+    assert_eq!(calls_in_loop.load(Ordering::Relaxed), 0);
     if memory_locked {
         assert_eq!((ended.page_faults.minor, ended.page_faults.major), (0, 0));
     }
