@@ -1,6 +1,7 @@
 //! `takt` as a user meets it: what it prints, what it leaves behind, and how it ends.
 
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
@@ -51,6 +52,18 @@ impl Place {
             .stderr(Stdio::piped())
             .spawn()
             .unwrap()
+    }
+
+    /// Starts a run and waits until the arm moves. What the program writes on standard error is not kept.
+    fn run_until_it_moves(&self, options: &[&str]) -> Child {
+        let mut child = self.run(&[&["--log", "info"], options].concat());
+        let mut told = BufReader::new(child.stderr.take().unwrap()).lines();
+        assert!(
+            told.any(|line| line.unwrap().contains("to=\"moving\"")),
+            "the run has ended before the arm moved"
+        );
+        thread::spawn(move || told.for_each(drop));
+        child
     }
 
     fn run_to_end(&self, options: &[&str]) -> Output {
@@ -192,9 +205,7 @@ fn an_unknown_bus_on_the_command_line_is_refused() {
 fn ctrl_c_sigterm_and_a_closed_terminal_stop_in_control_and_end_with_130() {
     for which in [Signal::SIGINT, Signal::SIGTERM, Signal::SIGHUP] {
         let place = Place::new();
-        let child = place.run(&["--json"]);
-        // Power-up and bring-up take about half a second, the first move more than one.
-        thread::sleep(Duration::from_millis(1_500));
+        let child = place.run_until_it_moves(&["--json"]);
         signal(&child, which);
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "{}", errors(&output));
@@ -230,8 +241,7 @@ fn a_run_that_was_told_to_outlive_its_terminal_does() {
 fn a_second_ctrl_c_ends_at_once() {
     let place = Place::new();
     place.change("velocity = \"80 %\"", "velocity = \"5 %\"");
-    let child = place.run(&[]);
-    thread::sleep(Duration::from_millis(1_500));
+    let child = place.run_until_it_moves(&[]);
     let began = Instant::now();
     signal(&child, Signal::SIGINT);
     thread::sleep(Duration::from_millis(20));
@@ -243,8 +253,7 @@ fn a_second_ctrl_c_ends_at_once() {
 #[test]
 fn a_process_that_is_frozen_in_motion_goes_on_and_counts_what_it_missed() {
     let place = Place::new();
-    let child = place.run(&["--json"]);
-    thread::sleep(Duration::from_millis(1_500));
+    let child = place.run_until_it_moves(&["--json"]);
     signal(&child, Signal::SIGSTOP);
     thread::sleep(Duration::from_millis(200));
     signal(&child, Signal::SIGCONT);

@@ -8,7 +8,7 @@ use serde_json::Value;
 use takt::Config;
 
 use crate::printed::{ends_with, errors, said};
-use crate::simulated::Simulated;
+use crate::simulated::{Simulated, at_once};
 
 /// A simulated converter with motors 1 to 4, in a process of its own.
 struct Converter {
@@ -156,7 +156,9 @@ fn a_motor_behind_the_converter_follows_a_cycle() {
     let bus = format!("line={}", converter.interface);
     let recording = converter.simulated.path.with_file_name("run.mcap");
     let recording = recording.to_str().unwrap();
-    let output = takt(&["run", config().to_str().unwrap(), "--bus", &bus, "--record", recording, "--json"]);
+    let mut run = at_once(env!("CARGO_BIN_EXE_takt"));
+    run.arg("run").arg(config()).args(["--bus", &bus, "--record", recording, "--json"]).stdin(Stdio::null());
+    let output = run.output().unwrap();
     ends_with(0, &output);
     let report = json(&output);
     let position = report["axes"][0]["final_position"].as_f64().unwrap();

@@ -7,6 +7,14 @@ use std::time::Duration;
 
 use tempfile::TempDir;
 
+/// Starts a program that gets a processor at once where the rights allow it, as the firmware of a drive has one. On a busy machine an
+/// ordinary process answers late, which a master on a line takes for a fault.
+pub fn at_once(program: &str) -> Command {
+    let mut command = Command::new("nice");
+    command.args(["-n", "-19", program]);
+    command
+}
+
 /// Simulated drives or devices, until this is dropped.
 pub struct Simulated {
     process: Child,
@@ -20,7 +28,7 @@ impl Simulated {
     pub fn new(arguments: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("line");
-        let mut takt = Command::new(env!("CARGO_BIN_EXE_takt"));
+        let mut takt = at_once(env!("CARGO_BIN_EXE_takt"));
         takt.arg("sim").args(arguments).arg("--pty").arg(&path).stdin(Stdio::null()).stderr(Stdio::null());
         let process = takt.spawn().unwrap();
         while !path.exists() {
