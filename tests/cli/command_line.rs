@@ -156,6 +156,8 @@ fn a_run_leaves_a_recording_and_a_report_for_people() {
 #[test]
 fn without_rights_the_run_is_done_all_the_same_and_says_what_was_refused_and_how_to_grant_it() {
     let place = Place::new();
+    // An ordinary thread cannot keep every cycle of 1 ms on a busy machine.
+    place.change("period = \"1 ms\"", "period = \"4 ms\"");
     let output = place.run_unprivileged(&["--json"]);
     assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
     let realtime = &report(&output)["realtime"];
