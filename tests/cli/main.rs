@@ -33,6 +33,7 @@ mod scan_command;
 mod send;
 mod serial_devices;
 mod serial_line_config;
+mod served_run;
 mod service;
 mod simulated;
 mod slcan;
