@@ -13,10 +13,9 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::{Pid, geteuid};
+use nix::unistd::geteuid;
 use takt::internals::remote::{Demand, PACKET_WORDS, Packets, Received, Role};
 use takt::{
     AxisPoint, Client, ClientStream, CommandError, Config, ConnectError, Controller, EventKind, LeaseError,
