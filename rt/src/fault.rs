@@ -1,6 +1,6 @@
 //! What can go wrong: one enum, whose variants carry what was seen and what was allowed.
 
-use crate::cia402::OperationMode;
+use crate::cia402::{DriveState, OperationMode};
 use crate::frame::Id;
 use crate::rule::Rule;
 use crate::time::Nanoseconds;
@@ -96,6 +96,18 @@ pub enum Fault {
     DriveDisabled {
         /// Object 6041.
         statusword: u16,
+    },
+    /// A drive was to be disabled and has not confirmed in time that it has no torque.
+    NotDisabled {
+        /// The state that it showed last.
+        state: DriveState,
+        /// Cycles of its bus without feedback; 0 if it reports.
+        silent_cycles: u16,
+    },
+    /// A drive has torque although its group is disabled: it was enabled by something else than this controller.
+    DriveEnabled {
+        /// The state that it shows.
+        state: DriveState,
     },
     /// A drive shows another mode of operation than the one that it was set to.
     ModeChanged {
@@ -244,6 +256,8 @@ impl Fault {
             Self::TimingUnfit { .. } => Rule::TimingUnfit,
             Self::CallbackOverrun { .. } => Rule::CallbackOverrun,
             Self::CallbackPanicked => Rule::CallbackPanicked,
+            Self::NotDisabled { .. } => Rule::NotDisabled,
+            Self::DriveEnabled { .. } => Rule::DriveEnabled,
         }
     }
 
@@ -264,6 +278,8 @@ impl Fault {
             Self::LateFeedback { cycles } => (cycles.into(), 0.0),
             Self::DriveFault { error_code: code } | Self::EmergencyMessage { code } => (code.into(), 0.0),
             Self::DriveDisabled { statusword } => (statusword.into(), 0.0),
+            Self::NotDisabled { state, silent_cycles } => (f64::from(state as u8), silent_cycles.into()),
+            Self::DriveEnabled { state } => (f64::from(state as u8), 0.0),
             Self::ModeChanged { shown, expected } | Self::ModeNotShown { shown, expected } => {
                 (shown.into(), (expected as i8).into())
             }
@@ -339,8 +355,17 @@ impl Fault {
                 Self::CallbackOverrun { spent_ns: seen as u64, budget_ns: allowed as u64 }
             }
             Rule::CallbackPanicked => Self::CallbackPanicked,
+            Rule::NotDisabled => {
+                Self::NotDisabled { state: drive_state(seen)?, silent_cycles: allowed as u16 }
+            }
+            Rule::DriveEnabled => Self::DriveEnabled { state: drive_state(seen)? },
         })
     }
+}
+
+/// The state of a drive with this number in a recording.
+fn drive_state(number: f64) -> Option<DriveState> {
+    DriveState::ALL.into_iter().find(|state| f64::from(*state as u8) == number)
 }
 
 #[cfg(test)]

@@ -75,11 +75,15 @@ pub enum Rule {
     DampingLimit = 31,
     /// [`Fault::ModeNotShown`].
     ModeNotShown = 32,
+    /// [`Fault::NotDisabled`].
+    NotDisabled = 33,
+    /// [`Fault::DriveEnabled`].
+    DriveEnabled = 34,
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 33] = [
+    pub const ALL: [Self; 35] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -113,6 +117,8 @@ impl Rule {
         Self::StiffnessLimit,
         Self::DampingLimit,
         Self::ModeNotShown,
+        Self::NotDisabled,
+        Self::DriveEnabled,
     ];
 
     /// Its word in configurations and reports.
@@ -151,6 +157,8 @@ impl Rule {
             Self::StiffnessLimit => "stiffness_limit",
             Self::DampingLimit => "damping_limit",
             Self::ModeNotShown => "mode_not_shown",
+            Self::NotDisabled => "not_disabled",
+            Self::DriveEnabled => "drive_enabled",
         }
     }
 
@@ -178,6 +186,8 @@ impl Rule {
             | Self::MissedFeedback
             | Self::DriveFault
             | Self::DriveDisabled
+            | Self::NotDisabled
+            | Self::DriveEnabled
             | Self::ModeChanged
             | Self::ModeNotShown
             | Self::EnableTimeout

@@ -88,6 +88,16 @@ impl StopCause {
         }
     }
 
+    /// Of two causes the one of a higher rank is the reason of a stop, and the first one of those of the same rank: a fault goes before
+    /// what was asked for, and a drive that has torque when it should have none before whatever made it stop.
+    pub(crate) const fn rank(&self) -> CauseRank {
+        match self {
+            Self::Requested => CauseRank::Requested,
+            Self::Fault(Fault::NotDisabled { .. } | Fault::DriveEnabled { .. }) => CauseRank::Unreleased,
+            Self::Fault(_) => CauseRank::Fault,
+        }
+    }
+
     /// As [`Fault::numbers`].
     pub fn numbers(&self) -> (f64, f64) {
         self.fault().map_or((0.0, 0.0), Fault::numbers)
@@ -100,6 +110,14 @@ impl StopCause {
             _ => Fault::from_numbers(rule, seen, allowed).map(Self::Fault),
         }
     }
+}
+
+/// How much a cause weighs, see [`StopCause::rank`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum CauseRank {
+    Requested,
+    Fault,
+    Unreleased,
 }
 
 /// The one reason of a stop: the first fault, or that it was asked for where there is none.

@@ -16,27 +16,27 @@ pub(super) struct DriveReport {
     emergency_code: u16,
     /// Slots since that message, while no fault has to be expected for it otherwise.
     since_emergency_cycles: Option<u8>,
+    /// Whether a fault that was there when the last reset began has been there ever since.
+    is_being_reset: bool,
 }
 
 impl DriveReport {
-    /// Takes the state that a statusword shows. Returns whether a fault is gone with it.
+    /// Takes the state that a statusword shows.
     ///
     /// A drive that was enabled counts as disabled only when a second statusword says so. One corrupted statusword would
     /// otherwise let the set-point follow the joint while the drive still obeys, and disable it. A fault counts at once.
-    pub(super) fn note_state(&mut self, shown: DriveState) -> bool {
+    pub(super) fn note_state(&mut self, shown: DriveState) {
         let contradicts = self.state == DriveState::OperationEnabled
             && shown != DriveState::OperationEnabled
             && !shown.is_faulted();
         self.contradictions = if contradicts { self.contradictions.saturating_add(1) } else { 0 };
         if self.contradictions == 1 {
-            return false;
+            return;
         }
-        let is_fault_gone = self.state.is_faulted() && !shown.is_faulted();
-        if is_fault_gone {
-            self.emergency_code = 0;
+        if self.state.is_faulted() && !shown.is_faulted() {
+            (self.emergency_code, self.is_being_reset) = (0, false);
         }
         self.state = shown;
-        is_fault_gone
     }
 
     /// The drive's state.
@@ -63,9 +63,15 @@ impl DriveReport {
     /// A fault reset begins. The code of a fault is kept until the fault is gone.
     pub(super) fn begin_fault_reset(&mut self) {
         self.dismiss_emergency();
-        if !self.state.is_faulted() {
+        self.is_being_reset = self.state.is_faulted();
+        if !self.is_being_reset {
             self.emergency_code = 0;
         }
+    }
+
+    /// Whether a fault that was there when the last reset began has been there ever since.
+    pub(super) const fn is_being_reset(&self) -> bool {
+        self.is_being_reset
     }
 
     /// Lets a slot pass.
@@ -104,8 +110,9 @@ mod tests {
         report.note_emergency(0x2310);
         report.begin_fault_reset();
         assert_eq!(report.emergency_code(), 0x2310);
-        assert!(report.note_state(DriveState::SwitchOnDisabled));
-        assert_eq!(report.emergency_code(), 0);
+        assert!(report.is_being_reset());
+        report.note_state(DriveState::SwitchOnDisabled);
+        assert_eq!((report.emergency_code(), report.is_being_reset()), (0, false));
     }
 
     #[test]

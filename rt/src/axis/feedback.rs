@@ -101,7 +101,6 @@ impl Axis {
     /// Forgets what has been wrong with the drive. The code of a fault is known until it is there no more.
     pub fn begin_fault_reset(&mut self) {
         self.report.begin_fault_reset();
-        self.power.begin_fault_reset(self.report.state().is_faulted());
     }
 
     /// Lets time pass in a slot in which the axis' bus has no cycle.
@@ -129,9 +128,8 @@ impl Axis {
         if self.joint.take_report(counts, velocity, span, scale, velocity_limit) {
             self.start_from_actual();
         }
-        if self.report.note_state(self.parameters.codec.state(self.statusword())) {
-            self.power.note_fault_gone();
-        }
+        self.report.note_state(self.parameters.codec.state(self.statusword()));
+        self.note_power_report();
         let behind = self.set_points.due().position - self.joint.position();
         self.following.set_error(if self.is_profile() { 0.0 } else { behind });
         true

@@ -10,16 +10,18 @@
 //!
 //! # Power
 //!
-//! Whether a drive may have power is one state with these transitions. A dash leaves the state as it is.
+//! The power of a drive, as it is commanded and confirmed, is one state with these transitions. A dash leaves the state as it is.
+//! A drive that is latched off is Releasing, and its set-point is kept. Before its first report a drive is Releasing, too.
 //!
-//! | event | Off | Resetting | Granted | LatchedOff |
-//! | --- | --- | --- | --- | --- |
-//! | [`Axis::begin_watch`] | – | – | Off | Off |
-//! | [`Axis::prepare_to_enable`], its conditions hold | Granted | – | – | – |
-//! | [`Axis::latch_off`] | LatchedOff | LatchedOff | LatchedOff | – |
-//! | [`Axis::release_latch`] | – | – | Off | Off |
-//! | [`Axis::begin_fault_reset`], the drive shows a fault | Resetting | – | Resetting | Resetting |
-//! | the drive shows no fault any more | – | Off | – | – |
+//! | event | Off | Enabling | On | Releasing | NotReleased |
+//! | --- | --- | --- | --- | --- | --- |
+//! | [`Axis::begin_watch`] | Enabling | – | Enabling | Enabling | – |
+//! | [`Axis::prepare_to_enable`], its conditions hold | – | On | – | – | – |
+//! | [`Axis::latch_off`] | Releasing | Releasing | Releasing | – | Releasing |
+//! | [`Axis::release_power`] | Releasing | Releasing | Releasing | – | – |
+//! | [`Axis::settle_power`], the drive has confirmed that it has no torque | – | – | – | Off | Off |
+//! | the same, it has not, and is overdue | – | – | – | NotReleased | – |
+//! | some reports in a row show torque | NotReleased | – | – | – | – |
 
 mod bit_fields;
 mod command;
@@ -45,7 +47,6 @@ mod stream;
 mod torque_loop;
 
 use crate::bit_fields::FieldDrive;
-use crate::cia402::DriveState;
 use crate::control::{ControlLaw, TrackingError};
 use crate::frame::Frame;
 use crate::guard::FollowingErrorGuard;
@@ -223,7 +224,7 @@ impl Axis {
 
     /// Begins to watch the node anew: the group begins to enable its drives.
     pub fn begin_watch(&mut self) {
-        self.power.begin_watch();
+        self.begin_to_watch_power();
         self.node_monitor.begin();
         self.duplicate_node = DuplicateNodeDetector::default();
         self.late_reply.forget_findings();
@@ -251,41 +252,9 @@ impl Axis {
         self.node_monitor.pass();
     }
 
-    /// Takes the power from the drive for good: it has left operation enabled by itself, or cannot be reached. It is not led
-    /// back before it is watched anew, and its set-point stays.
-    pub fn latch_off(&mut self) {
-        self.power.latch_off();
-    }
-
-    /// The group is disabled: the drive has no torque, or is not waited for any longer. Its set-point follows the joint again.
-    pub fn release_latch(&mut self) {
-        self.power.release_latch();
-    }
-
-    /// Grants power to the drive if it may be enabled. It has been disabled for so long that nothing older is under way in
-    /// either direction, it shows no fault, its reports come in their own cycle, and its joint is at rest on the set-point.
-    pub fn prepare_to_enable(&mut self, period_s: f64) {
-        if self.shows_rest_without_torque()
-            && self.controlwords.is_disabled_for_long()
-            && self.is_on_joint(period_s)
-        {
-            self.power.grant();
-        }
-    }
-
-    /// Whether the drive may be led to operation enabled and kept there.
-    pub fn is_power_granted(&self) -> bool {
-        self.power == Power::Granted
-    }
-
     /// Whether a fault that was there when the last reset began has been there ever since.
     pub fn is_being_reset(&self) -> bool {
-        self.power == Power::Resetting
-    }
-
-    /// Whether the drive follows set-points.
-    pub fn is_enabled(&self) -> bool {
-        self.drive_state() == DriveState::OperationEnabled && self.power != Power::LatchedOff
+        self.report.is_being_reset()
     }
 
     /// Shows the state to observers. `shown` keeps when the drive reported last.

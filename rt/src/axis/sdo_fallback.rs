@@ -192,7 +192,12 @@ impl Axis {
 
     /// Whether the drive has torque, as far as it can be known: an SDO confirmation is newer than the last statusword.
     pub fn has_torque(&self) -> bool {
-        self.may_have_torque() && !self.sdo_fallback.is_switched_off()
+        self.may_have_torque() && !self.has_confirmed_by_service()
+    }
+
+    /// Whether the drive has confirmed by SDO that its power is to be off.
+    pub(super) fn has_confirmed_by_service(&self) -> bool {
+        self.sdo_fallback.is_switched_off()
     }
 
     /// Whether the drive has torque by its last report, or may have got it since: what a drive of bit fields was told is newer than its

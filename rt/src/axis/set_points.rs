@@ -2,7 +2,6 @@
 
 use super::Axis;
 use super::delay::SetPointDelay;
-use super::power::Power;
 use crate::control::TorqueDemand;
 use crate::fault::Fault;
 use crate::group_trajectory::stop_limits;
@@ -179,7 +178,7 @@ impl Axis {
         // The sum of the difference need not be the actual position to the last bit.
         let is_there = way.abs() < most;
         let next = if is_there { self.joint.position() } else { here + way };
-        self.rest_at(if self.power == Power::LatchedOff { here } else { next });
+        self.rest_at(if self.is_latched_off() { here } else { next });
     }
 
     /// Leaves the set-point where it is.

@@ -194,7 +194,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             return Goal::QuickStop;
         }
         if goal != Goal::Enabled {
-            return goal;
+            return if axis.is_not_released() { Goal::NoVoltage } else { goal };
         }
         let is_stopping = matches!(self.state, GroupState::Stopping);
         // A drive that PDOs do not reach is told the same by SDO.

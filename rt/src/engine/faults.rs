@@ -11,7 +11,7 @@ use crate::motion_reports::MotionState;
 use crate::plan::{PlanError, State};
 use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
-use crate::stop::{Origin, StopCause, StopReason};
+use crate::stop::{CauseRank, Origin, StopCause, StopReason};
 use crate::stop_category::StopCategory;
 use crate::watch::{NodeFault, TimingLevel};
 
@@ -58,7 +58,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     #[inline]
     pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
         if !self.group.state.has_power() {
-            return;
+            return self.watch_disabled();
         }
         self.check_buses(buses);
         self.check_timing();
@@ -152,20 +152,51 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
+    /// Watches the power of drives that are to have none. While a drive has not confirmed that, a latched fault says so.
+    fn watch_disabled(&mut self) {
+        if matches!(self.group.state, GroupState::Passive) {
+            return;
+        }
+        let is_overdue = self.group.state_cycles > self.shared.enable_timeout_cycles;
+        self.settle_power(is_overdue);
+    }
+
+    /// Takes what the drives have shown of their power, and fails for the first one that is not known to have none, if it is not
+    /// waited for any longer.
+    pub(super) fn settle_power(&mut self, is_overdue: bool) {
+        self.axes.iter_mut().for_each(|axis| axis.settle_power(is_overdue));
+        self.report_unreleased();
+    }
+
+    /// Fails for the first drive that has not given up its power, unless a fault of this kind is latched already.
+    pub(super) fn report_unreleased(&mut self) {
+        let latched = self.group.stop.map_or(CauseRank::Requested, |stop| stop.cause.rank());
+        if latched == CauseRank::Unreleased {
+            return;
+        }
+        let has_fault = latched == CauseRank::Fault;
+        let unreleased =
+            self.axes.iter().find_map(|axis| Some((axis.number(), axis.unreleased_fault(has_fault)?)));
+        if let Some((number, fault)) = unreleased {
+            self.fail(Origin::Axis(number), fault);
+        }
+    }
+
     /// Begins the stop that the configuration has for a fault.
     pub(super) fn fail(&mut self, origin: Origin, fault: Fault) {
         self.begin_stop(StopCause::Fault(fault), origin, self.shared.categories.of(fault.rule()));
     }
 
     /// Begins a stop. The first fault stays the reason, and a later one can only make the stop harder. That somebody asked
-    /// for the stop is no fault: the first one that comes up before that stop is over takes its place, and must be reset.
+    /// for the stop is no fault: the first one that comes up before that stop is over takes its place, and must be reset. A drive that
+    /// does not give up its power takes the place of the fault that the group has stopped for.
     pub(super) fn begin_stop(&mut self, cause: StopCause, origin: Origin, category: StopCategory) {
         let wanted = self.possible(category);
         let (slot, phase) = (self.shared.present_slot(), self.group.state.phase());
         let is_under_way = matches!(self.group.state, GroupState::Stopping | GroupState::Disabling(_));
         let present = self.group.stop.filter(|present| is_under_way || !present.is_requested());
         let hardest = present.map_or(wanted, |present| present.category.min(wanted));
-        let kept = present.filter(|present| !present.is_requested() || cause == StopCause::Requested);
+        let kept = present.filter(|present| present.cause.rank() >= cause.rank());
         let begun = StopReason { category: hardest, cause, origin, slot, phase };
         let reason = kept.map_or(begun, |kept| StopReason { category: hardest, ..kept });
         self.group.stop = Some(reason);

@@ -117,7 +117,8 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     /// before what was asked for: a group without power begins each of them anew.
     pub(super) fn note_untold(&mut self, stop: StopReason) {
         let hardest = self.untold.map_or(stop.category, |untold| untold.category.min(stop.category));
-        let reason = self.untold.filter(|untold| !untold.is_requested()).unwrap_or(stop);
+        let kept = self.untold.filter(|untold| untold.cause.rank() >= stop.cause.rank());
+        let reason = kept.unwrap_or(stop);
         self.untold = Some(StopReason { category: hardest, ..reason });
     }
 
@@ -144,6 +145,9 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     pub(super) fn enter(&mut self, state: GroupState<AXES>) {
         let (from, to) = (self.group.state.phase(), state.phase());
         self.group.state = state;
+        if matches!(state, GroupState::Disabling(_)) {
+            self.axes.iter_mut().for_each(Axis::release_power);
+        }
         if from != to {
             self.emit(EventKind::PhaseChanged { from, to });
             self.group.state_cycles = 0;

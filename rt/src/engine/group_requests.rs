@@ -248,5 +248,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             self.axes.iter_mut().for_each(Axis::begin_fault_reset);
         }
         self.group.stop = None;
+        if matches!(self.group.state, GroupState::Disabled) {
+            self.report_unreleased();
+        }
     }
 }

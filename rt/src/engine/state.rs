@@ -18,7 +18,8 @@
 //!            Request::Move takes the place of a callback, or the callback is over    Moving
 //! Stopping   the joints are at rest                                                  Holding (2), Disabling (1)
 //!            it gets harder (category 0)                                             Disabling
-//! Disabling  no drive shows torque any more, or the patience is over                 Disabled
+//! Disabling  every drive has confirmed that it has no torque, or is not waited for   Disabled
+//!            any longer: then a latched fault says so
 //! ```
 //!
 //! A number in brackets is a stop category of IEC 60204-1. While a group changes its mode it is shown in the phase that it has come

@@ -278,8 +278,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         if is_patient && self.axes.iter().any(is_waited_for) {
             return;
         }
+        self.settle_power(true);
         self.group.motion.cancel();
-        self.axes.iter_mut().for_each(Axis::release_latch);
         self.enter(GroupState::Disabled);
     }
 }

@@ -24,6 +24,7 @@ mod node_axes;
 mod off_cycle_axes;
 mod one_group;
 mod overload;
+mod power;
 mod profile_modes;
 mod reported_process_data;
 mod shared_commands;

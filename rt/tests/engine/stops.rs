@@ -337,6 +337,7 @@ fn a_joint_that_coasts_is_not_taken_for_standing_when_slots_are_missed() {
     let may_be_enabled = |speed: f64, missed_slots: u32| {
         let mut axis = Axis::new(0, parameters.clone());
         axis.set_cycle(period_s);
+        axis.begin_watch();
         let (mut position, mut unreported_slots) = (0.0, 1);
         for cycle in 0..40 {
             let [s0, s1] = (DriveState::ReadyToSwitchOn.statusword_bits() | 0x0290).to_le_bytes();

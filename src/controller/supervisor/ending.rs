@@ -2,7 +2,7 @@
 
 use takt_rt::{Phase, Request, Snapshot, StopCategory};
 
-use super::phases::{fault_stop, is_any, is_every_group_off, is_off, stuck_phase};
+use super::phases::{fault_stop, is_any, is_every_group_off, is_off, stuck_phase, unreleased_stop};
 use super::{Stage, Supervisor, service_sender};
 use crate::channels::HostSide;
 use crate::controller::arrival::ARRIVAL_NS;
@@ -81,6 +81,7 @@ impl Supervisor {
     pub(super) fn disable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         if is_every_group_off(snapshot) {
             self.note_fault_while_disabling(snapshot);
+            self.note_unreleased(snapshot);
             self.begin_shut_down(now_ns);
         } else if elapsed_ns > self.stage_timeout_ns {
             let phase = stuck_phase(snapshot, |phase| !is_off(phase));
@@ -93,6 +94,13 @@ impl Supervisor {
     fn note_fault_while_disabling(&mut self, snapshot: &Snapshot) {
         let fault = fault_stop(snapshot).filter(|stop| stop.phase == Phase::Disabling);
         if let (Some(stop), Some(Outcome::Finished | Outcome::Interrupted)) = (fault, &self.outcome) {
+            self.outcome = Some(Outcome::Stopped(stop));
+        }
+    }
+
+    /// A drive that has torque although it should have none is the outcome of every run.
+    fn note_unreleased(&mut self, snapshot: &Snapshot) {
+        if let Some(stop) = unreleased_stop(snapshot) {
             self.outcome = Some(Outcome::Stopped(stop));
         }
     }
@@ -137,6 +145,7 @@ impl Supervisor {
         // group is disabled.
         let is_off = is_every_group_off(snapshot) && elapsed_ns > 0;
         if is_off && self.are_told_to_stop(elapsed_ns, snapshot) || elapsed_ns > self.stage_timeout_ns {
+            self.note_unreleased(snapshot);
             self.request(Request::Shutdown);
             self.enter(Stage::Done, now_ns);
         }

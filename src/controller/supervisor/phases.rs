@@ -8,6 +8,12 @@ pub fn fault_stop(snapshot: &Snapshot) -> Option<StopReason> {
     stops.filter(|stop| stop.rule() != Rule::Requested).min_by_key(|stop| stop.slot)
 }
 
+/// The stop of a group with a drive that has torque although it should have none, or may have it.
+pub fn unreleased_stop(snapshot: &Snapshot) -> Option<StopReason> {
+    let mut stops = snapshot.groups().iter().filter_map(|group| group.stop);
+    stops.find(|stop| matches!(stop.rule(), Rule::NotDisabled | Rule::DriveEnabled))
+}
+
 /// Whether a group is in such a phase.
 pub fn is_any(snapshot: &Snapshot, is_such: impl Fn(Phase) -> bool) -> bool {
     snapshot.groups().iter().any(|group| is_such(group.phase))

@@ -124,6 +124,8 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("stiffness_limit", "超出刚度限值"),
     ("damping_limit", "超出阻尼限值"),
     ("mode_not_shown", "驱动器未切换模式"),
+    ("not_disabled", "驱动器可能仍有转矩"),
+    ("drive_enabled", "驱动器被其他设备使能"),
 ];
 
 #[cfg(test)]

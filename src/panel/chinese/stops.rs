@@ -46,6 +46,20 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "the drive of {0} left operation enabled by itself (statusword {1})",
         "{0} 的驱动器自行退出运行使能（状态字 {1}）",
     ),
+    ("the drive of {0} was to be disabled and still shows <1>", "{0} 的驱动器应已去使能，但仍显示<1>"),
+    (
+        "the drive of {0} has not confirmed that it is disabled: no report for <1>, and <2> before",
+        "{0} 的驱动器未确认已去使能：已有 <1>未上报，此前为<2>",
+    ),
+    (
+        "the drive of {0} shows <1> although its group is disabled: something else has enabled it",
+        "{0} 的驱动器在所属组去使能时显示<1>：它被其他设备使能",
+    ),
+    ("keep away from the joint and cut the supply of its drive", "远离关节并切断其驱动器电源"),
+    (
+        "keep away from the joint, and end the other master or the vendor's tool that enables its drive",
+        "远离关节，并结束使能其驱动器的其他主站或厂商工具",
+    ),
     ("the drive of {0} shows <1> instead of <2>", "{0} 的驱动器显示<1>，而不是<2>"),
     (
         "the drive of {0} has not changed to <1> in time: it shows <2>",

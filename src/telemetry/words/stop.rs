@@ -75,6 +75,18 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::DriveDisabled { statusword } => {
             format!("the drive of {axis} left operation enabled by itself (statusword 0x{statusword:04X})")
         }
+        Fault::NotDisabled { state, silent_cycles: 0 } => {
+            format!("the drive of {axis} was to be disabled and still shows {}", state.name())
+        }
+        Fault::NotDisabled { state, silent_cycles } => format!(
+            "the drive of {axis} has not confirmed that it is disabled: no report for {}, and {} before",
+            cycles(silent_cycles),
+            state.name()
+        ),
+        Fault::DriveEnabled { state } => format!(
+            "the drive of {axis} shows {} although its group is disabled: something else has enabled it",
+            state.name()
+        ),
         Fault::ModeChanged { shown, expected } => format!(
             "the drive of {axis} shows {} instead of {}",
             mode(shown.into()),
@@ -155,14 +167,18 @@ fn drive_error(stop: &StopReason, machine: &Machine, code: u16) -> String {
     machine.drive_error(stop.axis().unwrap_or(u8::MAX), code)
 }
 
-/// The cure, where a drive has stopped the group and its error is known.
+/// The cure, where a drive has torque that it should not have, or has stopped the group and its error is known.
 pub(crate) fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
-    let StopCause::Fault(Fault::DriveFault { error_code: code } | Fault::EmergencyMessage { code }) =
-        stop.cause
-    else {
-        return None;
-    };
-    Some(machine.drive_cure(stop.axis()?, code))
+    match stop.cause.fault()? {
+        Fault::DriveFault { error_code: code } | Fault::EmergencyMessage { code } => {
+            Some(machine.drive_cure(stop.axis()?, *code))
+        }
+        Fault::NotDisabled { .. } => Some("keep away from the joint and cut the supply of its drive"),
+        Fault::DriveEnabled { .. } => Some(
+            "keep away from the joint, and end the other master or the vendor's tool that enables its drive",
+        ),
+        _ => None,
+    }
 }
 
 /// The full text of a stop: cause, phase, category, and cure where one is known.
@@ -259,6 +275,27 @@ mod tests {
                 0x1250.into(),
                 0.0,
                 "the drive of shoulder left operation enabled by itself (statusword 0x1250)",
+            ),
+            (
+                Rule::NotDisabled,
+                Origin::Axis(0),
+                4.0,
+                0.0,
+                "the drive of shoulder was to be disabled and still shows operation enabled",
+            ),
+            (
+                Rule::NotDisabled,
+                Origin::Axis(0),
+                4.0,
+                5001.0,
+                "the drive of shoulder has not confirmed that it is disabled: no report for 5001 cycles, and operation enabled before",
+            ),
+            (
+                Rule::DriveEnabled,
+                Origin::Axis(1),
+                5.0,
+                0.0,
+                "the drive of slide shows quick stop active although its group is disabled: something else has enabled it",
             ),
             (
                 Rule::ModeChanged,
@@ -373,6 +410,14 @@ mod tests {
         assert!(text(0x730F).ends_with("the joint's zero must be set again"), "{}", text(0x730F));
         assert!(text(0x8611).contains("; try: look for a blocked or overloaded joint"), "{}", text(0x8611));
         assert!(text(0).contains("; try: `takt drive … info` reads"), "{}", text(0));
+    }
+
+    #[test]
+    fn the_text_of_a_stop_for_a_drive_with_torque_that_it_should_not_have_ends_with_what_to_do() {
+        for rule in [Rule::NotDisabled, Rule::DriveEnabled] {
+            let text = stop(&reason(rule, Origin::Axis(0), 4.0, 0.0), &machine());
+            assert!(text.contains("; try: keep away from the joint"), "{text}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Fault injection: the wrapper, the files, and the controller's reaction to each kind, in virtual time.
 
 mod arm;
+mod disobedience;
 mod drives;
 mod files;
 mod gantry;

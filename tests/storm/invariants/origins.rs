@@ -90,6 +90,8 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::MissedFeedback
             | Rule::DriveFault
             | Rule::DriveDisabled
+            | Rule::NotDisabled
+            | Rule::DriveEnabled
             | Rule::ModeChanged
             | Rule::ModeNotShown
             | Rule::EnableTimeout

@@ -45,6 +45,12 @@ impl Phases {
         let was_latched = self.is_latched;
         for event in seen.events_of(self.group) {
             match event.kind {
+                // A drive that has torque when it should have none takes the place of any other reason.
+                EventKind::Stop(reason)
+                    if matches!(reason.rule(), Rule::NotDisabled | Rule::DriveEnabled) =>
+                {
+                    self.is_latched = true;
+                }
                 EventKind::Stop(reason) if reason.rule() != Rule::Requested => {
                     if self.is_latched && !asked.has_reset_lately {
                         return Err(format!("a second reason: {reason:?}, shown {:?}", group.stop));
