@@ -109,6 +109,11 @@ pub enum Fault {
         /// The state that it shows.
         state: DriveState,
     },
+    /// An enabled drive does not obey the bus any more: it has cleared statusword bit 9 (remote), which it had set.
+    DriveLocal {
+        /// Object 6041.
+        statusword: u16,
+    },
     /// A drive shows another mode of operation than the one that it was set to.
     ModeChanged {
         /// Object 6061.
@@ -258,6 +263,7 @@ impl Fault {
             Self::CallbackPanicked => Rule::CallbackPanicked,
             Self::NotDisabled { .. } => Rule::NotDisabled,
             Self::DriveEnabled { .. } => Rule::DriveEnabled,
+            Self::DriveLocal { .. } => Rule::DriveLocal,
         }
     }
 
@@ -277,7 +283,7 @@ impl Fault {
             Self::MissedFeedback { cycles, limit } => (cycles.into(), limit.into()),
             Self::LateFeedback { cycles } => (cycles.into(), 0.0),
             Self::DriveFault { error_code: code } | Self::EmergencyMessage { code } => (code.into(), 0.0),
-            Self::DriveDisabled { statusword } => (statusword.into(), 0.0),
+            Self::DriveDisabled { statusword } | Self::DriveLocal { statusword } => (statusword.into(), 0.0),
             Self::NotDisabled { state, silent_cycles } => (f64::from(state as u8), silent_cycles.into()),
             Self::DriveEnabled { state } => (f64::from(state as u8), 0.0),
             Self::ModeChanged { shown, expected } | Self::ModeNotShown { shown, expected } => {
@@ -359,6 +365,7 @@ impl Fault {
                 Self::NotDisabled { state: drive_state(seen)?, silent_cycles: allowed as u16 }
             }
             Rule::DriveEnabled => Self::DriveEnabled { state: drive_state(seen)? },
+            Rule::DriveLocal => Self::DriveLocal { statusword: seen as u16 },
         })
     }
 }

@@ -79,11 +79,13 @@ pub enum Rule {
     NotDisabled = 33,
     /// [`Fault::DriveEnabled`].
     DriveEnabled = 34,
+    /// [`Fault::DriveLocal`].
+    DriveLocal = 35,
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 35] = [
+    pub const ALL: [Self; 36] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -119,6 +121,7 @@ impl Rule {
         Self::ModeNotShown,
         Self::NotDisabled,
         Self::DriveEnabled,
+        Self::DriveLocal,
     ];
 
     /// Its word in configurations and reports.
@@ -159,6 +162,7 @@ impl Rule {
             Self::ModeNotShown => "mode_not_shown",
             Self::NotDisabled => "not_disabled",
             Self::DriveEnabled => "drive_enabled",
+            Self::DriveLocal => "drive_local",
         }
     }
 
@@ -188,6 +192,7 @@ impl Rule {
             | Self::DriveDisabled
             | Self::NotDisabled
             | Self::DriveEnabled
+            | Self::DriveLocal
             | Self::ModeChanged
             | Self::ModeNotShown
             | Self::EnableTimeout

@@ -1,9 +1,11 @@
 //! What the drive of an axis says of itself: its state by its statuswords, and its errors.
 
-use crate::cia402::DriveState;
+use crate::cia402::{DriveState, statusword};
 
 /// A fault shows in the statusword within this many slots of the emergency message that announces it.
 const EMERGENCY_GRACE_CYCLES: u8 = 3;
+/// Reports in a row without the remote bit that make a drive local: some statuswords may be corrupted.
+const LOCAL_REPORTS: u8 = 5;
 
 /// What a drive has reported of its state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -18,6 +20,8 @@ pub(super) struct DriveReport {
     since_emergency_cycles: Option<u8>,
     /// Whether a fault that was there when the last reset began has been there ever since.
     is_being_reset: bool,
+    /// Reports in a row without statusword bit 9 (remote) of a drive that has set it since it was enabled; `None` if it has not.
+    without_remote: Option<u8>,
 }
 
 impl DriveReport {
@@ -37,6 +41,22 @@ impl DriveReport {
             (self.emergency_code, self.is_being_reset) = (0, false);
         }
         self.state = shown;
+    }
+
+    /// Takes the statusword of the state that was noted last.
+    #[inline]
+    pub(super) fn note_remote(&mut self, word: u16) {
+        self.without_remote = match self.without_remote {
+            _ if self.state != DriveState::OperationEnabled => None,
+            _ if word & statusword::REMOTE != 0 => Some(0),
+            without => without.map(|reports| reports.saturating_add(1)),
+        };
+    }
+
+    /// Whether an enabled drive does not obey the bus any more: it has obeyed it by its statusword since it was enabled.
+    #[inline]
+    pub(super) fn is_local(&self) -> bool {
+        self.without_remote.is_some_and(|reports| reports >= LOCAL_REPORTS)
     }
 
     /// The drive's state.
@@ -113,6 +133,30 @@ mod tests {
         assert!(report.is_being_reset());
         report.note_state(DriveState::SwitchOnDisabled);
         assert_eq!((report.emergency_code(), report.is_being_reset()), (0, false));
+    }
+
+    #[test]
+    fn a_drive_is_local_when_a_remote_bit_that_it_has_set_while_it_is_enabled_is_gone_for_some_reports() {
+        const ENABLED: u16 = 0x0037;
+        let local_after = |words: &[u16]| {
+            let mut report = DriveReport::default();
+            words
+                .iter()
+                .map(|word| {
+                    report.note_state(DriveState::decode(*word));
+                    report.note_remote(*word);
+                    report.is_local()
+                })
+                .position(|is_local| is_local)
+        };
+        let remote = ENABLED | statusword::REMOTE;
+        assert_eq!(local_after(&[remote, ENABLED, ENABLED, ENABLED, ENABLED, ENABLED]), Some(5));
+        assert_eq!(local_after(&[remote, ENABLED, ENABLED, ENABLED, ENABLED, remote, ENABLED]), None);
+        assert_eq!(local_after(&[ENABLED; 20]), None, "a drive without this bit");
+        assert_eq!(
+            local_after(&[0x0231, 0x0231, ENABLED, ENABLED, ENABLED, ENABLED, ENABLED, ENABLED]),
+            None
+        );
     }
 
     #[test]

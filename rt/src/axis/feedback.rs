@@ -128,7 +128,9 @@ impl Axis {
         if self.joint.take_report(counts, velocity, span, scale, velocity_limit) {
             self.start_from_actual();
         }
-        self.report.note_state(self.parameters.codec.state(self.statusword()));
+        let statusword = self.statusword();
+        self.report.note_state(self.parameters.codec.state(statusword));
+        self.report.note_remote(statusword);
         self.note_power_report();
         let behind = self.set_points.due().position - self.joint.position();
         self.following.set_error(if self.is_profile() { 0.0 } else { behind });
@@ -236,6 +238,12 @@ impl Axis {
     /// Whether another node answers with the same node ID.
     pub fn is_duplicate(&self) -> bool {
         self.duplicate_node.is_found()
+    }
+
+    /// Whether the enabled drive does not obey the bus any more, by statusword bit 9 (remote).
+    #[inline]
+    pub(crate) fn is_local(&self) -> bool {
+        self.report.is_local()
     }
 
     /// The code of an emergency message that the statusword has had time to explain by a fault.

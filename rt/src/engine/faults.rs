@@ -404,6 +404,9 @@ impl Expectation {
         if self.is_disabled(axis) {
             return Some(Fault::DriveDisabled { statusword: axis.statusword() });
         }
+        if axis.is_local() {
+            return Some(Fault::DriveLocal { statusword: axis.statusword() });
+        }
         if let Some(jump) = axis.jump() {
             return Some(Fault::ImplausibleFeedback { distance: jump.distance, reachable: jump.reach });
         }

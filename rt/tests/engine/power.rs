@@ -173,3 +173,39 @@ fn a_drive_that_has_never_reported_is_a_fault_of_an_active_group_after_some_time
     rig.run(600);
     assert_eq!(rules(&rig), [(Rule::NotDisabled, Some(2))]);
 }
+
+#[test]
+fn an_enabled_drive_that_goes_local_is_a_fault_and_is_not_taken_for_disabled() {
+    let mut rig = Rig::enabled(3);
+    rig.drive(1).is_local = true;
+    rig.run(4);
+    assert_eq!(rules(&rig), []);
+    rig.run(3);
+    assert_eq!(rules(&rig), [(Rule::DriveLocal, Some(1))]);
+    let cause = rig.stops()[0].cause;
+    assert_eq!(StopCause::from_numbers(Rule::DriveLocal, cause.numbers().0, cause.numbers().1), Some(cause));
+    rig.run_until(Phase::Disabled, 600);
+    assert_eq!(latched(&rig), Some((Rule::NotDisabled, Some(1))));
+}
+
+#[test]
+fn a_remote_bit_that_is_away_for_some_reports_is_no_local_drive() {
+    let mut rig = Rig::enabled(3);
+    for _ in 0..20 {
+        rig.drive(1).is_local = true;
+        rig.run(4);
+        rig.drive(1).is_local = false;
+        rig.run(2);
+    }
+    assert_eq!((rig.phase(), rules(&rig)), (Phase::Holding, vec![]));
+}
+
+#[test]
+fn a_drive_without_a_remote_bit_works() {
+    let mut rig = Rig::new(3);
+    rig.drive(1).has_no_remote_bit = true;
+    let mut rig = rig.enable();
+    rig.move_to(0.5);
+    rig.run_until(Phase::Holding, 3_000);
+    assert_eq!(rules(&rig), []);
+}

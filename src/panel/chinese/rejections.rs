@@ -126,6 +126,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("mode_not_shown", "驱动器未切换模式"),
     ("not_disabled", "驱动器可能仍有转矩"),
     ("drive_enabled", "驱动器被其他设备使能"),
+    ("drive_local", "驱动器不再受总线控制"),
 ];
 
 #[cfg(test)]

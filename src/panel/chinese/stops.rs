@@ -60,6 +60,14 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "keep away from the joint, and end the other master or the vendor's tool that enables its drive",
         "远离关节，并结束使能其驱动器的其他主站或厂商工具",
     ),
+    (
+        "the drive of {0} does not obey the bus any more: it has cleared its remote bit (statusword {1})",
+        "{0} 的驱动器不再受总线控制：它已清除远程位（状态字 {1}）",
+    ),
+    (
+        "keep away from the joint, and end the vendor's tool or the local input that controls its drive",
+        "远离关节，并结束控制其驱动器的厂商工具或本地输入",
+    ),
     ("the drive of {0} shows <1> instead of <2>", "{0} 的驱动器显示<1>，而不是<2>"),
     (
         "the drive of {0} has not changed to <1> in time: it shows <2>",

@@ -87,6 +87,9 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             "the drive of {axis} shows {} although its group is disabled: something else has enabled it",
             state.name()
         ),
+        Fault::DriveLocal { statusword } => format!(
+            "the drive of {axis} does not obey the bus any more: it has cleared its remote bit (statusword 0x{statusword:04X})"
+        ),
         Fault::ModeChanged { shown, expected } => format!(
             "the drive of {axis} shows {} instead of {}",
             mode(shown.into()),
@@ -176,6 +179,9 @@ pub(crate) fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static
         Fault::NotDisabled { .. } => Some("keep away from the joint and cut the supply of its drive"),
         Fault::DriveEnabled { .. } => Some(
             "keep away from the joint, and end the other master or the vendor's tool that enables its drive",
+        ),
+        Fault::DriveLocal { .. } => Some(
+            "keep away from the joint, and end the vendor's tool or the local input that controls its drive",
         ),
         _ => None,
     }
@@ -298,6 +304,13 @@ mod tests {
                 "the drive of slide shows quick stop active although its group is disabled: something else has enabled it",
             ),
             (
+                Rule::DriveLocal,
+                Origin::Axis(0),
+                0x0037.into(),
+                0.0,
+                "the drive of shoulder does not obey the bus any more: it has cleared its remote bit (statusword 0x0037)",
+            ),
+            (
                 Rule::ModeChanged,
                 Origin::Axis(0),
                 1.0,
@@ -414,7 +427,7 @@ mod tests {
 
     #[test]
     fn the_text_of_a_stop_for_a_drive_with_torque_that_it_should_not_have_ends_with_what_to_do() {
-        for rule in [Rule::NotDisabled, Rule::DriveEnabled] {
+        for rule in [Rule::NotDisabled, Rule::DriveEnabled, Rule::DriveLocal] {
             let text = stop(&reason(rule, Origin::Axis(0), 4.0, 0.0), &machine());
             assert!(text.contains("; try: keep away from the joint"), "{text}");
         }

@@ -92,6 +92,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::DriveDisabled
             | Rule::NotDisabled
             | Rule::DriveEnabled
+            | Rule::DriveLocal
             | Rule::ModeChanged
             | Rule::ModeNotShown
             | Rule::EnableTimeout
