@@ -76,7 +76,8 @@ mod wire;
 pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, Exchange, FeedForward, FeedbackSince, Jump,
-    ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, SenderByte, Supervision, TorqueLimits,
+    ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, PositionCounter, SenderByte,
+    Supervision, TorqueLimits,
 };
 pub use bit_fields::{
     BesideTarget, BitField, BitRange, ByteOrder, CodeRange, CommandTargets, CommandValue, CommandValues,

@@ -177,11 +177,19 @@ pub enum RejectReason {
         /// How far it may be.
         limit: f64,
     },
+    /// The joint is beyond a wrap of its drive's position counter, or so far beyond its limits that it may as well be a lap of the counter
+    /// away: the drive cannot be commanded where it is.
+    BeyondCounter {
+        /// Where it is, by what its drive has counted.
+        position: f64,
+        /// The nearest position limit.
+        limit: f64,
+    },
 }
 
 impl RejectReason {
     /// One of each, in the order of their numbers, with numbers of no meaning.
-    pub const ALL: [Self; 36] = [
+    pub const ALL: [Self; 37] = [
         Self::Phase,
         Self::StopLatched { rule: Rule::FollowingError },
         Self::EnableInhibited,
@@ -218,6 +226,7 @@ impl RejectReason {
         Self::NotDisabled,
         Self::NotAtRest { velocity: 1.0 },
         Self::OffSetPoint { distance: 2.0, limit: 1.0 },
+        Self::BeyondCounter { position: 2.0, limit: 1.0 },
     ];
 
     /// The number that stands for it in recordings.
@@ -259,6 +268,7 @@ impl RejectReason {
             Self::NotDisabled => 33,
             Self::NotAtRest { .. } => 34,
             Self::OffSetPoint { .. } => 35,
+            Self::BeyondCounter { .. } => 36,
         }
     }
 
@@ -274,6 +284,7 @@ impl RejectReason {
             | Self::VelocityLimit { velocity: value, limit }
             | Self::TorqueLimit { torque: value, limit }
             | Self::NoRoomToStop { rest: value, limit }
+            | Self::BeyondCounter { position: value, limit }
             | Self::OffSetPoint { distance: value, limit } => (value, limit),
             Self::VelocityScale { scale: value } | Self::AccelerationScale { scale: value } => (value, 1.0),
             Self::NotFinite { value }
@@ -341,6 +352,7 @@ impl RejectReason {
             33 => Self::NotDisabled,
             34 => Self::NotAtRest { velocity: asked },
             35 => Self::OffSetPoint { distance: asked, limit: allowed },
+            36 => Self::BeyondCounter { position: asked, limit: allowed },
             _ => return None,
         })
     }
@@ -420,6 +432,12 @@ impl core::fmt::Display for RejectReason {
             }
             Self::OffSetPoint { distance, limit } => {
                 write!(f, "the joint is {distance} from its set-point; at most {limit} is allowed")
+            }
+            Self::BeyondCounter { position, limit } => {
+                write!(
+                    f,
+                    "the joint is at {position}, where the count of its drive may have wrapped; its limit is {limit}"
+                )
             }
             Self::StartMismatch { position, present } => {
                 write!(

@@ -134,7 +134,7 @@ impl Scale {
     /// Position (rad or m) to counts, to the nearest; beyond 32 bits the nearest end.
     #[inline]
     pub fn position_to_counts(&self, position: f64) -> i32 {
-        nearest(position * self.counts_per_unit + self.zero_counts)
+        nearest(self.counts_at(position))
     }
 
     /// The set-point of a position (rad or m) in counts: to the nearest, at a limit to the inside.
@@ -158,9 +158,14 @@ impl Scale {
         self.torque_to_per_mille(inward(torque, -limit, limit, unit))
     }
 
-    /// Counts to position (rad or m).
-    pub fn position_from_counts(&self, counts: i32) -> f64 {
-        (f64::from(counts) - self.zero_counts) * self.units_per_count
+    /// Counts to position (rad or m); those of a counter that has wrapped may be beyond 32 bits.
+    pub fn position_from_counts(&self, counts: impl Into<i64>) -> f64 {
+        (counts.into() as f64 - self.zero_counts) * self.units_per_count
+    }
+
+    /// Position (rad or m) to counts, with their fraction, however many.
+    pub(crate) fn counts_at(&self, position: f64) -> f64 {
+        position * self.counts_per_unit + self.zero_counts
     }
 
     /// Velocity (rad/s or m/s) to the drive's unit.

@@ -9,7 +9,7 @@ use std::ops::{Deref, Range, RangeInclusive};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use takt_rt::{Cia402Codec, Id, MappedObject, ModeCondition, OperationMode};
+use takt_rt::{Cia402Codec, Id, MappedObject, ModeCondition, OperationMode, PositionCounter};
 
 use super::bounds::Bounds;
 use super::model::{Control, Identity};
@@ -48,6 +48,8 @@ pub struct DriveFacts {
     pub identity: Identity,
     /// Counts of one turn of the position that the drives report. `None`: a configuration must say it.
     pub counts_per_turn: Option<f64>,
+    /// The counts that the drives report as their position (object 6064).
+    pub counter: PositionCounter,
     /// The unit of velocities (objects 606C, 60FF).
     pub velocity_unit: VelocityUnit,
     /// The unit of profile velocities (6081, 6099), where it is another one.
@@ -243,6 +245,7 @@ impl DriveFacts {
             name,
             identity: Identity { device_type: None, vendor: None, product: None, revision: None },
             counts_per_turn: None,
+            counter: PositionCounter::BITS_32,
             velocity_unit: VelocityUnit::Counts(1.0),
             profile_velocity_unit: None,
             acceleration_unit: None,

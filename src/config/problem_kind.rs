@@ -268,13 +268,17 @@ pub enum ProblemKind {
         /// The upper limit.
         high: String,
     },
-    /// Something that does not fit the 32 bits that a drive counts in.
-    #[error("`{key}` is {counts:.0} counts, which does not fit the drive's 32 bits")]
+    /// Something beyond the counts that a drive has.
+    #[error("`{key}` is {counts:.0} counts, and the drive counts from {lowest} to {highest}")]
     BeyondCounts {
         /// The key.
         key: String,
         /// The value in counts or counts per second.
         counts: f64,
+        /// The lowest count of the drive.
+        lowest: i32,
+        /// The highest count.
+        highest: i32,
     },
     /// A device configuration file that cannot be used.
     #[error("{reason}")]

@@ -1,5 +1,7 @@
 //! The quantities and ranges of an axis by what it does: turn or slide.
 
+use takt_rt::PositionCounter;
+
 use super::model::{Axis, Limits, Travel};
 use super::quantity::Quantity;
 use super::ranges::AxisRanges;
@@ -63,12 +65,14 @@ pub struct Counting {
     pub gear_ratio: f64,
     pub reversed: bool,
     pub zero_counts: i32,
+    /// The counts that the drive reports.
+    pub counter: PositionCounter,
 }
 
 impl Counting {
     pub fn of(axis: &Axis) -> Self {
         let Axis { travel, counts_per_turn, gear_ratio, reversed, zero_counts, .. } = *axis;
-        Self { travel, counts_per_turn, gear_ratio, reversed, zero_counts }
+        Self { travel, counts_per_turn, gear_ratio, reversed, zero_counts, counter: axis.drive.counter }
     }
 
     /// Turns of the reported position per rad (m).
@@ -85,5 +89,11 @@ impl Counting {
     pub fn position(&self, position: f64) -> f64 {
         let direction = if self.reversed { -1.0 } else { 1.0 };
         direction * position * self.counts_per_unit() + f64::from(self.zero_counts)
+    }
+
+    /// The position at a count.
+    pub fn joint(&self, count: i32) -> f64 {
+        let direction = if self.reversed { -1.0 } else { 1.0 };
+        direction * (f64::from(count) - f64::from(self.zero_counts)) / self.counts_per_unit()
     }
 }

@@ -232,6 +232,7 @@ fn axis_parameters(
             timeout_cycles: cycles(MODE_TIMEOUT_NS),
         },
         scale: axis.scale().map_err(|error| AssembleError::Scale { axis: index, error })?,
+        counter: axis.drive.counter,
         limits: axis.limits,
         torque_limits: torque_limits(axis),
         feed_forward: axis.feed_forward,

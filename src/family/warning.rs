@@ -15,6 +15,8 @@ use crate::family::{adapter_warning, bring_up, registry, report_cycles};
 const USUAL_TURNS: f64 = 2.0;
 /// A lost reply costs a serial line about three rounds, and a drive must not miss its master for it.
 const LOST_ROUNDS: u64 = 4;
+/// Share of the range of positions that a joint may be pushed beyond its limits by: so far from them its drive's count is not to wrap.
+const PUSHED: f64 = 0.1;
 /// A drive that rounds a velocity by less than this share runs as commanded.
 const ROUNDING: f64 = 0.01;
 
@@ -71,6 +73,13 @@ pub enum WarningKind {
         turns: f64,
         /// The limits, where they look like degrees.
         degrees: Option<[f64; 2]>,
+    },
+    /// The position counter of the drive wraps near a position limit.
+    NearWrap {
+        /// The limit, with its unit.
+        limit: String,
+        /// Where it wraps, with its unit.
+        wrap: String,
     },
     /// A velocity limit in rad/s that looks like one in deg/s.
     VelocityInDegrees {
@@ -173,6 +182,12 @@ impl fmt::Display for WarningKind {
                 "`limits.position` is a range of {} turns, and looks like degrees: a number without a unit is in rad; \
                  write [\"{low} deg\", \"{high} deg\"]",
                 Short(*turns)
+            ),
+            Self::NearWrap { limit, wrap } => write!(
+                f,
+                "the count of its drive wraps at {wrap}, near the limit of {limit} in `limits.position`: a joint that is pushed beyond it \
+                 is not enabled before it is back; set the zero of the drive elsewhere, so that its counts end far \
+                 from the limits"
             ),
             Self::VelocityInDegrees { velocity } => write!(
                 f,
@@ -326,6 +341,18 @@ pub(crate) fn is_rounded(commanded: f64, rounded: f64) -> bool {
     (commanded - rounded).abs() > ROUNDING * commanded.abs()
 }
 
+/// The position limit near which the count of the drive wraps.
+fn near_wrap(axis: &Axis) -> Option<WarningKind> {
+    let (counting, limits) = (Counting::of(axis), &axis.limits);
+    let show = |position: f64| Quantities::of(axis.travel).position.show(position);
+    let margin = PUSHED * (limits.position_max - limits.position_min);
+    let ends = [counting.counter.lowest(), counting.counter.highest()].map(|count| counting.joint(count));
+    [(limits.position_min, -margin), (limits.position_max, margin)].into_iter().find_map(|(limit, beyond)| {
+        let wrap = ends.into_iter().find(|wrap| (0.0..=1.0).contains(&((wrap - limit) / beyond)))?;
+        Some(WarningKind::NearWrap { limit: show(limit), wrap: show(wrap) })
+    })
+}
+
 fn of_axis(axis: &Axis) -> Vec<WarningKind> {
     let Axis { drive, limits, gear_ratio, travel, .. } = axis;
     let mut kinds = vec![];
@@ -340,6 +367,7 @@ fn of_axis(axis: &Axis) -> Vec<WarningKind> {
     } else if inner_gear_from.is_some_and(|from| *gear_ratio >= from) {
         kinds.push(WarningKind::GearInDrive { gear_ratio: *gear_ratio });
     }
+    kinds.extend(near_wrap(axis));
     if *travel != Travel::Rotary {
         return kinds;
     }

@@ -378,6 +378,21 @@ fn a_gear_ratio_of_the_gear_inside_an_erob_is_warned_about() {
 }
 
 #[test]
+fn limits_near_a_wrap_of_the_drive_s_count_are_warned_about() {
+    // The joint is at about 3.3 rad where the count of its drive wraps; its limits are ±2.9671 rad.
+    let zero_at = |count: &str| {
+        let line = format!("drive = \"erob-canopen\"\nzero_counts = {count}");
+        move |arm: String| arm.replacen("drive = \"erob-canopen\"", &line, 1)
+    };
+    for count in ["2147208000", "-2147208000"] {
+        let near = warnings(zero_at(count));
+        assert_eq!(near.len(), 1, "{near:?}");
+        assert!(near[0].contains("the count of its drive wraps at"), "{near:?}");
+    }
+    assert_eq!(warnings(zero_at("2146900000")), Vec::<String>::new());
+}
+
+#[test]
 fn limits_that_look_like_degrees_are_warned_about() {
     let changed = |find: &'static str, with: &'static str| move |arm: String| arm.replacen(find, with, 1);
     let limits = "position = [-2.9671, 2.9671]";

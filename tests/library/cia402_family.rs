@@ -9,6 +9,7 @@ use takt::config::Control;
 use takt::family::bring_up::{PdoPlan, ProcessData};
 use takt::family::cia402::{self, Device};
 use takt::{Outcome, VirtualRun};
+use takt_rt::PositionCounter;
 
 const CYCLES_AT_MOST: u64 = 60_000;
 
@@ -50,6 +51,17 @@ fn an_arm_of_three_makers_drives_moves_in_csp_at_1_ms() {
     for (axis, position) in config.axes.iter().zip(run(&config)) {
         assert!(position.abs() < 0.01, "{}: {position}", axis.name);
     }
+}
+
+#[test]
+fn a_data_sheet_may_bound_the_counts_of_the_position() {
+    let counter = |name: &str| {
+        let sheet = repository().join("tests/eds/vendors").join(name);
+        cia402::drive(Device::load(&sheet, None).unwrap()).counter
+    };
+    let bounded = PositionCounter::new(-1_800_000_000, 1_800_000_000).unwrap();
+    assert_eq!(counter("faulhaber-mcbl300x.eds"), bounded);
+    assert_eq!(counter("maxon-epos4.eds"), PositionCounter::BITS_32, "0 and 0 are no bounds");
 }
 
 #[test]

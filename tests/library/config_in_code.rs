@@ -138,7 +138,11 @@ const CASES: &[Case] = &[
         |c| axis(c).limits.position_max = f64::INFINITY,
         &[AXIS, "`axis.limits.position` cannot be inf"],
     ),
-    ("far range", |c| axis(c).limits.position_max = 1e9, &[AXIS, "does not fit the drive's 32 bits"]),
+    (
+        "far range",
+        |c| axis(c).limits.position_max = 1e9,
+        &[AXIS, "and the drive counts from -2147483648 to 2147483647"],
+    ),
     (
         "velocity",
         |c| axis(c).limits.velocity = f64::NAN,

@@ -1,6 +1,7 @@
 //! What the drive of an axis reports, and when.
 
 use super::exchange::{Exchange, NoFeedback};
+use super::joint::JointFacts;
 use super::late_reply::SetPointSkip;
 use super::{Axis, FeedbackSince};
 use crate::cia402::DriveState;
@@ -124,8 +125,7 @@ impl Axis {
             .reported_slots
             .contains(FeedbackSlot::Velocity)
             .then(|| scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity)));
-        let velocity_limit = self.parameters.limits.velocity;
-        if self.joint.take_report(counts, velocity, span, scale, velocity_limit) {
+        if self.joint.take_report(counts, velocity, span, JointFacts::of(&self.parameters)) {
             self.start_from_actual();
         }
         let statusword = self.statusword();
@@ -139,7 +139,7 @@ impl Axis {
 
     /// Takes the position that the drive has reported by SDO, unless it reports by process data.
     pub fn set_reported_position(&mut self, counts: i32) {
-        if self.joint.take_sdo_position(counts, &self.parameters.scale) {
+        if self.joint.take_sdo_position(counts, JointFacts::of(&self.parameters)) {
             self.start_from_actual();
         }
     }
@@ -222,6 +222,12 @@ impl Axis {
     /// The actual position (rad or m): the last plausible one.
     pub fn position(&self) -> f64 {
         self.joint.position()
+    }
+
+    /// Whether the drive can be commanded where the joint is: the joint is not beyond a wrap of the drive's position counter, nor may it
+    /// as well be a lap of that away.
+    pub fn is_position_commandable(&self) -> bool {
+        self.joint.is_commandable(JointFacts::of(&self.parameters))
     }
 
     /// The actual velocity (rad/s or m/s).

@@ -1,10 +1,42 @@
 //! Where the joint of an axis is, by the reports that are plausible, and whether it stands.
 
-use super::plausibility::{Plausibility, PlausibilityCheck, TravelBound};
+use super::plausibility::{Meaning, Plausibility, PlausibilityCheck, TravelBound};
+use super::position_counter::PositionCounter;
 use super::reception::ReportSpan;
 use super::standstill::Standstill;
-use super::{AT_REST, Jump};
+use super::{AT_REST, AxisParameters, Jump};
+use crate::guard::AxisLimits;
 use crate::units::Scale;
+
+/// What is known of a joint beforehand.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct JointFacts<'a> {
+    pub(super) scale: &'a Scale,
+    pub(super) counter: PositionCounter,
+    pub(super) limits: &'a AxisLimits,
+}
+
+impl<'a> JointFacts<'a> {
+    pub(super) fn of(parameters: &'a AxisParameters) -> Self {
+        Self { scale: &parameters.scale, counter: parameters.counter, limits: &parameters.limits }
+    }
+
+    /// Of all counts that the drive reports as this one, that which is nearest to the middle of the position limits: where the joint is
+    /// if it has not been watched.
+    fn by_limits(self, reported: i32) -> i64 {
+        let AxisLimits { position_min, position_max, .. } = *self.limits;
+        self.counter.nearest(reported, self.scale.counts_at(0.5 * (position_min + position_max)))
+    }
+
+    fn position(self, counts: i64) -> f64 {
+        self.scale.position_from_counts(counts)
+    }
+
+    /// The way of one lap of the counter: rad (m).
+    fn lap(self) -> f64 {
+        self.counter.lap() as f64 / self.scale.resolution()
+    }
+}
 
 /// How the position of the joint is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,7 +58,10 @@ pub(super) struct JointEstimate {
     check: PlausibilityCheck,
     source: Source,
     position: f64,
-    position_counts: i32,
+    /// The counts of that position, over all wraps of the drive's counter.
+    counts: i64,
+    /// The same as the drive has reported them.
+    reported_counts: i32,
     velocity: f64,
     /// The last report, if the joint cannot have got there.
     jump: Option<Jump>,
@@ -40,21 +75,27 @@ impl JointEstimate {
     #[inline]
     pub(super) fn take_report(
         &mut self,
-        counts: i32,
+        reported: i32,
         velocity: Option<f64>,
         span: ReportSpan,
-        scale: &Scale,
-        velocity_limit: f64,
+        facts: JointFacts<'_>,
     ) -> bool {
-        let position = scale.position_from_counts(counts);
-        let bound = TravelBound { velocity: velocity_limit, count: 1.0 / scale.resolution() };
+        let counted = self.counts + facts.counter.step(self.reported_counts, reported);
+        let (velocity_limit, count) = (facts.limits.velocity, 1.0 / facts.scale.resolution());
+        let half_lap = 0.5 * facts.counter.lap() as f64 * count;
+        let bound = TravelBound { velocity: velocity_limit, count, half_lap };
+        let by_limits = || facts.position(facts.by_limits(reported));
         let mut has_become_known = false;
-        match self.check.judge(position, span.longest_s, bound) {
-            Plausibility::Plausible { velocity: by_positions } => {
+        match self.check.judge(facts.position(counted), by_limits, span.longest_s, bound) {
+            Plausibility::Plausible { velocity: by_positions, meaning } => {
+                let counts = match meaning {
+                    Meaning::Counted => counted,
+                    Meaning::ByLimits => facts.by_limits(reported),
+                };
                 self.jump = None;
                 self.velocity = velocity.unwrap_or(by_positions);
-                self.standstill.note(position, span, velocity_limit, bound.count);
-                has_become_known = self.accept(position, counts);
+                has_become_known = self.accept(reported, counts, facts);
+                self.standstill.note(self.position, span, velocity_limit, count);
             }
             Plausibility::Implausible { distance, reach } => self.jump = Some(Jump { distance, reach }),
         }
@@ -64,18 +105,29 @@ impl JointEstimate {
 
     /// Takes the position that the drive has reported by SDO, unless it reports by process data. Returns whether the position
     /// has become known by this.
-    pub(super) fn take_sdo_position(&mut self, counts: i32, scale: &Scale) -> bool {
+    pub(super) fn take_sdo_position(&mut self, reported: i32, facts: JointFacts<'_>) -> bool {
         if self.is_heard() {
             return false;
         }
-        let has_become_known = self.accept(scale.position_from_counts(counts), counts);
+        let has_become_known = self.accept(reported, facts.by_limits(reported), facts);
         self.source = Source::Sdo;
         has_become_known
     }
 
-    fn accept(&mut self, position: f64, counts: i32) -> bool {
-        (self.position, self.position_counts) = (position, counts);
+    fn accept(&mut self, reported: i32, counts: i64, facts: JointFacts<'_>) -> bool {
+        (self.reported_counts, self.counts, self.position) = (reported, counts, facts.position(counts));
         !self.is_known()
+    }
+
+    /// Whether the drive can be commanded where the joint is: its counter has no wrap between the joint and the position limits, and the
+    /// joint is not so far beyond them that it may as well be a lap of the counter away.
+    pub(super) fn is_commandable(&self, facts: JointFacts<'_>) -> bool {
+        /// Share of the counts outside of the limits, on either side, in which the joint is not taken to be a lap away.
+        const SHARE: f64 = 0.25;
+        let AxisLimits { position_min, position_max, .. } = *facts.limits;
+        let beyond = (self.position - position_max).max(position_min - self.position);
+        let outside = facts.lap() - (position_max - position_min);
+        facts.counter.contains(self.counts) && (beyond <= 0.0 || beyond <= SHARE * outside)
     }
 
     /// A stop begins: from now on it counts for how long the joint has stood.
@@ -98,9 +150,9 @@ impl JointEstimate {
         self.position
     }
 
-    /// The last plausible position, in counts.
+    /// The last plausible position, in counts as the drive has reported it.
     pub(super) const fn position_counts(&self) -> i32 {
-        self.position_counts
+        self.reported_counts
     }
 
     /// The last plausible velocity.
@@ -131,19 +183,25 @@ mod tests {
     use crate::units::ScaleParameters;
     use core::f64::consts::TAU;
 
-    const VELOCITY_LIMIT: f64 = 2.0;
+    const SCALE: ScaleParameters = ScaleParameters {
+        counts_per_turn: TAU * 1e6,
+        velocity_units_per_turn: TAU * 1e6,
+        gear_ratio: 1.0,
+        travel_per_turn: TAU,
+        reversed: false,
+        zero_counts: 0.0,
+        rated_torque: 31.0,
+    };
 
     fn scale() -> Scale {
-        Scale::new(ScaleParameters {
-            counts_per_turn: TAU * 1e6,
-            velocity_units_per_turn: TAU * 1e6,
-            gear_ratio: 1.0,
-            travel_per_turn: TAU,
-            reversed: false,
-            zero_counts: 0.0,
-            rated_torque: 31.0,
-        })
-        .unwrap()
+        Scale::new(SCALE).unwrap()
+    }
+
+    const LIMITS: AxisLimits =
+        AxisLimits { position_min: -3.0, position_max: 3.0, velocity: 2.0, ..AxisLimits::NONE };
+
+    fn facts(scale: &Scale) -> JointFacts<'_> {
+        JointFacts { scale, counter: PositionCounter::default(), limits: &LIMITS }
     }
 
     fn report(joint: &mut JointEstimate, counts: i32, is_known: bool) -> bool {
@@ -151,17 +209,65 @@ mod tests {
             counts,
             None,
             ReportSpan { longest_s: 1e-3, cycle_s: 1e-3, is_known },
-            &scale(),
-            VELOCITY_LIMIT,
+            facts(&scale()),
         )
+    }
+
+    /// The position of a joint after these reports.
+    fn position_after(facts: JointFacts<'_>, reports: impl IntoIterator<Item = i32>) -> (f64, bool) {
+        let mut joint = JointEstimate::default();
+        let span = ReportSpan { longest_s: 1e-3, cycle_s: 1e-3, is_known: true };
+        for counts in reports {
+            joint.take_report(counts, None, span, facts);
+        }
+        (joint.position(), joint.is_commandable(facts))
+    }
+
+    #[test]
+    fn a_joint_whose_drive_counts_over_a_wrap_goes_on_there_and_is_not_commanded_beyond_it() {
+        let scale = Scale::new(ScaleParameters { zero_counts: 2_147_000_000.0, ..SCALE }).unwrap();
+        let facts = facts(&scale);
+        let up = (0..200).map(|step| 2_147_400_000_i32.wrapping_add(step * 1_000));
+        let (position, is_commandable) = position_after(facts, up.clone());
+        assert!((position - 0.599).abs() < 1e-9, "{position}");
+        assert!(!is_commandable);
+        let (position, is_commandable) = position_after(facts, up.clone().chain(up.rev()));
+        assert!((position - 0.4).abs() < 1e-9, "{position}");
+        assert!(is_commandable);
+    }
+
+    #[test]
+    fn the_limits_say_on_which_side_of_a_wrap_a_joint_is_that_nobody_has_watched() {
+        // One lap of the counter is 16 rad.
+        let counter = PositionCounter::new(-8_000_000, 7_999_999).unwrap();
+        let scale = Scale::new(ScaleParameters { zero_counts: 4_500_000.0, ..SCALE }).unwrap();
+        let facts = JointFacts { counter, ..facts(&scale) };
+        let at = |joint: f64| {
+            let counts = (joint * 1e6) as i64 + 4_500_000;
+            position_after(facts, [((counts + 8_000_000).rem_euclid(16_000_000) - 8_000_000) as i32])
+        };
+        for (joint, is_expected) in [
+            (0.0, true),
+            (-3.0, true),
+            (3.0, true),
+            (3.3, true),
+            (3.6, false),
+            (5.4, false),
+            (-5.4, true),
+            (-5.7, false),
+        ] {
+            let (position, is_commandable) = at(joint);
+            assert!((position - joint).abs() < 1e-6, "{position} for {joint}");
+            assert_eq!(is_commandable, is_expected, "{joint}");
+        }
     }
 
     #[test]
     fn a_position_becomes_known_once_and_process_data_go_before_sdo() {
         let mut joint = JointEstimate::default();
-        assert!(joint.take_sdo_position(500, &scale()) && !joint.is_heard());
+        assert!(joint.take_sdo_position(500, facts(&scale())) && !joint.is_heard());
         assert!(!report(&mut joint, 600, true) && joint.is_heard());
-        assert!(!joint.take_sdo_position(700, &scale()));
+        assert!(!joint.take_sdo_position(700, facts(&scale())));
         assert_eq!(joint.position_counts(), 600);
     }
 

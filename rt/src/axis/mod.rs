@@ -2,7 +2,7 @@
 //!
 //! The parts of an [`Axis`], a file each: `set_points` and `delay` (where it is to be, and the guard),
 //! `stream` (what a source wants, and the set-points that come of it), `torque_loop` (the torque where it is made here),
-//! `mode` (its change at run time), `profile_mode` (targets instead of set-points), `joint` and `plausibility` (where the joint is), `reception` and
+//! `mode` (its change at run time), `profile_mode` (targets instead of set-points), `joint`, `plausibility` and `position_counter` (where the joint is), `reception` and
 //! `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
 //! `sdo_fallback` (the controlword when process data do not arrive), `exchange` and `command` (the frames), `bit_fields` (the same for a
 //! drive without PDOs), `off_cycle` (a drive that is spoken to outside of the cycle), `rest` and `standstill` (has the
@@ -36,6 +36,7 @@ mod mode;
 mod off_cycle;
 mod parameters;
 mod plausibility;
+mod position_counter;
 mod power;
 mod profile_mode;
 mod reception;
@@ -75,6 +76,7 @@ pub use parameters::{
     AxisParameters, AxisParametersError, FeedForward, FeedbackSince, ModeChanges, ModeCondition, Supervision,
     TorqueLimits,
 };
+pub use position_counter::PositionCounter;
 
 /// Cycles of its bus after which a drive has obeyed a controlword and has said so.
 const SETTLED_CYCLES: u32 = 4;

@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::exchange::Exchange;
+use super::position_counter::PositionCounter;
 use crate::cia402::OperationMode;
 use crate::cia402_codec::Cia402Codec;
 use crate::control::{ControlLaw, GainError};
@@ -182,6 +183,8 @@ pub struct AxisParameters {
     pub mode_changes: ModeChanges,
     /// SI to drive units.
     pub scale: Scale,
+    /// The counts that the drive reports as its position.
+    pub counter: PositionCounter,
     /// What it may never be asked to do.
     pub limits: AxisLimits,
     /// What a source may ask of it where its torque is made here.
@@ -353,6 +356,7 @@ pub(super) mod tests {
                 rated_torque: 31.0,
             })
             .unwrap(),
+            counter: PositionCounter::default(),
             limits: AxisLimits {
                 position_min: -3.0,
                 position_max: 3.0,

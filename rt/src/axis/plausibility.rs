@@ -12,12 +12,23 @@ pub(super) struct TravelBound {
     pub(super) velocity: f64,
     /// The distance of one count.
     pub(super) count: f64,
+    /// Half a lap of the drive's position counter. A joint that can have moved farther may have passed a wrap unseen.
+    pub(super) half_lap: f64,
 }
 
 impl TravelBound {
     fn within(self, seconds: f64) -> f64 {
         IMPLAUSIBLE_SPEED * self.velocity * seconds + IMPLAUSIBLE_COUNTS * self.count
     }
+}
+
+/// Which position a report means, of those that are whole laps of the drive's position counter apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Meaning {
+    /// The nearest one to the last position.
+    Counted,
+    /// The nearest one to the middle of the position limits: the joint has not been watched all the way.
+    ByLimits,
 }
 
 /// The verdict on a report.
@@ -27,6 +38,8 @@ pub(super) enum Plausibility {
     Plausible {
         /// The velocity that brought it there: rad/s (m/s).
         velocity: f64,
+        /// Which of the positions that the report may mean it is.
+        meaning: Meaning,
     },
     /// The joint cannot have got there.
     Implausible {
@@ -50,37 +63,53 @@ pub(super) struct PlausibilityCheck {
 }
 
 impl PlausibilityCheck {
-    /// Takes a report, so many seconds after the one before.
+    /// Takes a report, so many seconds after the one before: where the joint is if the laps of the counter are counted from its last
+    /// position, and if the position limits decide.
     #[inline]
-    pub(super) fn judge(&mut self, reported: f64, elapsed_s: f64, bound: TravelBound) -> Plausibility {
+    pub(super) fn judge(
+        &mut self,
+        counted: f64,
+        by_limits: impl FnOnce() -> f64,
+        elapsed_s: f64,
+        bound: TravelBound,
+    ) -> Plausibility {
         self.accepted_s += elapsed_s;
-        let Some(accepted) = self.accepted else {
-            self.accept(reported);
-            return Plausibility::Plausible { velocity: 0.0 };
-        };
-        let is_reached = |from: f64, seconds: f64| (reported - from).abs() <= bound.within(seconds);
-        let source = if is_reached(accepted, self.accepted_s) {
-            Some((accepted, self.accepted_s))
-        } else {
-            let rejected = self.rejected.map(|from| (from, elapsed_s));
-            rejected.filter(|(from, seconds)| is_reached(*from, *seconds))
-        };
-        match source {
-            Some((from, seconds)) => {
-                self.accept(reported);
-                let velocity = if seconds > 0.0 { (reported - from) / seconds } else { 0.0 };
-                Plausibility::Plausible { velocity }
+        let reach = bound.within(self.accepted_s);
+        match self.accepted {
+            Some(from) if reach < bound.half_lap && (counted - from).abs() <= reach => {
+                self.accept(counted, Meaning::Counted, Some((from, self.accepted_s)))
             }
-            None => {
-                self.rejected = Some(reported);
-                let distance = (reported - accepted).abs();
-                Plausibility::Implausible { distance, reach: bound.within(self.accepted_s) }
-            }
+            accepted => self.judge_anew(accepted, by_limits(), elapsed_s, bound),
         }
     }
 
-    fn accept(&mut self, position: f64) {
+    /// Takes a report that does not follow from the last position.
+    #[cold]
+    fn judge_anew(
+        &mut self,
+        accepted: Option<f64>,
+        reported: f64,
+        elapsed_s: f64,
+        bound: TravelBound,
+    ) -> Plausibility {
+        let Some(accepted) = accepted else { return self.accept(reported, Meaning::ByLimits, None) };
+        let is_reached = |from: f64, seconds: f64| (reported - from).abs() <= bound.within(seconds);
+        let before = [Some((accepted, self.accepted_s)), self.rejected.map(|from| (from, elapsed_s))];
+        let source = before.into_iter().flatten().find(|(from, seconds)| is_reached(*from, *seconds));
+        if source.is_some() {
+            return self.accept(reported, Meaning::ByLimits, source);
+        }
+        self.rejected = Some(reported);
+        let distance = (reported - accepted).abs();
+        Plausibility::Implausible { distance, reach: bound.within(self.accepted_s) }
+    }
+
+    /// Accepts a position, to which the joint has come from another one in so many seconds.
+    fn accept(&mut self, position: f64, meaning: Meaning, source: Option<(f64, f64)>) -> Plausibility {
         *self = Self { accepted: Some(position), accepted_s: 0.0, rejected: None };
+        let source = source.filter(|(_, seconds)| *seconds > 0.0);
+        let velocity = source.map_or(0.0, |(from, seconds)| (position - from) / seconds);
+        Plausibility::Plausible { velocity, meaning }
     }
 }
 
@@ -89,13 +118,18 @@ mod tests {
     use super::*;
 
     /// 8 mrad in a millisecond, and a little more.
-    const BOUND: TravelBound = TravelBound { velocity: 2.0, count: 1e-6 };
+    const BOUND: TravelBound = TravelBound { velocity: 2.0, count: 1e-6, half_lap: 1e3 };
+
+    /// Takes a report of a joint that passes no wrap.
+    fn judge(check: &mut PlausibilityCheck, reported: f64, elapsed_s: f64) -> Plausibility {
+        check.judge(reported, || reported, elapsed_s, BOUND)
+    }
 
     fn judged(reports: &[f64]) -> [bool; 8] {
         let mut check = PlausibilityCheck::default();
         let mut accepted = [false; 8];
         for (is_accepted, report) in accepted.iter_mut().zip(reports) {
-            *is_accepted = matches!(check.judge(*report, 1e-3, BOUND), Plausibility::Plausible { .. });
+            *is_accepted = matches!(judge(&mut check, *report, 1e-3), Plausibility::Plausible { .. });
         }
         accepted
     }
@@ -117,14 +151,37 @@ mod tests {
     #[test]
     fn the_longer_nothing_is_accepted_the_further_the_joint_can_have_moved() {
         let mut check = PlausibilityCheck::default();
-        check.judge(0.0, 1e-3, BOUND);
-        assert_eq!(check.judge(0.1, 0.1, BOUND), Plausibility::Plausible { velocity: 1.0 });
-        let verdict = check.judge(0.2, 1e-3, BOUND);
+        judge(&mut check, 0.0, 1e-3);
+        let counted = Plausibility::Plausible { velocity: 1.0, meaning: Meaning::Counted };
+        assert_eq!(judge(&mut check, 0.1, 0.1), counted);
+        let verdict = judge(&mut check, 0.2, 1e-3);
         let Plausibility::Implausible { distance, reach } = verdict else { panic!("{verdict:?}") };
         assert!((distance - 0.1).abs() < 1e-12);
         assert!((reach - (4.0 * 2.0 * 1e-3 + 64.0 * 1e-6)).abs() < 1e-12);
         // Of two that agree the second tells the velocity.
-        let Plausibility::Plausible { velocity } = check.judge(0.201, 1e-3, BOUND) else { panic!() };
+        let Plausibility::Plausible { velocity, .. } = judge(&mut check, 0.201, 1e-3) else { panic!() };
         assert!((velocity - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_limits_say_what_a_report_means_that_does_not_follow_from_the_last_position() {
+        let meaning =
+            |check: &mut PlausibilityCheck, counted: f64, by_limits: f64, elapsed_s: f64| match check.judge(
+                counted,
+                || by_limits,
+                elapsed_s,
+                BOUND,
+            ) {
+                Plausibility::Plausible { meaning, .. } => Some(meaning),
+                Plausibility::Implausible { .. } => None,
+            };
+        let mut check = PlausibilityCheck::default();
+        assert_eq!(meaning(&mut check, 2_003.0, 3.0, 1e-3), Some(Meaning::ByLimits), "the first one");
+        assert_eq!(meaning(&mut check, 3.001, -1_997.0, 1e-3), Some(Meaning::Counted), "beyond the limits");
+        assert_eq!(meaning(&mut check, 3.5, -1_996.5, 1e-3), None, "out of reach");
+        assert_eq!(meaning(&mut check, 3.5, -1_996.5, 1e-3), Some(Meaning::ByLimits), "and again");
+        // After 200 s of silence, in which it can have moved by more than half a lap.
+        assert_eq!(meaning(&mut check, -1_996.5, 3.5, 200.0), None);
+        assert_eq!(meaning(&mut check, -1_996.5, 3.5, 300.0), Some(Meaning::ByLimits));
     }
 }

@@ -164,6 +164,7 @@ impl Axis {
     pub fn prepare_to_enable(&mut self, period_s: f64) {
         if self.shows_rest_without_torque()
             && !self.drive_state().is_faulted()
+            && self.is_position_commandable()
             && self.controlwords.is_disabled_for_long()
             && self.is_on_joint(period_s)
         {

@@ -9,6 +9,7 @@ use super::targets::{Rejection, check_profile_target, check_scales, check_target
 use crate::axis::Axis;
 use crate::control::ControlLaw;
 use crate::group_trajectory::Leg;
+use crate::guard::AxisLimits;
 use crate::phase::Phase;
 use crate::plan::{PlanError, State};
 use crate::profile::ProfileTarget;
@@ -30,7 +31,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             }
             Request::Enable => {
                 self.require_phase(&[Phase::Disabled])?;
-                self.require_no_fault()
+                self.require_no_fault()?;
+                self.require_commandable_positions()
             }
             Request::Move(_) if matches!(self.group.state, GroupState::InLoop(_)) => self.require_no_fault(),
             Request::Move(_) | Request::SetProfileTarget(_) => {
@@ -90,6 +92,19 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         match self.group.stop.filter(|stop| !stop.is_requested()) {
             Some(stop) => {
                 Err(Rejection { axis: stop.axis(), ..RejectReason::StopLatched { rule: stop.rule() }.into() })
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// No joint may be enabled beyond a wrap of its drive's position counter: the drive might go around the world to its set-point.
+    fn require_commandable_positions(&self) -> Handled {
+        match self.axes.iter().find(|axis| !axis.is_position_commandable()) {
+            Some(axis) => {
+                let position = axis.position();
+                let AxisLimits { position_min, position_max, .. } = axis.parameters().limits;
+                let limit = position.clamp(position_min, position_max);
+                Err(RejectReason::BeyondCounter { position, limit }.of_axis(axis.number()))
             }
             None => Ok(()),
         }

@@ -156,6 +156,7 @@ pub enum Deadline {
 ///         rated_torque: 31.0,
 ///     })
 ///     .unwrap(),
+///     counter: PositionCounter::default(),
 ///     limits: AxisLimits {
 ///         position_min: -3.0,
 ///         position_max: 3.0,

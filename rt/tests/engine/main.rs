@@ -24,6 +24,7 @@ mod node_axes;
 mod off_cycle_axes;
 mod one_group;
 mod overload;
+mod position_counter;
 mod power;
 mod profile_modes;
 mod reported_process_data;

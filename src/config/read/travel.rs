@@ -1,5 +1,7 @@
 //! How an axis moves, rotary or linear, and how its drive counts that.
 
+use takt_rt::PositionCounter;
+
 use super::machine::boolean;
 use super::section::Section;
 use crate::config::defaults;
@@ -51,6 +53,7 @@ pub fn counting(
         gear_ratio: gear_ratio.unwrap_or(Some(defaults::GEAR_RATIO))?,
         reversed,
         zero_counts: i32::try_from(zero_counts.unwrap_or(Some(0))?).ok()?,
+        counter: drive.map_or(PositionCounter::BITS_32, |drive| drive.counter),
     };
     let Some(entry) = position_at_zero_counts else { return Some(counting) };
     if zero_counts.is_some() {

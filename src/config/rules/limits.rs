@@ -1,5 +1,7 @@
 //! The limits of an axis, and the following error.
 
+use takt_rt::PositionCounter;
+
 use super::Fields;
 use crate::config::bounds::Bounds;
 use crate::config::model::{FollowingError, Limits};
@@ -47,13 +49,13 @@ pub fn position_range(
         spot.report_range(format!("a range of {}", q.position.show(high - low)), allowed);
         return false;
     }
-    fits_counts(spot, &[low, high].map(|position| counting.position(position)))
+    fits_counter(spot, counting.counter, &[low, high].map(|position| counting.position(position)))
 }
 
 pub fn velocity(spot: &Spot<'_>, velocity: f64, q: Quantities, counting: Option<&Counting>) -> Option<f64> {
     let velocity = spot.quantity(velocity, q.velocity, q.ranges.velocity)?;
     let counts = counting.map(|counting| velocity * counting.counts_per_unit());
-    fits_counts(spot, counts.as_slice()).then_some(velocity)
+    fits_counter(spot, PositionCounter::BITS_32, counts.as_slice()).then_some(velocity)
 }
 
 /// The count at which the joint is at 0, from the position that it has where the drive counts 0.
@@ -61,14 +63,16 @@ pub fn zero_counts(spot: &Spot<'_>, position_at_zero_counts: f64, counting: &Cou
     let position =
         spot.quantity(position_at_zero_counts, Quantities::of(counting.travel).position, Bounds::Finite)?;
     let counts = -(counting.position(position) - counting.position(0.0));
-    fits_counts(spot, &[counts]).then_some(counts.round() as i32)
+    fits_counter(spot, PositionCounter::BITS_32, &[counts]).then_some(counts.round() as i32)
 }
 
-/// A drive counts positions and speeds in 32 bits.
-fn fits_counts(spot: &Spot<'_>, counts: &[f64]) -> bool {
-    let beyond = counts.iter().find(|counts| counts.abs() > f64::from(i32::MAX));
+/// A drive counts speeds in 32 bits, and positions by its counter.
+fn fits_counter(spot: &Spot<'_>, counter: PositionCounter, counts: &[f64]) -> bool {
+    let (lowest, highest) = (counter.lowest(), counter.highest());
+    let range = f64::from(lowest)..=f64::from(highest);
+    let beyond = counts.iter().find(|counts| !range.contains(*counts));
     if let Some(&counts) = beyond {
-        spot.report(ProblemKind::BeyondCounts { key: spot.key.clone(), counts });
+        spot.report(ProblemKind::BeyondCounts { key: spot.key.clone(), counts, lowest, highest });
     }
     beyond.is_none()
 }

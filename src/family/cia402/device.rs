@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode};
+use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode, PositionCounter};
 
 use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
 use crate::canopen::object::{DataType, Object, ObjectAddress};
@@ -34,6 +34,8 @@ const PRODUCT: ObjectAddress = ObjectAddress::new(0x1018, 2);
 const SUPPORTED_MODES: ObjectAddress = ObjectAddress::new(0x6502, 0);
 const ENCODER_INCREMENTS: ObjectAddress = ObjectAddress::new(0x608F, 1);
 const ENCODER_REVOLUTIONS: ObjectAddress = ObjectAddress::new(0x608F, 2);
+const POSITION_RANGE_LOWEST: ObjectAddress = ObjectAddress::new(0x607B, 1);
+const POSITION_RANGE_HIGHEST: ObjectAddress = ObjectAddress::new(0x607B, 2);
 const FEED: ObjectAddress = ObjectAddress::new(0x6092, 1);
 const FEED_REVOLUTIONS: ObjectAddress = ObjectAddress::new(0x6092, 2);
 const VELOCITY_NUMERATOR: ObjectAddress = ObjectAddress::new(0x6096, 1);
@@ -175,6 +177,12 @@ impl Device {
         i64::try_from(value).ok()
     }
 
+    /// The counts that the drive reports as its position, where the data sheet bounds them (607B, position range limit).
+    fn position_counter(&self) -> Option<PositionCounter> {
+        let limit = |address| i32::try_from(self.number(address)?).ok();
+        PositionCounter::new(limit(POSITION_RANGE_LOWEST)?, limit(POSITION_RANGE_HIGHEST)?)
+    }
+
     fn ratio(&self, numerator: ObjectAddress, divisor: ObjectAddress) -> Option<f64> {
         let (numerator, divisor) = (self.number(numerator)?, self.number(divisor).unwrap_or(1));
         (numerator > 0 && divisor > 0).then(|| numerator as f64 / divisor as f64)
@@ -289,6 +297,7 @@ impl Device {
                 revision: None,
             },
             counts_per_turn: self.counts_per_turn(),
+            counter: self.position_counter().unwrap_or(standard.counter),
             velocity_unit: self.velocity_unit(),
             profile_velocity_unit: self.unit_by_quirks(PROFILE_VELOCITY.address.index),
             acceleration_unit: self.unit_by_quirks(PROFILE_ACCELERATION.address.index),

@@ -90,6 +90,10 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "{0} is {1} from its set-point (allowed: {2}), and would be pulled there",
         "{0} 偏离设定值 {1}（允许：{2}），使能后会被拉过去",
     ),
+    (
+        "{0} is at {1}, where the count of its drive may have wrapped: turn it by hand to its limit of {2}",
+        "{0} 位于 {1}，其驱动器的计数可能已回绕：请手动将其转到限值 {2}",
+    ),
     ("another trajectory is already to take the place of the present one", "已有另一条轨迹等待接替当前轨迹"),
     // Rules, by the keys that they have in reports.
     ("not_finite", "设定值不是有限数"),

@@ -135,6 +135,9 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         RejectReason::OffSetPoint { distance, limit } => format!(
             "{axis} is {distance:.6} {length} from its set-point (allowed: {limit:.6} {length}), and would be pulled there"
         ),
+        RejectReason::BeyondCounter { position, limit } => format!(
+            "{axis} is at {position:.4} {length}, where the count of its drive may have wrapped: turn it by hand to its limit of {limit:.4} {length}"
+        ),
         RejectReason::SuccessorPending => {
             "another trajectory is already to take the place of the present one".to_owned()
         }

@@ -9,7 +9,7 @@ use takt_rt::{
     AxisLimits, AxisParameters, BitSet, BusHealth, BusParameters, CanopenNetwork, Cia402Codec, CommandPdo,
     Exchange, Pdos,
     ControlLaw, CycleInput, CycleTiming, Deadline, Engine, EngineParameters, FeedForward, FeedbackSince,
-    Follow, Frame, HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, Received, Request,
+    Follow, Frame, HostInterface, Id, MappedObject, Mapping, ModeChanges, Pdo, Phase, PositionCounter, Received, Request,
     RequestEnvelope, RequestId, RequestTarget, Scale, ScaleParameters, SendBatch, StopCategories,
     Supervision, TimingLadder, TorqueLimits,
 };
@@ -78,6 +78,7 @@ fn axis() -> Option<AxisParameters> {
         law: ControlLaw::Position,
         mode_changes: ModeChanges::default(),
         scale: Scale::new(scale).ok()?,
+        counter: PositionCounter::default(),
         limits: AxisLimits {
             position_min: -3.0,
             position_max: 3.0,
