@@ -136,7 +136,28 @@ pub struct StopReason {
     pub phase: Phase,
 }
 
+/// What two stops of one group make together.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct MergedStop {
+    /// The reason and the category of both.
+    pub(crate) reason: StopReason,
+    /// Whether the second one is the reason.
+    pub(crate) is_new_reason: bool,
+    /// Whether the second one asks for a harder category than the first one.
+    pub(crate) is_harder: bool,
+}
+
 impl StopReason {
+    /// Merges a stop with the present one of its group. The cause of the higher rank is the reason, the first one of the same rank, and
+    /// the harder category counts.
+    pub(crate) fn merged(present: Option<Self>, begun: Self) -> MergedStop {
+        let is_new_reason = present.is_none_or(|present| present.cause.rank() < begun.cause.rank());
+        let is_harder = present.is_none_or(|present| begun.category < present.category);
+        let category = present.map_or(begun.category, |present| present.category.min(begun.category));
+        let reason = present.filter(|_| !is_new_reason).unwrap_or(begun);
+        MergedStop { reason: Self { category, ..reason }, is_new_reason, is_harder }
+    }
+
     /// The axis concerned; `None` when it was not one axis.
     pub const fn axis(&self) -> Option<u8> {
         self.origin.axis()
@@ -150,5 +171,64 @@ impl StopReason {
     /// Whether the stop was asked for: then nothing has to be reset.
     pub const fn is_requested(&self) -> bool {
         matches!(self.cause, StopCause::Requested)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cia402::DriveState;
+
+    const REQUESTED: StopCause = StopCause::Requested;
+    const FAULT: StopCause = StopCause::Fault(Fault::BusLost);
+    const UNRELEASED: StopCause =
+        StopCause::Fault(Fault::DriveEnabled { state: DriveState::OperationEnabled });
+    const CATEGORIES: [StopCategory; 3] = [StopCategory::Zero, StopCategory::One, StopCategory::Two];
+
+    fn stop(cause: StopCause, category: StopCategory, slot: u64) -> StopReason {
+        StopReason { category, cause, origin: Origin::Group, slot, phase: Phase::Moving }
+    }
+
+    #[test]
+    fn a_stop_without_another_one_is_the_reason() {
+        for cause in [REQUESTED, FAULT, UNRELEASED] {
+            for category in CATEGORIES {
+                let begun = stop(cause, category, 2);
+                let expected = MergedStop { reason: begun, is_new_reason: true, is_harder: true };
+                assert_eq!(StopReason::merged(None, begun), expected);
+            }
+        }
+    }
+
+    #[test]
+    fn of_two_stops_the_table_says_which_one_is_the_reason() {
+        // The present cause, the second one, and whether that becomes the reason.
+        let table = [
+            (REQUESTED, REQUESTED, false),
+            (REQUESTED, FAULT, true),
+            (REQUESTED, UNRELEASED, true),
+            (FAULT, REQUESTED, false),
+            (FAULT, FAULT, false),
+            (FAULT, UNRELEASED, true),
+            (UNRELEASED, REQUESTED, false),
+            (UNRELEASED, FAULT, false),
+            (UNRELEASED, UNRELEASED, false),
+        ];
+        for (first, second, is_new_reason) in table {
+            for first_category in CATEGORIES {
+                for second_category in CATEGORIES {
+                    let (present, begun) = (stop(first, first_category, 1), stop(second, second_category, 2));
+                    let merged = StopReason::merged(Some(present), begun);
+                    let reason = if is_new_reason { begun } else { present };
+                    let category = first_category.min(second_category);
+                    let expected = MergedStop {
+                        reason: StopReason { category, ..reason },
+                        is_new_reason,
+                        is_harder: second_category < first_category,
+                    };
+                    assert_eq!(merged, expected, "{present:?}, {begun:?}");
+                }
+            }
+        }
     }
 }

@@ -11,7 +11,7 @@ use crate::motion_reports::MotionState;
 use crate::plan::{PlanError, State};
 use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
-use crate::stop::{CauseRank, Origin, StopCause, StopReason};
+use crate::stop::{CauseRank, MergedStop, Origin, StopCause, StopReason};
 use crate::stop_category::StopCategory;
 use crate::watch::{NodeFault, TimingLevel};
 
@@ -28,13 +28,11 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
     }
 
-    /// Stops the groups that stop with one that does, for the same reason, and those that stop with these. A stop that begins in
-    /// the step of a cycle stops the others in the next one.
+    /// Stops the groups that stop with one that does, for the same reason. A stop that begins in the step of a cycle stops the others
+    /// in the next one.
     pub(super) fn couple_stops(&mut self) {
-        if self.groups.iter().all(|group| group.untold.is_none()) {
-            return;
-        }
-        for _ in 0..self.groups.len() {
+        // A group that must stop harder than the one with which it stops makes others harder: there are three categories.
+        while self.groups.iter().any(|group| group.untold.is_some()) {
             for number in 0..self.groups.len() as u8 {
                 let untold = self.groups.get_mut(usize::from(number)).and_then(|group| group.untold.take());
                 if let Some(stop) = untold {
@@ -47,7 +45,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     fn stop_coupled(&mut self, with: u8, stop: &StopReason) {
         self.for_each_group(|group| {
             if group.group.stops_with.contains(&with) && group.group.state.has_power() {
-                group.begin_stop(stop.cause, stop.origin, stop.category);
+                group.begin_coupled_stop(stop);
             }
         });
     }
@@ -190,32 +188,48 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Begins a stop. The first fault stays the reason, and a later one can only make the stop harder. That somebody asked
     /// for the stop is no fault: the first one that comes up before that stop is over takes its place, and must be reset. A drive that
     /// does not give up its power takes the place of the fault that the group has stopped for.
+    ///
+    /// The groups that stop with this one are told of each stop, whatever this one has stopped for: they may have been enabled since.
     pub(super) fn begin_stop(&mut self, cause: StopCause, origin: Origin, category: StopCategory) {
-        let wanted = self.possible(category);
+        let begun = self.begun(cause, origin, self.possible(category));
+        let category = self.take_stop(begun);
+        self.group.note_untold(StopReason { category, ..begun });
+    }
+
+    /// Begins the stop of another group, with which this one stops. The groups that stop with this one know of it, unless it is harder
+    /// here.
+    fn begin_coupled_stop(&mut self, stop: &StopReason) {
+        let begun = self.begun(stop.cause, stop.origin, self.possible(stop.category));
+        let category = self.take_stop(begun);
+        if category < stop.category {
+            self.group.note_untold(StopReason { category, ..begun });
+        }
+    }
+
+    fn begun(&self, cause: StopCause, origin: Origin, category: StopCategory) -> StopReason {
         let (slot, phase) = (self.shared.present_slot(), self.group.state.phase());
+        StopReason { category, cause, origin, slot, phase }
+    }
+
+    /// Takes a stop beside the present one. Returns the category of both.
+    fn take_stop(&mut self, begun: StopReason) -> StopCategory {
         let is_under_way = matches!(self.group.state, GroupState::Stopping | GroupState::Disabling(_));
+        // What was asked for counts no more when it is done.
         let present = self.group.stop.filter(|present| is_under_way || !present.is_requested());
-        let hardest = present.map_or(wanted, |present| present.category.min(wanted));
-        let kept = present.filter(|present| present.cause.rank() >= cause.rank());
-        let begun = StopReason { category: hardest, cause, origin, slot, phase };
-        let reason = kept.map_or(begun, |kept| StopReason { category: hardest, ..kept });
+        let MergedStop { reason, is_new_reason, is_harder } = StopReason::merged(present, begun);
         self.group.stop = Some(reason);
-        if kept.is_none() {
-            if cause != StopCause::Requested {
+        if is_new_reason {
+            if !begun.is_requested() {
                 // A reset that is under way is not for this fault.
                 self.group.fault_reset_cycles = 0;
             }
             self.emit(EventKind::Stop(reason));
             self.shared.snapshot.motions.end_all(self.group.number, MotionState::Stopped(reason), |_| {});
         }
-        let is_harder = present.is_none_or(|present| wanted < present.category);
-        if is_harder || kept.is_none() {
-            // What is new, not what is kept: a group may have reset the fault that this one still stops for.
-            self.group.note_untold(begun);
-        }
         if is_harder {
-            self.carry_out(wanted);
+            self.carry_out(begun.category);
         }
+        reason.category
     }
 
     /// A joint in profile torque cannot be held where it is: its drive closes no position loop. It stops by the drive's

@@ -22,7 +22,7 @@ use crate::time::Nanoseconds;
 pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     /// Its number.
     pub(super) number: u8,
-    /// The groups that stop this one, too, when they stop, by their numbers.
+    /// The groups that stop this one, too, when they stop, directly or by way of others, by their numbers.
     pub(super) stops_with: ArrayVec<u8, MAX_GROUPS>,
     /// Where its axes stand among those of the engine, which has them beside each other.
     pub(super) places: Places,
@@ -51,7 +51,7 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) unsent: UnsentSteps<BUSES>,
     /// Cycles in which its set-points went on.
     pub(super) steps: u64,
-    /// What the groups that stop with this one do not know yet: a stop that has begun, or has become harder.
+    /// What the groups that stop with this one do not know yet.
     pub(super) untold: Option<StopReason>,
 }
 
@@ -113,13 +113,9 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         };
     }
 
-    /// Keeps a stop for the groups that stop with this one. Of several in one cycle the hardest category counts, and a fault
-    /// before what was asked for: a group without power begins each of them anew.
+    /// Keeps a stop for the groups that stop with this one.
     pub(super) fn note_untold(&mut self, stop: StopReason) {
-        let hardest = self.untold.map_or(stop.category, |untold| untold.category.min(stop.category));
-        let kept = self.untold.filter(|untold| untold.cause.rank() >= stop.cause.rank());
-        let reason = kept.unwrap_or(stop);
-        self.untold = Some(StopReason { category: hardest, ..reason });
+        self.untold = Some(StopReason::merged(self.untold, stop).reason);
     }
 
     /// Ends the cycle, whose commands have left, or were ready too late.

@@ -259,8 +259,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             group.set_point_buses = parameters.set_point_buses_of(&axes);
             groups.push(group);
         }
-        for (group, own) in groups.iter_mut().zip(&parameters.groups) {
-            group.stops_with = own.stops_with.clone();
+        for (number, group) in (0..).zip(&mut groups) {
+            group.stops_with = parameters.stops_with(number);
         }
         Ok(Self {
             dispatch: dispatch_of(&parameters)?,

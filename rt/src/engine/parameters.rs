@@ -339,6 +339,24 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         self.groups.iter().map(|group| group.axes.clone()).chain(all)
     }
 
+    /// The groups that stop a group, too, when they stop, directly or by way of others.
+    pub(super) fn stops_with(&self, group: u8) -> ArrayVec<u8, MAX_GROUPS> {
+        let direct = |group: u8| self.groups.get(usize::from(group)).map(|own| own.stops_with.as_slice());
+        let mut all: ArrayVec<u8, MAX_GROUPS> = ArrayVec::new();
+        let mut next = Some(group);
+        let mut followed = 0;
+        while let Some(of) = next {
+            for with in direct(of).unwrap_or_default() {
+                if *with != group && !all.contains(with) {
+                    let _ = all.try_push(*with);
+                }
+            }
+            next = all.get(followed).copied();
+            followed += 1;
+        }
+        all
+    }
+
     fn is_canopen(&self, bus: u8) -> bool {
         self.buses.get(usize::from(bus)).is_some_and(|bus| bus.canopen.is_some())
     }

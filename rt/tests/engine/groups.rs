@@ -236,6 +236,87 @@ fn a_stop_that_is_asked_to_be_harder_does_not_bring_back_a_fault_that_another_gr
     rig.assert_limits_kept();
 }
 
+/// Group 1 has stopped with group 0, and is enabled again and moves while that still brakes.
+fn enabled_beside_a_braking_group(mut parameters: EngineParameters) -> Rig {
+    for axis in &mut parameters.axes[..2] {
+        axis.limits.deceleration = 0.5;
+    }
+    let mut rig = enabled(parameters);
+    ask(&mut rig, 0, Request::Move(move_to(2.0)));
+    rig.run(300);
+    ask(&mut rig, 0, Request::Stop(StopCategory::One));
+    run_until(&mut rig, 1, Phase::Disabled, 300);
+    ask(&mut rig, 1, Request::Enable);
+    run_until(&mut rig, 1, Phase::Holding, 200);
+    ask(&mut rig, 1, Request::Move(move_to(2.0)));
+    rig.run(50);
+    assert_eq!([0, 1].map(|group| rig.phase_of(group)), [Phase::Stopping, Phase::Moving]);
+    rig
+}
+
+#[test]
+fn a_second_stop_of_a_group_that_still_brakes_reaches_the_groups_that_stop_with_it() {
+    for second in [StopCategory::Two, StopCategory::One, StopCategory::Zero] {
+        // Directly, and by way of a group that has nothing to stop.
+        for is_direct in [true, false] {
+            let mut parameters = three();
+            if is_direct {
+                parameters.groups[1].stops_with.push(0);
+            } else {
+                parameters.groups[1].stops_with.push(2);
+                parameters.groups[2].stops_with.push(0);
+            }
+            let mut rig = enabled_beside_a_braking_group(parameters);
+            ask(&mut rig, 0, Request::Stop(second));
+            let stop = rig.host.snapshot.groups()[1].stop.unwrap();
+            assert_eq!((stop.rule(), stop.category), (Rule::Requested, second.min(StopCategory::One)));
+            run_until(&mut rig, 1, Phase::Disabled, 2_000);
+            rig.assert_limits_kept();
+        }
+    }
+}
+
+#[test]
+fn a_second_fault_of_a_group_that_still_brakes_reaches_the_groups_that_stop_with_it() {
+    let mut parameters = three();
+    parameters.groups[1].stops_with.push(0);
+    for axis in &mut parameters.axes[..2] {
+        axis.limits.deceleration = 0.5;
+    }
+    let mut rig = enabled(parameters);
+    ask(&mut rig, 0, Request::Move(move_to(2.0)));
+    rig.run(300);
+    // It is a fault in one cycle.
+    rig.buses[0].inject(Frame::of(Id::canopen(0x080, 0), []));
+    run_until(&mut rig, 1, Phase::Disabled, 300);
+    ask(&mut rig, 1, Request::ResetFaults);
+    ask(&mut rig, 1, Request::Enable);
+    run_until(&mut rig, 1, Phase::Holding, 200);
+    rig.run(20);
+    assert_eq!([0, 1].map(|group| rig.phase_of(group)), [Phase::Stopping, Phase::Holding]);
+    rig.drive(1).state = DriveState::Fault;
+    rig.run(3);
+    let stop = rig.host.snapshot.groups()[1].stop.unwrap();
+    assert_eq!((stop.rule(), stop.axis()), (Rule::DriveFault, Some(1)));
+    run_until(&mut rig, 1, Phase::Disabled, 300);
+}
+
+#[test]
+fn groups_that_stop_with_each_other_stop_once_for_each_stop() {
+    let mut parameters = three();
+    parameters.groups[0].stops_with.push(1);
+    parameters.groups[1].stops_with.push(0);
+    let mut rig = enabled(parameters);
+    for stops_before in [0, 2] {
+        ask(&mut rig, 0, Request::Stop(StopCategory::Two));
+        rig.run(50);
+        let expected = [0, 1].map(|group| (group, Rule::Requested));
+        assert_eq!(stops(&rig)[stops_before..], expected);
+        (0..2).for_each(|group| ask(&mut rig, group, Request::Move(move_to(1.0))));
+        (0..2).for_each(|group| run_until(&mut rig, group, Phase::Holding, 3_000));
+    }
+}
+
 #[test]
 fn a_coupling_has_one_direction() {
     let mut parameters = three();
