@@ -22,9 +22,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Lets every group look for what is wrong.
     pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
         self.for_each_group(|group| group.check_faults(buses));
-        // While no drive has power it stays, until a group is enabled.
-        if self.shared.foreign_frame.is_some() && self.groups.iter().any(|group| group.state.has_power()) {
-            self.shared.foreign_frame = None;
+        // While no drive has power they stay, until a group is enabled.
+        if !self.shared.foreign_frames.is_empty() && self.groups.iter().any(|group| group.state.has_power()) {
+            self.shared.foreign_frames.forget();
         }
     }
 
@@ -98,9 +98,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             };
             self.fail(Origin::Bus(bus as u8), fault);
         }
-        if let Some((bus, id)) = self.shared.foreign_frame.filter(|(bus, _)| own.contains(usize::from(*bus)))
-        {
-            self.fail(Origin::Bus(bus), Fault::ForeignMaster { id });
+        if !self.shared.foreign_frames.is_empty() {
+            for (bus, id) in self.shared.foreign_frames.on(own) {
+                self.fail(Origin::Bus(bus), Fault::ForeignMaster { id });
+            }
         }
     }
 

@@ -24,6 +24,7 @@ mod checkpoint;
 mod encode;
 mod executing;
 mod faults;
+mod foreign_frames;
 mod group;
 mod group_requests;
 mod guarding;

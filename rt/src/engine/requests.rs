@@ -115,7 +115,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Forgets what was observed while nothing could move.
     fn forget_observations(&mut self) {
-        self.shared.foreign_frame = None;
+        self.shared.foreign_frames.forget();
         self.shared.slots.forgive();
         if let Some(level) = self.shared.slots.changed_level() {
             self.shared.emit(None, EventKind::Timing { level });

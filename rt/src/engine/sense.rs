@@ -51,7 +51,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 }
             }
             Destination::Foreign => {
-                self.shared.foreign_frame.get_or_insert((bus as u8, received.frame.id()));
+                self.shared.foreign_frames.note(bus, received.frame.id());
                 self.receive_foreign_nmt(bus, &received.frame);
             }
             Destination::Service => self.receive_sdo_response(bus, &received.frame),

@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::backlog::Backlog;
+use super::foreign_frames::ForeignFrames;
 use super::guarding::NodeGuards;
 use super::heartbeat::HeartbeatProducer;
 use super::outbox::Outbox;
@@ -11,7 +12,6 @@ use super::slots::SlotWatch;
 use super::{Deadline, has_cycle};
 use crate::axis::{Axis, Exchange};
 use crate::bit_set::BitSet;
-use crate::frame::Id;
 use crate::host::Snapshot;
 use crate::record::{CycleRecord, Event, EventKind};
 use crate::source::AxisTarget;
@@ -48,8 +48,8 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) asked_by_sync: BitSet,
     /// The buses with drives that are stopped by SDO in this slot.
     pub(super) stopped_by_sdo: BitSet,
-    /// The bus and the identifier of a frame that only this controller may send.
-    pub(super) foreign_frame: Option<(u8, Id)>,
+    /// Frames that only this controller may send.
+    pub(super) foreign_frames: ForeignFrames<BUSES>,
     pub(super) heartbeat: Option<HeartbeatProducer<BUSES>>,
     /// The nodes that are asked for their state.
     pub(super) guards: NodeGuards<AXES>,
@@ -119,7 +119,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             skip_sync: BitSet::default(),
             asked_by_sync: BitSet::default(),
             stopped_by_sdo: BitSet::default(),
-            foreign_frame: None,
+            foreign_frames: ForeignFrames::default(),
             heartbeat: parameters.heartbeat.map(heartbeat),
             guards,
             time: parameters.time_cycles.map(TimeProducer::new),

@@ -318,6 +318,21 @@ fn groups_that_stop_with_each_other_stop_once_for_each_stop() {
 }
 
 #[test]
+fn another_master_on_a_bus_without_power_does_not_hide_one_on_another_bus() {
+    let mut rig = enabled(three());
+    for group in [0, 2] {
+        ask(&mut rig, group, Request::Disable);
+        run_until(&mut rig, group, Phase::Disabled, 300);
+    }
+    for bus in [0, 1] {
+        rig.buses[bus].inject(Frame::of(Id::canopen(0x080, 0), []));
+    }
+    rig.run(2);
+    assert_eq!(stops(&rig), [(1, Rule::ForeignMaster)]);
+    assert_eq!(rig.stops()[0].origin, Origin::Bus(1));
+}
+
+#[test]
 fn a_coupling_has_one_direction() {
     let mut parameters = three();
     parameters.groups[1].stops_with.push(0);
