@@ -9,9 +9,9 @@ use crate::time::Nanoseconds;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Fault {
-    /// A set-point was not a finite number.
+    /// A set-point, or the torque that is made of it here, was not a finite number.
     NotFinite {
-        /// The position of the set-point.
+        /// The position of the set-point; NaN for a torque.
         position: f64,
     },
     /// A set-point lay outside the position limits; in a profile mode, the place where the joint would come to rest.

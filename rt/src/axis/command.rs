@@ -45,6 +45,12 @@ impl Axis {
         self.command.set(CommandSlot::TorqueOffset, 0);
     }
 
+    /// Whether the torque that was to be commanded was not a number.
+    #[inline]
+    pub(crate) fn is_torque_undefined(&self) -> bool {
+        self.torque_loop.is_undefined()
+    }
+
     /// Sends the set-point that is due. A drive that follows positions gets no longer way than that of one cycle of its bus.
     #[inline]
     fn send_set_point(&mut self, is_enabled: bool) {

@@ -18,6 +18,8 @@ pub(super) struct TorqueLoop {
     torque: f64,
     /// Whether the set-point has begun anew since: the torque goes on from where it was.
     is_resumed: bool,
+    /// Whether what was to be the last command was not a number.
+    is_undefined: bool,
 }
 
 impl TorqueLoop {
@@ -42,7 +44,7 @@ impl TorqueLoop {
     /// The loop begins to drive a joint that stands, with a torque that is fed forward from the first command on.
     pub(super) fn begin_holding(&mut self, torque: f64) {
         let demand = TorqueDemand::Law { torque };
-        *self = Self { demand, commanded: demand, offset: 0.0, torque, is_resumed: false };
+        *self = Self { demand, commanded: demand, torque, ..Self::default() };
     }
 
     /// The set-point begins anew: whatever the loop makes of that, the torque goes on from where it was.
@@ -50,7 +52,13 @@ impl TorqueLoop {
         self.is_resumed = true;
     }
 
-    /// The torque of the next command, of at most `limit`. Of the offset `fade` goes away.
+    /// Whether what the last command was made of gave no number: gains so large that their products are infinite.
+    pub(super) const fn is_undefined(&self) -> bool {
+        self.is_undefined
+    }
+
+    /// The torque of the next command, of at most `limit`. Of the offset `fade` goes away. Where it would not be a number, it stays as
+    /// it was, and goes on from there.
     pub(super) fn next(&mut self, law: &ControlLaw, input: &LoopInput, limit: f64, fade: f64) -> f64 {
         let wanted = law.torque(input, &self.demand);
         if self.is_resumed {
@@ -62,7 +70,13 @@ impl TorqueLoop {
         }
         self.commanded = self.demand;
         self.offset -= self.offset.clamp(-fade, fade);
-        self.torque = (wanted + self.offset).clamp(-limit, limit);
+        let torque = (wanted + self.offset).clamp(-limit, limit);
+        self.is_undefined = torque.is_nan();
+        if self.is_undefined {
+            self.resume();
+        } else {
+            self.torque = torque;
+        }
         self.torque
     }
 }

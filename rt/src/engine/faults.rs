@@ -419,6 +419,9 @@ impl Expectation {
         if self.is_disabled(axis) {
             return Some(Fault::DriveDisabled { statusword: axis.statusword() });
         }
+        if axis.is_torque_undefined() {
+            return Some(Fault::NotFinite { position: f64::NAN });
+        }
         if axis.is_local() {
             return Some(Fault::DriveLocal { statusword: axis.statusword() });
         }

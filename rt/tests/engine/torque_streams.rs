@@ -4,8 +4,8 @@ use crate::fixture::{FRICTION, INERTIA, LIMITS, PERIOD_S, Rig, axis_in, paramete
 use proptest::prelude::*;
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisTarget, ControlLaw, Fault, MAX_AXES, OperationMode, Phase, Request, Rule, StopCategory, StopCause,
-    StreamState, StreamWish, TorqueLimits,
+    AxisTarget, ControlLaw, DriveState, Fault, MAX_AXES, OperationMode, Phase, Request, Rule, StopCategory,
+    StopCause, StreamState, StreamWish, TorqueLimits,
 };
 
 /// N·m/s
@@ -279,6 +279,32 @@ fn a_stream_of_an_impedance_that_runs_dry_stays_soft() {
     rig.run(3_000);
     assert_eq!(causes(&rig), []);
     assert!((position(&rig) - 0.2).abs() < 0.005);
+}
+
+#[test]
+fn gains_whose_products_are_not_numbers_are_a_stop_and_the_torque_stays_as_it_was() {
+    let mut parameters = parameters(1);
+    parameters.axes[0] = axis_in(LAW, 0, 1);
+    parameters.axes[0].torque_limits = TorqueLimits::NONE;
+    let mut rig = Rig::of(parameters).enable();
+    rig.run(200);
+    rig.request(Request::Stream);
+    rig.drive(0).load = -5.0;
+    let state = State::rest(position(&rig));
+    let mild = AxisTarget::Impedance { state, stiffness: 400.0, damping: 5.0, torque: 10.0 };
+    rig.stream_target(mild);
+    rig.run(20);
+    // Its position has noise, of 1.5 rad/s from one report to the next.
+    let here = rig.drive(0).position;
+    let noise = [125, 0, 125, 0, 125].map(|counts| (DriveState::OperationEnabled, here + counts));
+    rig.drive(0).lies.extend(noise);
+    rig.stream_target(AxisTarget::Impedance { state, stiffness: f64::MAX, damping: f64::MAX, torque: 10.0 });
+    rig.run(5);
+    let [StopCause::Fault(Fault::NotFinite { .. })] = causes(&rig)[..] else { panic!("{:?}", rig.stops()) };
+    rig.run_until(Phase::Holding, 2_000);
+    let torques = || rig.host.records.iter().map(|record| f64::from(record.axes[0].torque_set));
+    assert!(torques().all(|torque| torque.abs() <= LIMITS.torque));
+    assert!((torques().last().unwrap() - 5.0).abs() < 2.0, "the load is held: {:?}", torques().last());
 }
 
 #[test]
