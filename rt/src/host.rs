@@ -31,12 +31,18 @@ pub trait HostInterface<const AXES: usize = MAX_AXES, const BUSES: usize = MAX_B
         None
     }
 
-    /// A stream of a group was asked for, and begins: what was streamed before is over.
+    /// A stream of a group was asked for, and begins: it takes points from now on, and begins without any.
     fn begin_stream(&mut self, _group: u8) {}
 
     /// Writes what the stream of a group wants in the slot that begins at this time. Asked for once in each slot in which the group
     /// streams, and in no other. [`crate::LookAhead`] makes it of points. `sample` is what was written in the slot before.
     fn stream(&mut self, _group: u8, _slot_start_ns: Nanoseconds, _sample: &mut StreamSample<AXES>) {}
+
+    /// Called at the end of each cycle for each group that does not stream: takes no points for its stream from now on, and discards
+    /// those that wait. Returns how many these were.
+    fn discard_points(&mut self, _group: u8) -> u64 {
+        0
+    }
 
     /// What a trajectory wants of a group so many seconds after its beginning. Asked for once in each cycle in which the group is
     /// on it, and when a [`Request::Execute`](crate::Request::Execute) is handled. `None` if there is no such trajectory, or it is

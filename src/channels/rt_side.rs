@@ -3,7 +3,7 @@
 use takt_rt::{
     AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackReturn, CheckpointError, CycleRecord, Event,
     Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport, Received, RequestEnvelope, Snapshot,
-    StreamSample, TrajectoryId, TrajectorySample,
+    StreamPoint, StreamSample, TrajectoryId, TrajectorySample,
 };
 
 use super::callbacks::{CallbackClock, CallbackTaker};
@@ -61,6 +61,13 @@ impl RtSide {
         self.streams.iter_mut().zip(checkpoints).try_for_each(|(stream, state)| stream.resume(state))
     }
 
+    /// Takes a point of a stream as one that a client has pushed, for a replay.
+    pub fn insert_point(&mut self, group: u8, point: &StreamPoint, slot_start_ns: Nanoseconds) {
+        if let Some(stream) = self.streams.get_mut(usize::from(group)) {
+            stream.insert(point, slot_start_ns);
+        }
+    }
+
     /// From now on the calls of callbacks are measured so.
     pub fn measure_callbacks_by(&mut self, clock: CallbackClock) {
         self.callbacks.measure_by(clock);
@@ -89,6 +96,10 @@ impl HostInterface for RtSide {
         if let Some(stream) = self.streams.get_mut(usize::from(group)) {
             stream.begin();
         }
+    }
+
+    fn discard_points(&mut self, group: u8) -> u64 {
+        self.streams.get_mut(usize::from(group)).map_or(0, StreamReceiver::discard)
     }
 
     fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds, sample: &mut StreamSample) {

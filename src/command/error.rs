@@ -230,8 +230,11 @@ pub enum StreamError {
         /// Why.
         reason: PointRefusal,
     },
-    /// Too many points wait: the group does not stream, or gets more than it can look ahead.
-    #[error("too many points wait for the controller: does it stream?")]
+    /// No stream takes the points: none has begun, or a stop has ended it.
+    #[error("no stream is running: begin one first; every stop ends it")]
+    NotStreaming,
+    /// Too many points wait: the stream gets more than it can look ahead.
+    #[error("too many points wait for the controller")]
     Full,
     /// This client of another process may not command now.
     #[error(transparent)]

@@ -5,17 +5,16 @@ use std::collections::{HashMap, VecDeque};
 use takt_rt::{
     AxisSnapshot, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CheckpointError,
     CycleRecord, Event, Frame, HostInterface, MAX_AXES, Nanoseconds, OffCycleReport, RequestEnvelope,
-    StreamSample, TrajectoryId, TrajectorySample,
+    StreamPoint, StreamSample, TrajectoryId, TrajectorySample,
 };
 
 use super::pop_front_if;
-use crate::channels::{ChannelSizes, GivenTrajectory, HostInput, HostSide, JournalEntry, RtSide, channels};
+use crate::channels::{ChannelSizes, GivenTrajectory, HostInput, JournalEntry, RtSide, channels};
 
 /// A host that gives what it gave, cycle by cycle.
 pub struct ReplayHost {
-    /// The streams are those of every run: points wait, are looked ahead, and become set-points.
+    /// The streams are those of every run: points are looked ahead, and become set-points.
     rt: RtSide,
-    host: HostSide,
     entries: VecDeque<JournalEntry>,
     trajectories: HashMap<TrajectoryId, (u8, GivenTrajectory)>,
     now: Inputs,
@@ -31,6 +30,8 @@ pub struct ReplayHost {
 struct Inputs {
     requests: VecDeque<RequestEnvelope>,
     reports: VecDeque<(u8, OffCycleReport)>,
+    /// Of all groups, in the order in which they were taken.
+    points: Vec<(u8, Box<StreamPoint>)>,
     service_frames: VecDeque<(usize, Frame)>,
     callbacks_taken: VecDeque<bool>,
     calls: VecDeque<(CallbackReturn, Box<[Option<AxisTarget>; MAX_AXES]>)>,
@@ -39,10 +40,9 @@ struct Inputs {
 impl ReplayHost {
     /// A host that has nothing to give yet, for a controller with such channels.
     pub fn new(sizes: &ChannelSizes) -> Self {
-        let (rt, host, _log) = channels(sizes);
+        let (rt, _host, _log) = channels(sizes);
         Self {
             rt,
-            host,
             entries: VecDeque::new(),
             trajectories: HashMap::new(),
             now: Inputs::default(),
@@ -101,8 +101,7 @@ impl ReplayHost {
             match input {
                 HostInput::Request(request) => self.now.requests.push_back(request),
                 HostInput::OffCycleReport { axis, report } => self.now.reports.push_back((axis, report)),
-                // A stream that takes no points any more has no room after some time.
-                HostInput::Point { group, point } => drop(self.host.streamer().push_to(group, &[point])),
+                HostInput::Point { group, point } => self.now.points.push((group, Box::new(point))),
                 HostInput::CallbackTaken { is_there } => self.now.callbacks_taken.push_back(is_there),
                 HostInput::Called { returned, targets } => {
                     self.now.calls.push_back((returned, Box::new(targets)))
@@ -130,6 +129,9 @@ impl HostInterface for ReplayHost {
     }
 
     fn stream(&mut self, group: u8, slot_start_ns: Nanoseconds, sample: &mut StreamSample) {
+        for (_, point) in self.now.points.iter().filter(|(of_group, _)| *of_group == group) {
+            self.rt.insert_point(group, point, slot_start_ns);
+        }
         self.rt.stream(group, slot_start_ns, sample);
     }
 

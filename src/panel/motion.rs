@@ -6,7 +6,7 @@ use takt_rt::{AxisPoint, Nanoseconds, OperationMode, Phase, RequestId, RequestTa
 
 use super::command::{CommandRefusal, Quantity, not_refused};
 use super::pages::PageNumber;
-use crate::command::{MotionError, MotionId, MoveOptions, RunningController};
+use crate::command::{MotionError, MotionId, MoveOptions, RunningController, StreamError};
 
 /// The real-time thread stops a drive in a profile mode whose value is not renewed for so long.
 const VALID_FOR: Duration = Duration::from_millis(300);
@@ -197,6 +197,8 @@ impl Route {
         }
         match self.send(controller, target, axis, value) {
             Ok(()) => Step::GoesOn,
+            // A stop has ended the stream.
+            Err(CommandRefusal::Stream(StreamError::NotStreaming)) => Step::Over,
             Err(error) => Step::Failed(error),
         }
     }

@@ -16,7 +16,7 @@ use crate::telemetry::{LOOP_TIMING_WORDS, Machine};
 /// `takt mem`, as bytes.
 pub const MAGIC: u64 = u64::from_ne_bytes(*b"takt mem");
 /// Counts changes of the memory, the packets and their meaning. Both sides must have the same.
-pub const VERSION: u64 = 3;
+pub const VERSION: u64 = 4;
 
 /// Events that an observer can be behind, and one that is being written.
 const EVENT_SLOTS: u64 = 1024 + 1;

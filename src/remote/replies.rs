@@ -275,6 +275,9 @@ fn put_stream_error(error: &StreamError, put: &mut Put) {
         StreamError::Ended => {
             put.word(6);
         }
+        StreamError::NotStreaming => {
+            put.word(7);
+        }
     }
 }
 
@@ -290,6 +293,7 @@ fn take_stream_error(take: &mut Take<'_>) -> Result<StreamError, Malformed> {
         4 => StreamError::Lease(take_lease_error(take)?),
         5 => StreamError::NoReply { after: take.duration()? },
         6 => StreamError::Ended,
+        7 => StreamError::NotStreaming,
         _ => return Err(Malformed),
     })
 }

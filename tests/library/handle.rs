@@ -282,7 +282,10 @@ fn a_mode_is_changed_while_the_joint_is_disabled_and_what_cannot_be_is_refused_i
     joint.enable().unwrap();
     joint.wait_for(Phase::Holding, PATIENCE).unwrap();
     // What a point may ask for is what the present mode takes.
+    joint.begin_stream().unwrap();
     assert_eq!(joint.stream().push_now(&torque), Ok(()));
+    joint.stop(StopCategory::Two).unwrap();
+    joint.wait_for(Phase::Holding, PATIENCE).unwrap();
     let motion = joint.move_to(&[0.3]).unwrap();
     assert_eq!(joint.wait(motion, PATIENCE), Ok(()));
     assert_eq!(joint.finish(), Outcome::Finished);

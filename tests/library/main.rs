@@ -32,6 +32,7 @@ mod rows;
 mod schedule;
 mod schedule_bounds;
 mod socketcan;
+mod stale_commands;
 mod stream_clients;
 mod telemetry;
 mod urdf;

@@ -134,7 +134,7 @@ fn a_client_that_floods_the_queue_and_the_stream_does_not_prevent_the_end_of_the
         |port| port,
         |host| {
             for _ in 0..100 {
-                // It is full soon, since nothing streams.
+                // It is refused, since nothing streams.
                 let _ = host.streamer().push(&[point]);
                 // Requests that are granted at any time and change nothing.
                 if host.request(Request::Sync(true)).is_err() {

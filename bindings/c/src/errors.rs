@@ -319,6 +319,7 @@ impl Failure {
                 Self { result, words, point: Some(point), axis: Some(axis), beyond }
             }
             StreamError::Count { .. } => Self::argument(words),
+            StreamError::NotStreaming => Self::new(takt_result::TAKT_ERROR_REFUSED, words),
             StreamError::Full => Self::new(takt_result::TAKT_ERROR_FULL, words),
             StreamError::Lease(_) => Self::new(takt_result::TAKT_ERROR_LEASE, words),
             StreamError::NoReply { .. } => Self::new(takt_result::TAKT_ERROR_TIMEOUT, words),

@@ -87,7 +87,8 @@ impl takt_target {
 }
 
 /// The groups of the handle begin to follow the points that are pushed. The first one must come within the enable time-out of the
-/// configuration. The axes are led to it within their limits.
+/// configuration. The axes are led to it within their limits. A stream begins empty: points are taken from now on, until a stop or a fault
+/// ends it. Those that still wait then are discarded, and counted as lost.
 ///
 /// Any thread, not in a callback; blocks for a cycle or two, until the real-time thread has granted it. takt_stop() ends it.
 ///
@@ -108,7 +109,8 @@ pub extern "C" fn takt_begin_stream(handle: takt_handle) -> takt_result {
 /// controller of another process it sends a packet, and waits for the answer.
 ///
 /// Errors: TAKT_ERROR_LIMIT (a torque or a gain beyond that of its axis; positions and velocities are led to within the limits),
-/// TAKT_ERROR_MODE, TAKT_ERROR_ARGUMENT, TAKT_ERROR_FULL, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE. The point is not taken then.
+/// TAKT_ERROR_MODE, TAKT_ERROR_ARGUMENT, TAKT_ERROR_REFUSED before takt_begin_stream() and after a stop, TAKT_ERROR_FULL, TAKT_ERROR_ENDED,
+/// TAKT_ERROR_HANDLE. The point is not taken then.
 ///
 /// # Safety
 /// `targets` is null, or points to `axes` targets.

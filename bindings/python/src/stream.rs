@@ -12,9 +12,7 @@ use takt::{
 };
 
 use crate::array::{self, Table};
-use crate::error::{
-    raise, raise_argument, raise_command, raise_ended, raise_motion, raise_stopped, raise_stream,
-};
+use crate::error::{raise_argument, raise_command, raise_motion, raise_stopped, raise_stream};
 use crate::link::{Link, duration, seconds};
 use crate::waiting::{stop_and_wait, until};
 
@@ -132,21 +130,6 @@ impl Stream {
         self.link.names_of(&self.axes)
     }
 
-    /// Points are for a group that follows them.
-    fn check_followed(&self, py: Python<'_>, controller: &dyn RunningController) -> PyResult<()> {
-        if controller.stream_report(self.target).state != StreamState::Idle {
-            return Ok(());
-        }
-        match controller.fault_in(self.target) {
-            Some(stopped) => Err(raise_stopped(py, &self.link.axis_names(), &stopped)),
-            None if controller.has_ended() => Err(raise_ended(py)),
-            None => {
-                let words = "the axes no longer follow the stream: a stop or another motion has ended it; begin a new one";
-                Err(raise(py, "StreamError", words, &[]))
-            }
-        }
-    }
-
     /// A stamp in nanoseconds of the controller's clock.
     fn stamp(
         &self,
@@ -161,8 +144,19 @@ impl Stream {
         }
     }
 
-    fn handed(&self, py: Python<'_>, result: Result<(), StreamError>) -> PyResult<()> {
-        result.map_err(|error| raise_stream(py, &self.names(), &error))
+    /// A stream that a fault has ended raises the fault.
+    fn handed(
+        &self,
+        py: Python<'_>,
+        controller: &dyn RunningController,
+        result: Result<(), StreamError>,
+    ) -> PyResult<()> {
+        result.map_err(|error| match (error, controller.fault_in(self.target)) {
+            (StreamError::NotStreaming, Some(stopped)) => {
+                raise_stopped(py, &self.link.axis_names(), &stopped)
+            }
+            (error, _) => raise_stream(py, &self.names(), &error),
+        })
     }
 
     /// Stops the axes and waits until they hold, or are off.
@@ -198,10 +192,9 @@ impl Stream {
         };
         let parts = Given { q, qd, qdd, torque, kp, kd }.read(py, self.axes.len(), row)?;
         let point = parts.row(py, 0, self.axes.len())?;
-        self.check_followed(py, controller)?;
         let at_ns = self.stamp(py, controller, "t", t)?;
         let handed = py.detach(|| controller.push_point(self.target, at_ns, &point));
-        self.handed(py, handed)
+        self.handed(py, controller, handed)
     }
 
     /// Hands over points at equal intervals, the first of which is meant for `t0`, or for now. They take the place of every earlier
@@ -226,10 +219,9 @@ impl Stream {
         // A chunk without points is refused as a point without parts is.
         let rows = 0..parts.rows.max(1);
         let points = rows.map(|row| parts.row(py, row, self.axes.len())).collect::<PyResult<Vec<_>>>()?;
-        self.check_followed(py, controller)?;
         let from_ns = self.stamp(py, controller, "t0", t0)?;
         let handed = py.detach(|| controller.push_chunk(self.target, from_ns, interval, &points));
-        self.handed(py, handed)
+        self.handed(py, controller, handed)
     }
 
     /// What it is doing: "awaited", "following", "dry", "idle".

@@ -111,7 +111,7 @@ def test_parts_that_do_not_belong_together_are_refused(sim):
 
 
 def test_who_pushes_after_a_stop_is_told(sim):
-    with pytest.raises(takt.StreamError, match="no longer follow"), sim.follow() as stream:
+    with pytest.raises(takt.StreamError, match="no stream is running"), sim.follow() as stream:
         stream.push(HOME * 0)
         sim.step(5)
         sim.stop()
@@ -132,6 +132,26 @@ def test_a_fault_of_an_exact_stream_is_told_to_who_pushes():
         sim.clear_fault()
         sim.enable()
         sim.move([0.0])
+
+
+def test_a_new_stream_carries_out_nothing_that_was_pushed_before_it(sim):
+    stream = sim.follow()
+    for number in range(60):
+        stream.push([0.003 * number, 0, 0, 0, 0, 0])
+        sim.run(0.02)
+    stream.push([0.18, 0, 0, 0, 0, 0])
+    lost = stream.counts[2]
+    sim.stop(1, wait=True)
+    assert stream.counts[2] == lost + 1
+    with pytest.raises(takt.StreamError, match="no stream is running"):
+        stream.push([0.18, 0, 0, 0, 0, 0])
+    sim.enable()
+    sim.move([-0.5, 0, 0, 0, 0, 0])
+    sim.run(5)
+    home = sim.state.position[0]
+    sim.follow()
+    sim.run(0.4)
+    assert abs(sim.state.position[0] - home) < 1e-6
 
 
 def test_an_exception_stops_the_arm_at_once(sim):

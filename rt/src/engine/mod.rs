@@ -352,6 +352,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         for (group, (record, snapshot)) in self.groups.iter_mut().zip(shown) {
             is_commanded |= !is_late && group.commands == Commands::Made;
             group.end_cycle(is_late);
+            group.discard_points(host);
             group.show(record, snapshot);
         }
         shared.slots.end(is_late);

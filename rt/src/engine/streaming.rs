@@ -136,6 +136,16 @@ fn wanted_of<const AXES: usize>(axis: &Axis, wish: &StreamWish<AXES>) -> AxisTar
 }
 
 impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
+    /// A group that does not stream has no use for points: those that the end of a stream has overtaken are lost.
+    pub(super) fn discard_points(&mut self, host: &mut impl HostInterface<AXES, BUSES>) {
+        if matches!(self.state, GroupState::Streaming(_)) {
+            return;
+        }
+        let discarded = host.discard_points(self.number);
+        self.stream.counts.points += discarded;
+        self.stream.counts.lost_points += discarded;
+    }
+
     /// What observers see of the stream.
     pub(super) fn stream_report(&self) -> StreamReport {
         let state = match self.state {

@@ -88,6 +88,15 @@ impl DelayEstimator {
         self.interval_ns
     }
 
+    /// The longest time by which the set-points can be behind a stamp: the longest delay, and the slot in which a point arrives.
+    pub(super) fn longest_ns(&self) -> Nanoseconds {
+        let longest_ns = match self.delay {
+            StreamDelay::Automatic => LONGEST_NS.unsigned_abs(),
+            StreamDelay::Fixed(fixed_ns) => fixed_ns,
+        };
+        longest_ns.saturating_add(self.period_ns.unsigned_abs())
+    }
+
     /// The present delay.
     pub(super) fn present_ns(&self) -> Nanoseconds {
         libm::round(self.present_ns.max(0.0)) as Nanoseconds

@@ -61,7 +61,7 @@ pub enum PointError {
     },
     /// It is meant for a time more than a minute from now.
     FarAway,
-    /// It has come so late that nothing depends on it any more.
+    /// It has come so late that nothing depends on it any more, or so long after its time that no motion begins with it.
     Late,
     /// There is no room, and it is the farthest of all.
     Full,
@@ -230,8 +230,13 @@ where
         if stamp_ns.abs_diff(now_ns) > FARTHEST_NS {
             return Err(PointError::FarAway);
         }
+        let age_ns = now_ns.saturating_sub(stamp_ns);
+        let is_beginning = self.begins_with(stamp_ns);
+        if is_beginning && age_ns > self.delay.longest_ns() {
+            return Err(PointError::Late);
+        }
         self.note_arrival(point, now_ns);
-        self.begin_after_pause(stamp_ns, now_ns);
+        self.begin_after_pause(is_beginning, stamp_ns, now_ns);
         let played_ns = self.play_time(now_ns);
         let mut index = self.stamps().partition_point(|stamp| *stamp < stamp_ns);
         let is_late = stamp_ns < played_ns && self.playback != Playback::Awaited;
@@ -304,19 +309,30 @@ where
         }
     }
 
+    /// True if the motion begins with a point of this stamp: no point has come before, or none for a long time.
+    fn begins_with(&self, stamp_ns: Nanoseconds) -> bool {
+        match self.playback {
+            Playback::Awaited => true,
+            Playback::Leading | Playback::Following => false,
+            Playback::Dry => self.last_stamp().is_none_or(|last_ns| {
+                let pause_ns = self.delay.interval_ns().saturating_mul(PAUSE_INTERVALS).max(PAUSE_NS);
+                stamp_ns.saturating_sub(last_ns) > pause_ns.unsigned_abs()
+            }),
+        }
+    }
+
     /// What had been played before a pause has nothing to do with what comes after it.
-    fn begin_after_pause(&mut self, stamp_ns: Nanoseconds, now_ns: Nanoseconds) {
+    fn begin_after_pause(&mut self, is_beginning: bool, stamp_ns: Nanoseconds, now_ns: Nanoseconds) {
         if self.playback != Playback::Dry {
             return;
         }
         self.delay.settle();
-        let Some(last_ns) = self.last_stamp() else { return };
-        let pause_ns = self.delay.interval_ns().saturating_mul(PAUSE_INTERVALS).max(PAUSE_NS).unsigned_abs();
-        let has_paused = stamp_ns.saturating_sub(last_ns) > pause_ns;
-        if has_paused {
+        if is_beginning {
             self.remove(0, self.count);
             self.playback = Playback::Leading;
-        } else if stamp_ns > last_ns && self.play_time(now_ns) < stamp_ns {
+        } else if self.last_stamp().is_some_and(|last_ns| stamp_ns > last_ns)
+            && self.play_time(now_ns) < stamp_ns
+        {
             self.playback = Playback::Following;
         }
     }
@@ -552,6 +568,38 @@ mod tests {
         }
         let expected = [(10, 1.0), (20, 1.0), (25, 2.0), (35, 2.0), (45, 2.0)];
         assert!(stamps_ms(&look_ahead).eq(expected), "{:?}", look_ahead.stamps());
+    }
+
+    #[test]
+    fn a_motion_begins_with_no_point_that_is_older_than_its_stream_can_lag() {
+        for (delay, longest_ms) in [
+            (StreamDelay::Fixed(0), 1),
+            (StreamDelay::Fixed(40 * MILLISECOND_NS), 41),
+            (StreamDelay::Automatic, 1_001),
+        ] {
+            let parameters = LookAheadParameters {
+                limits: [AxisLimits::NONE].into_iter().collect(),
+                period_ns: MILLISECOND_NS,
+                delay,
+            };
+            let mut look_ahead = LookAhead::<1, _>::new([StreamPoint::default(); 8], parameters);
+            let mut sample = StreamSample::default();
+            // At first, and after a pause in which the stream has run dry.
+            for now_ms in [20_000, 30_000] {
+                let before = look_ahead.counts();
+                let mut insert = |at_ms| look_ahead.insert(&point(at_ms, 1.0), now_ms * MILLISECOND_NS);
+                assert_eq!(insert(now_ms - 8_000), Err(PointError::Late), "{delay:?}");
+                assert_eq!(insert(now_ms - longest_ms - 1), Err(PointError::Late), "{delay:?}");
+                look_ahead.sample(now_ms * MILLISECOND_NS, &mut sample);
+                assert!(!matches!(sample.wish, StreamWish::Targets(_)), "{delay:?}: {:?}", sample.wish);
+                assert_eq!(look_ahead.counts().late_points, before.late_points + 2);
+                let now_ns = now_ms * MILLISECOND_NS;
+                assert_eq!(look_ahead.insert(&point(now_ms - longest_ms, 1.0), now_ns), Ok(()), "{delay:?}");
+                look_ahead.sample(now_ns, &mut sample);
+                assert!(matches!(sample.wish, StreamWish::Targets(_)), "{delay:?}: {:?}", sample.wish);
+                look_ahead.sample(now_ns + 2_000 * MILLISECOND_NS, &mut sample);
+            }
+        }
     }
 
     #[test]

@@ -307,7 +307,7 @@ pub struct StreamCounts {
     pub points: u64,
     /// Points that have come too late for their time.
     pub late_points: u64,
-    /// Points that found no room, or could not be used.
+    /// Points that found no room, could not be used, or were discarded when the stream ended.
     pub lost_points: u64,
 }
 

@@ -9,7 +9,7 @@ use takt_rt::{
 };
 
 use super::{GroupHandle, Handle};
-use crate::channels::{SentPoint, chunk};
+use crate::channels::{ChannelError, SentPoint, chunk};
 use crate::command::{CommandError, RunningController, StreamError, check_point};
 
 /// Hands points to the stream of a group, or to those of all groups, from any thread. Clones are cheap and equal.
@@ -18,7 +18,9 @@ use crate::command::{CommandError, RunningController, StreamError, check_point};
 /// [`lag`](StreamHandle::lag), which depends on the interval of the points, on how late they come, and on the configuration
 /// (`[stream] delay`).
 ///
-/// A group follows its points from [`Handle::begin_stream`] or [`GroupHandle::begin_stream`] on.
+/// A group follows its points from [`Handle::begin_stream`] or [`GroupHandle::begin_stream`] on, until a stop or a fault ends its stream.
+/// A stream begins empty: at any other time points are refused ([`StreamError::NotStreaming`]), and those that still wait when a stream ends
+/// are discarded, and counted among the lost ones.
 #[derive(Clone)]
 pub struct StreamHandle {
     handle: Handle,
@@ -121,7 +123,10 @@ impl StreamHandle {
             StreamTarget::All => streamer.push(points),
             StreamTarget::Group { number, .. } => streamer.push_to(number, points),
         };
-        handed.map_err(|_| StreamError::Full)
+        handed.map_err(|error| match error {
+            ChannelError::NotStreaming => StreamError::NotStreaming,
+            ChannelError::Full | ChannelError::NoSuchBus { .. } => StreamError::Full,
+        })
     }
 
     fn axis_count(&self) -> usize {

@@ -75,7 +75,11 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "转矩或阻抗需要模式 \"cst\"，而该轴处于 {0}",
     ),
     ("a torque of {0} is beyond the limit of {1}", "转矩 {0} 超出限值 {1}"),
-    ("too many points wait for the controller: does it stream?", "等待控制器的点过多：是否处于点流状态？"),
+    (
+        "no stream is running: begin one first; every stop ends it",
+        "没有正在进行的点流：请先开始点流；任何停止都会结束点流",
+    ),
+    ("too many points wait for the controller", "等待控制器的点过多"),
     // How a motion ends.
     ("the callback has panicked (<0>): <1>", "回调函数崩溃（<0>）：<1>"),
     ("a stop has discarded the motion before it began", "停止在运动开始之前将其取消"),
@@ -146,6 +150,7 @@ mod tests {
         let streams =
             points.map(|reason| StreamError::Refused { point: 0, axis: 1, reason }).into_iter().chain([
                 StreamError::Count { given: 1, axes: 2 },
+                StreamError::NotStreaming,
                 StreamError::Full,
                 StreamError::NoReply { after },
                 StreamError::Ended,

@@ -74,6 +74,7 @@ static void streams(void) {
     takt_state state = {.size = sizeof state};
     takt_target targets[AXES];
     pose(to, 0.0);
+    CHECK(takt_push_positions(arm, to, AXES) == TAKT_ERROR_REFUSED);
     DONE(takt_begin_stream(arm));
     CHECK(now().groups[0].stream_state != TAKT_STREAM_IDLE);
     for (int point = 1; point <= 50; point++) {
@@ -94,6 +95,8 @@ static void streams(void) {
     while (fabs(now().axes[0].position_set - to[0]) > 1e-6) DONE(takt_wait_cycle(arm, 5.0, &state));
     DONE(takt_stop(arm, TAKT_STOP_AND_HOLD));
     DONE(takt_wait_phase(arm, TAKT_PHASE_HOLDING, 30.0));
+    CHECK(takt_push_positions(arm, to, AXES) == TAKT_ERROR_REFUSED);
+    CHECK(takt_push_positions_chunk(arm, takt_now_ns(arm), 10000000, chunk, 10, AXES) == TAKT_ERROR_REFUSED);
 }
 
 static void stops_and_powers(void) {

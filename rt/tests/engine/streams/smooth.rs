@@ -169,3 +169,37 @@ fn a_stop_in_the_midst_of_a_stream_keeps_every_limit() {
         rig.assert_differences_kept(JERK);
     }
 }
+
+#[test]
+fn points_that_wait_when_a_stream_ends_are_discarded_and_counted_in_the_cycle_that_ends_it() {
+    for end in [
+        Request::Stop(StopCategory::Zero),
+        Request::Stop(StopCategory::One),
+        Request::Stop(StopCategory::Two),
+        Request::Disable,
+    ] {
+        let mut rig = streaming(JERK);
+        rig.stream(0.5, 0.1);
+        rig.run(100);
+        rig.host.waiting_points = 3;
+        rig.run(1);
+        assert_eq!(rig.host.waiting_points, 3, "the stream takes them");
+        rig.request(end);
+        let report = rig.host.snapshot.groups[0].stream;
+        assert_eq!((rig.host.waiting_points, report.state), (0, StreamState::Idle), "{end:?}");
+        assert_eq!((report.counts.points, report.counts.lost_points), (3, 3), "{end:?}");
+        // A thread that was held up in the middle of a call.
+        rig.host.waiting_points = 1;
+        rig.run(1);
+        assert_eq!(rig.host.snapshot.groups[0].stream.counts.lost_points, 4, "{end:?}");
+    }
+}
+
+#[test]
+fn a_fault_that_ends_a_stream_discards_its_points_in_the_same_cycle() {
+    let mut rig = streaming(JERK);
+    rig.host.waiting_points = 2;
+    rig.run_until(Phase::Holding, 1_000);
+    assert_eq!(rig.stops().len(), 1, "no point was taken in time");
+    assert_eq!(rig.host.snapshot.groups[0].stream.counts.lost_points, 2);
+}
