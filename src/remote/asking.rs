@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use takt_rt::{RequestTarget, StopCategory};
+use takt_rt::{Nanoseconds, RequestTarget, StopCategory};
 
 use super::client::{Client, LOOK};
 use super::commands::{Command, Demand, StopRequest, packets_of_points};
 use super::replies::{Answer, REPLY_WITHIN, Reply};
+use super::shown::now_ns;
 use super::socket::{Names, PACKET_WORDS, Packets, Received, Role};
 use crate::command::{CommandError, LeaseError, MotionId, StreamError, TrajectoryProgress};
 use crate::trajectory::TrajectoryPoint;
@@ -85,23 +86,29 @@ const fn refused(kind: io::ErrorKind) -> NoAnswer {
 impl Client {
     /// Asks, and waits for the answer.
     fn ask(&self, command: Command) -> Result<Reply, NoAnswer> {
+        self.await_stops()?;
+        let asked_ns = now_ns();
         // A panic of another holder of the lock leaves a connection whose replies have other numbers.
         let mut commands = self.0.asking.commands.lock().unwrap_or_else(PoisonError::into_inner);
-        self.ask_by(&mut commands, command)
+        self.ask_by(&mut commands, asked_ns, command)
     }
 
-    fn ask_by(&self, commands: &mut Commands, command: Command) -> Result<Reply, NoAnswer> {
+    fn ask_by(
+        &self,
+        commands: &mut Commands,
+        asked_ns: Nanoseconds,
+        command: Command,
+    ) -> Result<Reply, NoAnswer> {
         if self.has_ended() {
             return Err(NoAnswer::Ended);
         }
-        self.await_stops()?;
         commands.number += 1;
         let number = commands.number;
         let connection = match &mut commands.connection {
             Some(connection) => connection,
             place => place.insert(self.connected()?),
         };
-        let asked = connection.send(&Demand { number, command }.words());
+        let asked = connection.send(&Demand { number, asked_ns, command }.words());
         let answer = match asked {
             Ok(()) => self.answer(connection, number),
             Err(_) => None,
@@ -249,13 +256,15 @@ impl Client {
         points: &[TrajectoryPoint],
         command: Command,
     ) -> Result<MotionId, CommandError> {
+        self.await_stops()?;
+        let asked_ns = now_ns();
         let mut commands = self.0.asking.commands.lock().unwrap_or_else(PoisonError::into_inner);
         for packet in packets_of_points(points) {
-            if let Reply::Refused(error) = self.ask_by(&mut commands, packet)? {
+            if let Reply::Refused(error) = self.ask_by(&mut commands, asked_ns, packet)? {
                 return Err(error);
             }
         }
-        let reply = self.ask_by(&mut commands, command)?;
+        let reply = self.ask_by(&mut commands, asked_ns, command)?;
         drop(commands);
         self.motion(reply)
     }

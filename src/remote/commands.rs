@@ -14,6 +14,8 @@ use crate::trajectory::TrajectoryPoint;
 pub struct Demand {
     /// The number.
     pub number: u64,
+    /// When the client made it, by `CLOCK_MONOTONIC`: a later stop discards it, if it has not been carried out by then.
+    pub asked_ns: Nanoseconds,
     /// The demand.
     pub command: Command,
 }
@@ -192,7 +194,7 @@ impl Demand {
     /// Its words.
     pub fn words(&self) -> Vec<u64> {
         let mut put = Put::default();
-        put.word(self.number);
+        put.word(self.number).word(self.asked_ns);
         self.command.put(&mut put);
         put.0
     }
@@ -200,7 +202,8 @@ impl Demand {
     /// The demand of a packet.
     pub fn of(words: &[u64]) -> Result<Self, Malformed> {
         let mut take = Take(words);
-        let demand = Self { number: take.word()?, command: Command::take(&mut take)? };
+        let demand =
+            Self { number: take.word()?, asked_ns: take.word()?, command: Command::take(&mut take)? };
         take.end()?;
         Ok(demand)
     }
@@ -233,6 +236,19 @@ impl Command {
             | Self::Point { target, .. }
             | Self::Chunk { target, .. } => Some(*target),
         }
+    }
+
+    /// True for what begins or changes a motion.
+    pub const fn is_discarded_by_stops(&self) -> bool {
+        !matches!(
+            self,
+            Self::Lease { .. }
+                | Self::Release
+                | Self::Disable(_)
+                | Self::Points(_)
+                | Self::Progress(_)
+                | Self::Question { .. }
+        )
     }
 
     fn put(&self, put: &mut Put) {

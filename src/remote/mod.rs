@@ -53,7 +53,7 @@ pub use stream::ClientStream;
 
 pub use crate::packet::Malformed;
 pub use commands::{Command, Demand, StopRequest};
-pub(crate) use layout::{Description, LeaseShown};
+pub(crate) use layout::{Description, LeaseShown, STOP_WORDS};
 pub(crate) use memory::Memory;
 pub use replies::{Answer, Reply};
 pub(crate) use shown::{ShownWriter, now_ns};

@@ -15,7 +15,7 @@ use super::lease::Claimant;
 use super::worker::Worker;
 use crate::command::LeaseError;
 use crate::remote::{
-    Answer, Listener, Memory, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest, accept,
+    Answer, Listener, Memory, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest, accept, now_ns,
 };
 
 /// Observers, and connections for stops, at most.
@@ -111,6 +111,7 @@ impl Connections {
                 Kind::Undecided => return self.decide(peer.connection, Role::of(words)),
                 Kind::Stops { taken } => match StopRequest::of(words) {
                     Ok(stop) if self.is_known(stop.target) => {
+                        self.served.stops.note(stop.target, now_ns());
                         // It fails only when the controller has ended.
                         let _ = self.served.controller.request_stop(stop.target, stop.category);
                         *taken += 1;

@@ -8,7 +8,7 @@
 //!
 //! All of them are ordinary threads beside the real-time one, and call the controller as the own program's threads do. So nothing that a
 //! client does or leaves undone reaches the loop but by the checked calls of a handle. A worker that waits for the controller holds up
-//! its own client alone, and no stop.
+//! its own client alone, and no stop. A stop overtakes the packets that wait for a worker: what was asked before it is not carried out.
 
 mod connections;
 mod lease;
@@ -18,13 +18,15 @@ mod worker;
 use std::fmt;
 use std::io;
 use std::os::fd::OwnedFd;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use takt_rt::{Nanoseconds, RequestTarget};
+
 use crate::command::RunningController;
-use crate::remote::{Description, Listener, NameError, Names, ShownWriter, SocketError};
+use crate::remote::{Description, Listener, NameError, Names, STOP_WORDS, ShownWriter, SocketError};
 use connections::Connections;
 use lease::Lease;
 
@@ -113,6 +115,7 @@ impl From<io::Error> for ServeError {
 struct Served {
     controller: Arc<dyn RunningController>,
     lease: Mutex<Lease>,
+    stops: Stops,
     has_ended: AtomicBool,
 }
 
@@ -124,6 +127,33 @@ impl Served {
 
     fn has_ended(&self) -> bool {
         self.has_ended.load(Ordering::Acquire)
+    }
+}
+
+/// When the newest stop that clients have asked for came, by `CLOCK_MONOTONIC`: of all axes, and of each group.
+#[derive(Default)]
+struct Stops([AtomicU64; STOP_WORDS]);
+
+impl Stops {
+    fn note(&self, target: RequestTarget, at_ns: Nanoseconds) {
+        let place = match target {
+            RequestTarget::All => 0,
+            RequestTarget::Group(group) => 1 + usize::from(group),
+        };
+        if let Some(newest_ns) = self.0.get(place) {
+            newest_ns.fetch_max(at_ns, Ordering::AcqRel);
+        }
+    }
+
+    /// True if a stop that concerns a target has come after a time.
+    fn came_after(&self, target: RequestTarget, at_ns: Nanoseconds) -> bool {
+        self.0.iter().enumerate().any(|(place, newest_ns)| {
+            let is_concerned = match target {
+                RequestTarget::All => true,
+                RequestTarget::Group(group) => place == 0 || place == 1 + usize::from(group),
+            };
+            is_concerned && newest_ns.load(Ordering::Acquire) > at_ns
+        })
     }
 }
 
@@ -166,6 +196,7 @@ pub fn serve(
     let served = Arc::new(Served {
         controller: Arc::new(controller),
         lease: Mutex::new(Lease::new(options.lease)),
+        stops: Stops::default(),
         has_ended: AtomicBool::new(false),
     });
     let (wake, waker) = nix::unistd::pipe().map_err(io::Error::from)?;
@@ -217,7 +248,7 @@ fn description(controller: &dyn RunningController) -> Description {
     let machine = controller.machine().clone();
     let groups = (0u8..)
         .zip(&machine.groups)
-        .map(|(group, _)| controller.axes_of(takt_rt::RequestTarget::Group(group)))
+        .map(|(group, _)| controller.axes_of(RequestTarget::Group(group)))
         .collect();
     let axes: Vec<_> = (0..machine.axes.len()).filter_map(|axis| controller.axis_properties(axis)).collect();
     Description::new(machine, groups, &axes)

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use takt_rt::RequestTarget;
+use takt_rt::{Nanoseconds, RequestTarget};
 
 use super::Served;
 use super::lease::Claimant;
@@ -34,7 +34,7 @@ impl Worker {
             let Ok(demand) = Demand::of(words.get(..count).unwrap_or_default()) else { break };
             let number = demand.number;
             let is_of_lease = matches!(demand.command, Command::Lease { .. } | Command::Release);
-            let Ok(reply) = self.answer(demand.command) else { break };
+            let Ok(reply) = self.answer(demand.command, demand.asked_ns) else { break };
             // Who has the lease is shown beside the next state, which a client waits for.
             let slot = self.served.controller.state().slot.saturating_add(is_of_lease.into());
             // A client that does not receive its replies is disconnected.
@@ -49,7 +49,7 @@ impl Worker {
     ///
     /// # Errors
     /// It names a group that there is not: its sender has not read the description.
-    pub fn answer(&mut self, command: Command) -> Result<Reply, Malformed> {
+    pub fn answer(&mut self, command: Command, asked_ns: Nanoseconds) -> Result<Reply, Malformed> {
         if let Some(RequestTarget::Group(group)) = command.target()
             && self.served.controller.axes_of(RequestTarget::Group(group)).is_empty()
         {
@@ -57,6 +57,10 @@ impl Worker {
         }
         let is_of_stream = matches!(command, Command::Point { .. } | Command::Chunk { .. });
         Ok(match self.admit(&command) {
+            Ok(()) if self.is_overtaken(&command, asked_ns) => match is_of_stream {
+                true => Reply::NotTaken(StreamError::NotStreaming),
+                false => Reply::Refused(CommandError::Overtaken),
+            },
             Ok(()) => {
                 let reply = self.carry_out(command);
                 // The controller may have taken its time.
@@ -79,6 +83,12 @@ impl Worker {
             _ => lease.renew(self.claimant, now_ns())?,
         }
         Ok(())
+    }
+
+    /// True if a stop has come since the client asked.
+    fn is_overtaken(&self, command: &Command, asked_ns: Nanoseconds) -> bool {
+        let target = command.target().unwrap_or(RequestTarget::All);
+        command.is_discarded_by_stops() && self.served.stops.came_after(target, asked_ns)
     }
 
     fn carry_out(&mut self, command: Command) -> Reply {

@@ -57,20 +57,21 @@ fn garbage(random: &mut Random, home: &[f64], role: Role) -> Vec<u64> {
     }
     let axes: Vec<AxisPoint> =
         home.iter().map(|position| AxisPoint::position(position + 0.05 * random.below(100) as f64)).collect();
+    let now_ns = ClientStream::now_ns();
     // Neither disabling nor another mode.
     let mut words = match random.below(5) {
-        0 => [vec![1, 12, 0, ClientStream::now_ns()], entries(&axes)].concat(),
-        1 => [vec![2, 13, 0, ClientStream::now_ns(), 1_000_000, 1], entries(&axes)].concat(),
-        2 => vec![3, 1, 1],
-        3 => vec![5, 20, 0, 1f64.to_bits(), 1f64.to_bits(), 0, 6, 0, 0, 0, 0, 0, 0],
-        _ => vec![4, 3, 0, 1f64.to_bits(), 1f64.to_bits(), 0, 6, 0, 0, 0, 0, 0, 0],
+        0 => [vec![1, now_ns, 12, 0, now_ns], entries(&axes)].concat(),
+        1 => [vec![2, now_ns, 13, 0, now_ns, 1_000_000, 1], entries(&axes)].concat(),
+        2 => vec![3, now_ns, 1, 1],
+        3 => vec![5, now_ns, 20, 0, 1f64.to_bits(), 1f64.to_bits(), 0, 6, 0, 0, 0, 0, 0, 0],
+        _ => vec![4, now_ns, 3, 0, 1f64.to_bits(), 1f64.to_bits(), 0, 6, 0, 0, 0, 0, 0, 0],
     };
-    let kind = words[1];
+    let kind = words[2];
     for _ in 0..random.below(4) {
         let at = random.below(words.len() as u64) as usize;
         words[at] ^= 1 << random.below(64);
     }
-    words[1] = kind;
+    words[2] = kind;
     words
 }
 

@@ -74,7 +74,7 @@ fn any_client_stops_the_arm_without_the_lease_and_past_commands_that_wait() {
     let flooding =
         Packets::connect_as(Path::new(&format!("{}.command", served.name())), Role::Commands).unwrap();
     let mut number = 0;
-    while flooding.send(&Demand::of(&[number, 1, 0]).unwrap().words()).is_ok() {
+    while flooding.send(&Demand::of(&[number, 0, 1, 0]).unwrap().words()).is_ok() {
         number += 1;
     }
     let motion = commanding.take_over().and_then(|()| commanding.move_to(&moved(&commanding, 0.8))).unwrap();

@@ -5,6 +5,7 @@ mod calls;
 mod deaths;
 mod garbage;
 mod lease;
+mod stops;
 
 use std::env;
 use std::fs;
@@ -16,7 +17,7 @@ use std::thread;
 use std::time::Duration;
 
 use nix::unistd::geteuid;
-use takt::internals::remote::{Demand, PACKET_WORDS, Packets, Received, Role};
+use takt::internals::remote::{self, Answer, Demand, PACKET_WORDS, Packets, Received, Reply, Role};
 use takt::{
     AxisPoint, Client, ClientStream, CommandError, Config, ConnectError, Controller, EventKind, LeaseError,
     MotionError, MoveOptions, OperationMode, Phase, RunningController, ServeError, ServeOptions, Server,
