@@ -1,7 +1,6 @@
 //! The session in zenoh, and the controller of another process.
 
-use std::sync::Mutex;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::Arc;
 use std::thread;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -15,12 +14,11 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::{Session, Wait};
 
 use crate::attachment::attachment;
+use crate::inbox::{Inbox, Taken};
 use crate::messages::{JointState, JointTrajectory};
 use crate::motion::{AxisPlace, Unfit, Wanted, wanted};
 use crate::names::{Gid, JOINT_STATE, JOINT_TRAJECTORY, Kind, Node, gid, is_topic};
 
-/// Trajectories that wait to be carried out; one that comes while so many wait is lost, which is said.
-const WAITING_AT_MOST: usize = 8;
 /// How often the end is looked for.
 const LOOK: Duration = Duration::from_millis(100);
 
@@ -95,7 +93,7 @@ pub struct Bridge {
     axes: Vec<AxisPlace>,
     publisher: Publisher<'static>,
     gid: Gid,
-    received: Mutex<Receiver<Vec<u8>>>,
+    inbox: Arc<Inbox>,
     // In the graph for as long as they are here. The session closes after what it has declared.
     _subscriber: Subscriber<()>,
     _tokens: [LivelinessToken; 3],
@@ -103,7 +101,8 @@ pub struct Bridge {
 }
 
 impl Bridge {
-    /// Connects to the controller and to the graph. Nothing is commanded.
+    /// Connects to the controller and to the graph. From now on a trajectory without points stops the axes at once, and those with points
+    /// wait for [`Bridge::run`]. `lost` is called for each one that is lost because too many wait.
     ///
     /// # Errors
     /// See [`BridgeError`].
@@ -135,11 +134,17 @@ impl Bridge {
             .declare_publisher(node.topic(&options.states, &JOINT_STATE))
             .wait()
             .map_err(refused("the topic of the joint states"))?;
-        let (sender, received) = mpsc::sync_channel(WAITING_AT_MOST);
+        let inbox = Arc::new(Inbox::default());
+        let (receiving, stopping) = (Arc::clone(&inbox), controller.clone());
         let subscriber = session
             .declare_subscriber(node.topic(&options.trajectories, &JOINT_TRAJECTORY))
             .callback(move |sample| {
-                if sender.try_send(sample.payload().to_bytes().into_owned()).is_err() {
+                let message = sample.payload().to_bytes().into_owned();
+                if JointTrajectory::decode(&message).is_some_and(|trajectory| trajectory.points.is_empty()) {
+                    receiving.put_stop(message);
+                    // It waits for nobody. The thread that carries commands out stops once more, and says why it cannot.
+                    let _ = stopping.stop(StopCategory::Two);
+                } else if !receiving.put(message) {
                     lost();
                 }
             })
@@ -155,7 +160,7 @@ impl Bridge {
             axes,
             publisher,
             gid,
-            received: Mutex::new(received),
+            inbox,
             _subscriber: subscriber,
             _tokens: tokens,
             _session: session,
@@ -205,14 +210,8 @@ impl Bridge {
     }
 
     fn carry_out(&self, is_over: &impl Fn() -> bool, tell: &impl Fn(&str)) {
-        // Only this thread takes it, and a thread that has panicked leaves it as it is.
-        let received = self.received.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         while !is_over() {
-            let message = match received.recv_timeout(LOOK) {
-                Ok(message) => message,
-                Err(RecvTimeoutError::Timeout) => continue,
-                Err(RecvTimeoutError::Disconnected) => return,
-            };
+            let Some(Taken { message, stops }) = self.inbox.take(LOOK) else { continue };
             let decoded = JointTrajectory::decode(&message).ok_or(Unfit::NotCdr);
             let groups = &self.controller.machine().groups;
             let found = decoded.and_then(|trajectory| {
@@ -227,6 +226,10 @@ impl Bridge {
                     }
                     Ok(()) => tell(&words_of(&wanted)),
                 },
+            }
+            // A stop that has come meanwhile may have overtaken what has just begun.
+            if self.inbox.stops() != stops {
+                let _ = self.controller.stop(StopCategory::Two);
             }
         }
     }

@@ -11,6 +11,7 @@
 
 mod attachment;
 mod bridge;
+mod inbox;
 mod messages;
 mod motion;
 mod names;

@@ -62,7 +62,7 @@ fn main() -> std::process::ExitCode {
 fn run(options: Options) -> Result<(), BridgeError> {
     let (controller, states, trajectories) =
         (options.controller.clone(), options.states.clone(), options.trajectories.clone());
-    let lost = || eprintln!("takt-zenoh: a trajectory was lost: others wait to be carried out");
+    let lost = || eprintln!("takt-zenoh: the oldest trajectory was lost: too many wait to be carried out");
     let bridge = Bridge::open(options, lost)?;
     eprintln!("takt-zenoh: {controller} publishes {states} and takes {trajectories}");
     bridge.run(|| false, |words| eprintln!("takt-zenoh: {words}"))
