@@ -70,6 +70,8 @@ type Addressed = (RequestTarget, Request);
 
 /// The stops of one kind for one target. 0 stands for none.
 struct StopWord {
+    /// The newest one that was asked for.
+    newest: AtomicU64,
     /// The newest one that was asked for and not taken yet.
     asked: AtomicU64,
     /// The newest one that the real-time thread has taken.
@@ -97,7 +99,7 @@ pub fn client_requests(
     let empty = || Box::new((RequestTarget::All, Request::Sync(false)));
     let slot = || Slot { number: AtomicU64::new(0), request: AtomicCell::new(Some(empty())) };
     let targets = if groups > 1 { 1 + groups.min(MAX_GROUPS) } else { 1 };
-    let stop = || StopWord { asked: AtomicU64::new(0), taken: AtomicU64::new(0) };
+    let stop = || StopWord { newest: AtomicU64::new(0), asked: AtomicU64::new(0), taken: AtomicU64::new(0) };
     let slots: Box<[Slot]> = (0..waiting.min(WAITING_AT_MOST)).map(|_| slot()).collect();
     let all = (0..slots.len()).fold(0, |bits, slot| bits | 1 << slot);
     let shared = Arc::new(Shared {
@@ -141,6 +143,7 @@ impl ClientRequests {
     pub fn stop_of(&self, target: RequestTarget, end: MotionEnd) -> RequestId {
         let id = self.shared.numbers.next();
         if let Some(stop) = self.shared.stop(target, end) {
+            stop.newest.fetch_max(id.0, Ordering::Release);
             stop.asked.fetch_max(id.0, Ordering::Release);
         }
         id
@@ -156,10 +159,19 @@ impl ClientRequests {
     /// The newest stop that the real-time thread has taken, of any kind, and that concerns requests for this target. It has discarded
     /// all of these with a smaller number that had not been taken until then.
     pub fn newest_stop(&self, target: RequestTarget) -> RequestId {
+        self.newest_of(target, |stop| &stop.taken)
+    }
+
+    /// The newest stop that was asked for, of any kind, and that concerns requests for this target.
+    pub fn newest_asked_stop(&self, target: RequestTarget) -> RequestId {
+        self.newest_of(target, |stop| &stop.newest)
+    }
+
+    fn newest_of(&self, target: RequestTarget, number: fn(&StopWord) -> &AtomicU64) -> RequestId {
         let of_targets = self.shared.stops.chunks(MotionEnd::ALL.len()).enumerate();
         let stops = of_targets.filter(|(place, _)| concerns(*place, target)).flat_map(|(_, stops)| stops);
-        let taken = stops.map(|stop| stop.taken.load(Ordering::Acquire));
-        RequestId(taken.max().unwrap_or(0))
+        let numbers = stops.map(|stop| number(stop).load(Ordering::Acquire));
+        RequestId(numbers.max().unwrap_or(0))
     }
 
     fn claim(&self) -> Option<(u64, &Slot)> {

@@ -3,7 +3,10 @@
 use std::path::Path;
 use std::time::Duration;
 
-use takt::{Config, MotionError, Phase, StopCategory, StreamError, StreamState, VirtualController};
+use takt::{
+    CommandError, Config, MotionError, Phase, StopCategory, StreamError, StreamState, Trajectory,
+    TrajectoryPoint, VirtualController,
+};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -140,4 +143,28 @@ fn a_stop_overtakes_every_motion_that_waits() {
     // And nothing of them is left behind.
     let again = arm.move_to(&far).unwrap();
     assert_eq!(arm.wait(again, PATIENCE), Ok(()));
+}
+
+#[test]
+fn a_stop_overtakes_a_trajectory_that_is_still_computed() {
+    let arm = simulated("arm6-erob.toml");
+    let home: Vec<f64> = arm.state().axes().iter().map(|axis| axis.position_set).collect();
+    let positions: Vec<f64> = home.iter().map(|home| home + 0.05).collect();
+    let points = [TrajectoryPoint { time_s: 2.0, positions, ..TrajectoryPoint::default() }];
+    // Those before it do not concern it.
+    arm.stop(StopCategory::Two).unwrap();
+    arm.pass(Duration::from_millis(100));
+    let along = arm.execute(&points).unwrap();
+    arm.pass(Duration::from_millis(500));
+    arm.stop(StopCategory::Two).unwrap();
+    arm.wait_for(Phase::Holding, PATIENCE).unwrap();
+    assert!(arm.wait(along, PATIENCE).is_err());
+    let here = joint(&arm);
+    let overtaken = arm.execute_with(|conditions| {
+        arm.stop(StopCategory::Two).unwrap();
+        Trajectory::new(&points, conditions)
+    });
+    assert_eq!(overtaken, Err(CommandError::Overtaken));
+    arm.pass(Duration::from_secs(1));
+    assert_eq!((joint(&arm), arm.state().groups()[0].phase), (here, Phase::Holding));
 }

@@ -173,19 +173,20 @@ impl GroupHandle {
         &self,
         make: impl Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>,
     ) -> Result<MotionId, CommandError> {
+        let stopped = self.newest_asked_stop();
         let mut trajectories = self.handle.0.trajectories.lock(self.number);
         let Some(present) = self.handle.under_way(&trajectories) else {
             let state = self.handle.state();
             let standing = |axis: &usize| state.axes().get(*axis).map(|axis| State::rest(axis.position_set));
             let start: Vec<State> = self.axes.iter().filter_map(standing).collect();
             let trajectory = self.made(&start, &make)?;
-            return self.begin(&mut trajectories, trajectory, ExecutionStart::Now, None);
+            return self.begin(&mut trajectories, trajectory, ExecutionStart::Now, stopped, None);
         };
         let start = |at_s: f64| -> Vec<State> {
             let states = present.given.trajectory().sample(at_s).states;
             self.axes.iter().zip(states).map(|(_, state)| state).collect()
         };
-        self.take_over(&mut trajectories, &present, None, |at_s| self.made(&start(at_s), &make))
+        self.take_over(&mut trajectories, &present, stopped, None, |at_s| self.made(&start(at_s), &make))
     }
 
     /// As [`Handle::move_through`], for the axes of the group in the order of [`GroupHandle::axes`].
@@ -218,6 +219,7 @@ impl GroupHandle {
         MotionId { request: motion, .. }: MotionId,
         wanted: impl Fn(&Present) -> (f64, bool),
     ) -> Result<(), CommandError> {
+        let stopped = self.newest_asked_stop();
         let mut trajectories = self.handle.0.trajectories.lock(self.number);
         let present = self.handle.under_way(&trajectories).filter(|present| present.motion == motion);
         let present = present.ok_or(CommandError::NoTrajectory)?;
@@ -233,7 +235,7 @@ impl GroupHandle {
         }
         let limits = self.limits();
         let (wanted, of) = (actual(&next), present.given.trajectory());
-        self.take_over(&mut trajectories, &present, Some(&next), |at_s| {
+        self.take_over(&mut trajectories, &present, stopped, Some(&next), |at_s| {
             Ok(of.at_rate(at_s, wanted, &limits)?)
         })?;
         Ok(())
@@ -245,6 +247,7 @@ impl GroupHandle {
         &self,
         trajectories: &mut TrajectoryState,
         present: &Present,
+        stopped: RequestId,
         same: Option<&Present>,
         make: impl Fn(f64) -> Result<Trajectory, CommandError>,
     ) -> Result<MotionId, CommandError> {
@@ -258,7 +261,7 @@ impl GroupHandle {
                 cycles: cycles as u64,
                 is_same_motion: same.is_some(),
             };
-            match self.begin(trajectories, trajectory, start, same) {
+            match self.begin(trajectories, trajectory, start, stopped, same) {
                 Err(CommandError::Refused(refused))
                     if refused.refusal.map(|refusal| refusal.reason) == Some(RejectReason::TooLate)
                         && margin_s < LONGEST_MARGIN_S =>
@@ -270,14 +273,19 @@ impl GroupHandle {
         }
     }
 
-    /// Hands a trajectory over, and waits until it is granted and has begun.
+    /// Hands a trajectory over, and waits until it is granted and has begun. `stopped` is the newest stop before it was asked for: a later
+    /// one discards it.
     fn begin(
         &self,
         trajectories: &mut TrajectoryState,
         trajectory: Trajectory,
         start: ExecutionStart,
+        stopped: RequestId,
         same: Option<&Present>,
     ) -> Result<MotionId, CommandError> {
+        if self.newest_asked_stop() != stopped {
+            return Err(CommandError::Overtaken);
+        }
         let giver = &self.handle.0.trajectories.giver;
         self.take_back_discarded(trajectories);
         let given = Arc::new(GivenTrajectory::new(trajectory, GroupAxes::new(self.axes.clone())));
@@ -315,6 +323,10 @@ impl GroupHandle {
             !is_discarded && state.answers.of(*request) == takt_rt::Answer::None
         });
         self.handle.0.trajectories.giver.release();
+    }
+
+    fn newest_asked_stop(&self) -> RequestId {
+        self.handle.0.clients.newest_asked_stop(self.target())
     }
 
     fn limits(&self) -> Vec<AxisLimits> {
