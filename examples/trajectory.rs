@@ -25,7 +25,7 @@ pub fn run(arm: &Handle) -> takt::Result {
     let point =
         |time_s, offset| TrajectoryPoint { time_s, positions: from_home(offset), ..Default::default() };
 
-    // A spline through the points, since they come without velocities.
+    // Smoothly from point to point, since they come without velocities.
     let points = [point(1.0, 0.05), point(2.0, 0.0), point(3.0, -0.05)];
     let motion = arm.execute(&points)?;
     arm.set_speed(motion, 0.5)?;

@@ -200,7 +200,7 @@ pub use remote::{Client, ClientEvents, ClientGroup, ClientStream, ConnectError, 
 #[cfg(target_os = "linux")]
 pub use serve::{ServeError, ServeOptions, Server, serve};
 pub use telemetry::{Notice, RecordingDestination};
-pub use trajectory::{Trajectory, TrajectoryError, TrajectoryPoint};
+pub use trajectory::{Interpolation, Trajectory, TrajectoryError, TrajectoryPoint};
 
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;

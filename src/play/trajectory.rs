@@ -6,7 +6,7 @@ use super::error::{FileProblem, PlayFileError};
 use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
 use crate::config::{Axis, Config};
-use crate::trajectory::{AxisPoints, Trajectory, TrajectoryConditions, TrajectoryError};
+use crate::trajectory::{AxisPoints, Interpolation, Trajectory, TrajectoryConditions, TrajectoryError};
 
 /// The rows of a file by the times that they are meant for.
 #[derive(Clone, Debug)]
@@ -93,7 +93,8 @@ impl FileTrajectory {
             let standing = || AxisPoints::standing(start.position, self.times_s.len());
             points.cloned().unwrap_or_else(standing)
         });
-        Trajectory::of_axes(&self.times_s, &points.collect::<Vec<_>>(), conditions)
+        let points: Vec<_> = points.collect();
+        Trajectory::of_axes(&self.times_s, &points, Interpolation::default(), conditions)
     }
 
     /// Checks the file before anything moves: the axes that it names will begin at its first point, and the others do not move.

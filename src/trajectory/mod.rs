@@ -41,6 +41,7 @@ use interpolation::Knots;
 
 pub(crate) use error::axis_name;
 pub use error::{BrokenLimit, PointQuantity, TrajectoryError};
+pub use interpolation::Interpolation;
 pub use point::{AxisPoints, TrajectoryPoint};
 pub use time_law::RateError;
 
@@ -83,7 +84,8 @@ impl Trajectory {
     /// A trajectory through these points, from the present set-points.
     ///
     /// A first point at the time 0 must be where the axes are. With a later one the trajectory goes there first, from the present
-    /// position, velocity and acceleration. Without velocities it ends at rest.
+    /// position, velocity and acceleration. Without velocities it ends at rest, and is nowhere beyond the points on both sides of it
+    /// ([`Interpolation::Monotone`]).
     ///
     /// # Errors
     /// The first thing that is wrong, with the point and the axis: see [`TrajectoryError`].
@@ -91,9 +93,21 @@ impl Trajectory {
         points: &[TrajectoryPoint],
         conditions: &TrajectoryConditions<'_>,
     ) -> Result<Self, TrajectoryError> {
+        Self::interpolated(points, Interpolation::default(), conditions)
+    }
+
+    /// The same, with a choice of how it goes through positions without velocities.
+    ///
+    /// # Errors
+    /// As [`Trajectory::new`].
+    pub fn interpolated(
+        points: &[TrajectoryPoint],
+        interpolation: Interpolation,
+        conditions: &TrajectoryConditions<'_>,
+    ) -> Result<Self, TrajectoryError> {
         let times_s: Vec<f64> = points.iter().map(|point| point.time_s).collect();
         let columns = point::columns(points, conditions.limits.len())?;
-        Self::of_axes(&times_s, &columns, conditions)
+        Self::of_axes(&times_s, &columns, interpolation, conditions)
     }
 
     /// The same, with the points of each axis beside each other. So one axis may have velocities, and another one none.
@@ -103,6 +117,7 @@ impl Trajectory {
     pub fn of_axes(
         times_s: &[f64],
         axes: &[AxisPoints],
+        interpolation: Interpolation,
         conditions: &TrajectoryConditions<'_>,
     ) -> Result<Self, TrajectoryError> {
         check_times(times_s)?;
@@ -127,7 +142,7 @@ impl Trajectory {
             .iter()
             .zip(conditions.start)
             .zip(conditions.limits)
-            .map(|((points, start), limits)| polynomials(&knot_times, points, start, limits))
+            .map(|((points, start), limits)| polynomials(&knot_times, points, interpolation, start, limits))
             .collect();
         let path = Path::new(&knot_times, &of_axes, first);
         path.check(conditions.limits)?;
@@ -385,6 +400,7 @@ fn check_end(
 fn polynomials(
     times_s: &[f64],
     points: &AxisPoints,
+    interpolation: Interpolation,
     start: &State,
     limits: &AxisLimits,
 ) -> (Vec<Polynomial>, Polynomial) {
@@ -396,6 +412,7 @@ fn polynomials(
         start: *start,
         end: State::default(),
         is_jerk_limited: limits.jerk.is_finite(),
+        interpolation,
     });
     let velocity = points.velocities.as_ref().and_then(|values| values.last().copied()).unwrap_or(0.0);
     let position = points.positions.last().copied().unwrap_or(start.position);

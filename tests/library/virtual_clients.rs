@@ -91,6 +91,29 @@ fn the_same_calls_give_the_same_run() {
 }
 
 #[test]
+fn an_axis_that_waits_in_a_trajectory_stands_still_and_one_that_goes_on_is_nowhere_beyond_its_points() {
+    for velocities in [vec![], vec![0.0]] {
+        let arm = simulated("first.toml");
+        let home = set_points(&arm.state())[0];
+        let point = |time_s, offset: f64| TrajectoryPoint {
+            time_s,
+            positions: vec![home + offset],
+            velocities: velocities.clone(),
+            ..TrajectoryPoint::default()
+        };
+        let along =
+            arm.execute(&[point(20.0, 0.0), point(21.5, 0.1), point(31.5, 0.1), point(33.0, 0.0)]).unwrap();
+        let mut seen = vec![];
+        while arm.result_of(along).is_none() {
+            seen.push(set_points(&arm.advance(1).unwrap())[0] - home);
+        }
+        assert!(seen[..19_900].iter().all(|offset| *offset == 0.0), "{velocities:?}");
+        assert!(seen[21_600..31_400].iter().all(|offset| (offset - 0.1).abs() < 1e-12), "{velocities:?}");
+        assert!(seen.iter().all(|offset| (-1e-12..=0.1 + 1e-12).contains(offset)), "{velocities:?}");
+    }
+}
+
+#[test]
 fn time_passes_only_while_somebody_waits() {
     let arm = simulated("first.toml");
     let (before, now_ns) = (arm.state(), arm.now_ns());

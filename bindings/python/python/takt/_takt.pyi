@@ -123,8 +123,9 @@ class Group:
     ) -> Motion:
         """Carries out points with times (seconds from now), as a JointTrajectory of ROS has them: a row of `q` for each.
 
-        All of it is checked before anything moves: `TrajectoryError` has the first point, axis and limit. A first point at 0 must be
-        where the axes are. While another trajectory is under way, this one takes its place without a step.
+        Without `qd` a smooth curve leads through the points and ends at rest; nowhere is it beyond the points on both sides of it. All of
+        it is checked before anything moves: `TrajectoryError` has the first point, axis and limit. A first point at 0 must be where the
+        axes are. While another trajectory is under way, this one takes its place without a step.
         """
 
     def follow(self) -> Stream:
