@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 use std::thread;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use takt::rt::linux::MonotonicClock;
 use takt::rt::{Clock, StopCategory};
@@ -210,28 +210,64 @@ impl Bridge {
     }
 
     fn carry_out(&self, is_over: &impl Fn() -> bool, tell: &impl Fn(&str)) {
+        let mut later: Vec<Later> = vec![];
         while !is_over() {
-            let Some(Taken { message, stops }) = self.inbox.take(LOOK) else { continue };
-            let decoded = JointTrajectory::decode(&message).ok_or(Unfit::NotCdr);
-            let groups = &self.controller.machine().groups;
-            let found = decoded.and_then(|trajectory| {
-                wanted(&trajectory, &self.axes, groups, &self.controller.state(), time_of_day_ns())
-            });
-            match found {
-                Err(reason) => tell(&format!("a trajectory was refused: {reason}")),
-                Ok(wanted) => match self.begin(&wanted) {
-                    Err(reason) => {
-                        let reason = reason.naming(&self.axes_of(&wanted));
-                        tell(&format!("a trajectory was refused: {reason}"));
-                    }
-                    Ok(()) => tell(&words_of(&wanted)),
-                },
+            let next = later.iter().map(|later| later.due.saturating_duration_since(Instant::now())).min();
+            let taken = self.inbox.take(next.map_or(LOOK, |next| next.min(LOOK)));
+            if let Some(Taken { message, stops }) = taken {
+                match JointTrajectory::decode(&message) {
+                    Some(trajectory) => self.receive(trajectory, stops, &mut later, tell),
+                    None => tell(&format!("a trajectory was refused: {}", Unfit::NotCdr)),
+                }
             }
-            // A stop that has come meanwhile may have overtaken what has just begun.
-            if self.inbox.stops() != stops {
-                let _ = self.controller.stop(StopCategory::Two);
+            // Whatever waits at the time of a stop is discarded.
+            later.retain(|later| later.stops == self.inbox.stops());
+            let now = Instant::now();
+            for Later { trajectory, stops, .. } in later.extract_if(.., |later| later.due <= now) {
+                self.carry_out_now(&trajectory, stops, tell);
             }
         }
+    }
+
+    /// Begins a trajectory, or lets it wait for its time. It takes the place of those of its group that wait.
+    fn receive(&self, trajectory: JointTrajectory, stops: u64, later: &mut Vec<Later>, tell: &impl Fn(&str)) {
+        if let Ok(Wanted::Execute { group, delay, .. }) = self.wanted(&trajectory) {
+            later.retain(|later| later.group != group);
+            if !delay.is_zero() {
+                tell(&format!("a trajectory begins in {:.3} s", delay.as_secs_f64()));
+                let due = Instant::now() + delay;
+                later.push(Later {
+                    due,
+                    group,
+                    stops,
+                    trajectory: JointTrajectory { at_ns: 0, ..trajectory },
+                });
+                return;
+            }
+        }
+        self.carry_out_now(&trajectory, stops, tell);
+    }
+
+    fn carry_out_now(&self, trajectory: &JointTrajectory, stops: u64, tell: &impl Fn(&str)) {
+        match self.wanted(trajectory) {
+            Err(reason) => tell(&format!("a trajectory was refused: {reason}")),
+            Ok(wanted) => match self.begin(&wanted) {
+                Err(reason) => {
+                    let reason = reason.naming(&self.axes_of(&wanted));
+                    tell(&format!("a trajectory was refused: {reason}"));
+                }
+                Ok(()) => tell(&words_of(&wanted)),
+            },
+        }
+        // A stop that has come meanwhile may have overtaken what has just begun.
+        if self.inbox.stops() != stops {
+            let _ = self.controller.stop(StopCategory::Two);
+        }
+    }
+
+    fn wanted(&self, trajectory: &JointTrajectory) -> Result<Wanted, Unfit> {
+        let groups = &self.controller.machine().groups;
+        wanted(trajectory, &self.axes, groups, &self.controller.state(), time_of_day_ns())
     }
 
     /// The names of the axes that it is for.
@@ -246,12 +282,21 @@ impl Bridge {
     fn begin(&self, wanted: &Wanted) -> Result<(), CommandError> {
         match wanted {
             Wanted::Stop => self.controller.stop(StopCategory::Two),
-            Wanted::Execute { group, points } => match self.controller.machine().groups.get(*group) {
+            Wanted::Execute { group, points, .. } => match self.controller.machine().groups.get(*group) {
                 Some(group) => self.controller.group(group)?.execute(points).map(drop),
                 None => self.controller.execute(points).map(drop),
             },
         }
     }
+}
+
+/// A trajectory that waits for its time.
+struct Later {
+    due: Instant,
+    group: usize,
+    /// The stops that had come before it.
+    stops: u64,
+    trajectory: JointTrajectory,
 }
 
 fn words_of(wanted: &Wanted) -> String {

@@ -1,12 +1,16 @@
 //! A joint trajectory as points of takt.
 
+use std::time::Duration;
+
 use takt::{Snapshot, TrajectoryPoint};
 use thiserror::Error;
 
 use crate::messages::{JointPoint, JointTrajectory};
 
-/// How far the beginning of a trajectory may lie in the past, for the way that it has come: 0.5 s.
+/// The beginning of a trajectory may be this long ago, for the way that it has come.
 const LATE_NS: i64 = 500_000_000;
+/// The beginning of a trajectory may be this far ahead: who waits longer has probably another clock.
+const EARLY_NS: i64 = 30_000_000_000;
 
 /// Why a trajectory is not carried out.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -57,10 +61,28 @@ pub enum Unfit {
         point: usize,
     },
     /// It should have begun long ago.
-    #[error("it should have begun {ago_s:.3} s ago: are the clocks of both computers alike?")]
+    #[error(
+        "its stamp, {stamp_s:.3} s on the sender's clock, is {:.3} s behind {now_s:.3} s on this computer's clock (allowed: {:.1} s). \
+         Synchronize both clocks, or stamp it with 0 to begin at once",
+        now_s - stamp_s, seconds(LATE_NS)
+    )]
     Late {
-        /// Seconds.
-        ago_s: f64,
+        /// When it is to begin, by the clock of its sender: seconds since 1970.
+        stamp_s: f64,
+        /// The time by the clock of this computer.
+        now_s: f64,
+    },
+    /// It is to begin too far ahead.
+    #[error(
+        "its stamp, {stamp_s:.3} s on the sender's clock, is {:.3} s ahead of {now_s:.3} s on this computer's clock (allowed: {:.1} s). \
+         Synchronize both clocks, or stamp it with 0 to begin at once",
+        stamp_s - now_s, seconds(EARLY_NS)
+    )]
+    Early {
+        /// When it is to begin, by the clock of its sender: seconds since 1970.
+        stamp_s: f64,
+        /// The time by the clock of this computer.
+        now_s: f64,
     },
 }
 
@@ -81,6 +103,8 @@ pub enum Wanted {
     Execute {
         /// The number of the group.
         group: usize,
+        /// How long it waits before it begins. The wait is no part of it.
+        delay: Duration,
         /// Its points, for the axes of the group in their order.
         points: Vec<TrajectoryPoint>,
     },
@@ -104,11 +128,7 @@ pub fn wanted(
         let name = |group: usize| groups.get(group).cloned().unwrap_or_default();
         return Err(Unfit::SeveralGroups { first: name(group), other: name(other.group) });
     }
-    let delay_ns = if trajectory.at_ns == 0 { 0 } else { trajectory.at_ns.saturating_sub(now_ns) };
-    if delay_ns < -LATE_NS {
-        return Err(Unfit::Late { ago_s: delay_ns as f64 / -1e9 });
-    }
-    let delay_s = delay_ns.max(0) as f64 / 1e9;
+    let delay = delay(trajectory.at_ns, now_ns)?;
     let of_group: Vec<usize> = (0..axes.len()).filter(|axis| axes[*axis].group == group).collect();
     let set_points: Vec<f64> = of_group
         .iter()
@@ -118,16 +138,7 @@ pub fn wanted(
     let still = |are_given: bool| if are_given { vec![0.0; of_group.len()] } else { vec![] };
     let (velocities, accelerations) =
         (still(have(|point| &point.velocities)), still(have(|point| &point.accelerations)));
-    let mut points = Vec::with_capacity(trajectory.points.len() + 1);
-    if delay_s > 0.0 {
-        // It waits where it is.
-        points.push(TrajectoryPoint {
-            time_s: delay_s,
-            positions: set_points.clone(),
-            velocities: velocities.clone(),
-            accelerations: accelerations.clone(),
-        });
-    }
+    let mut points = Vec::with_capacity(trajectory.points.len());
     for (number, point) in trajectory.points.iter().enumerate() {
         check_lengths(number, point, named.len())?;
         let spread = |values: &[f64], others: &[f64]| -> Vec<f64> {
@@ -140,13 +151,30 @@ pub fn wanted(
                 .collect()
         };
         points.push(TrajectoryPoint {
-            time_s: delay_s + point.time_s,
+            time_s: point.time_s,
             positions: spread(&point.positions, &set_points),
             velocities: spread(&point.velocities, &velocities),
             accelerations: spread(&point.accelerations, &accelerations),
         });
     }
-    Ok(Wanted::Execute { group, points })
+    Ok(Wanted::Execute { group, delay, points })
+}
+
+/// How long a trajectory with a stamp waits.
+fn delay(at_ns: i64, now_ns: i64) -> Result<Duration, Unfit> {
+    let ahead_ns = if at_ns == 0 { 0 } else { at_ns.saturating_sub(now_ns) };
+    let (stamp_s, now_s) = (seconds(at_ns), seconds(now_ns));
+    if ahead_ns < -LATE_NS {
+        return Err(Unfit::Late { stamp_s, now_s });
+    }
+    if ahead_ns > EARLY_NS {
+        return Err(Unfit::Early { stamp_s, now_s });
+    }
+    Ok(Duration::from_nanos(ahead_ns.max(0).unsigned_abs()))
+}
+
+fn seconds(ns: i64) -> f64 {
+    ns as f64 / 1e9
 }
 
 /// The axes that it names, in its order.
@@ -214,26 +242,45 @@ mod tests {
     #[test]
     fn joints_come_in_any_order_and_those_that_are_not_named_stay() {
         let both = of(&trajectory(&["b", "a"], vec![point(&[2.0, 1.0], 1.0)])).unwrap();
-        let Wanted::Execute { group: 0, points } = both else { panic!("{both:?}") };
+        let Wanted::Execute { group: 0, points, .. } = both else { panic!("{both:?}") };
         assert_eq!((points[0].positions.as_slice(), points[0].time_s), (&[1.0, 2.0][..], 1.0));
         let moving = JointPoint { velocities: vec![0.5], ..point(&[2.0], 1.0) };
         let one = of(&trajectory(&["b"], vec![moving])).unwrap();
         let Wanted::Execute { points, .. } = one else { panic!("{one:?}") };
         assert_eq!((&points[0].positions, &points[0].velocities), (&vec![0.1, 2.0], &vec![0.0, 0.5]));
         let hand = of(&trajectory(&["c"], vec![point(&[1.0], 1.0)])).unwrap();
-        assert!(matches!(hand, Wanted::Execute { group: 1, points } if points[0].positions == [1.0]));
+        assert!(matches!(hand, Wanted::Execute { group: 1, points, .. } if points[0].positions == [1.0]));
     }
 
     #[test]
-    fn what_begins_later_waits_where_it_is() {
-        let later = JointTrajectory { at_ns: 7_000_000_000, ..trajectory(&["c"], vec![point(&[1.0], 1.5)]) };
-        let Ok(Wanted::Execute { points, .. }) = of(&later) else { panic!() };
-        let times: Vec<_> = points.iter().map(|point| (point.time_s, point.positions[0])).collect();
-        assert_eq!(times, [(2.0, 0.3), (3.5, 1.0)]);
-        let late = JointTrajectory { at_ns: 4_000_000_000, ..later.clone() };
-        assert_eq!(of(&late), Err(Unfit::Late { ago_s: 1.0 }));
-        let just = JointTrajectory { at_ns: 4_900_000_000, ..later };
-        assert!(matches!(of(&just), Ok(Wanted::Execute { points, .. }) if points[0].time_s == 1.5));
+    fn the_wait_before_a_trajectory_is_no_part_of_it() {
+        for at_ns in [0, 7_000_000_000, 4_900_000_000, 35_000_000_000] {
+            let stamped = JointTrajectory { at_ns, ..trajectory(&["c"], vec![point(&[1.0], 1.5)]) };
+            let Ok(Wanted::Execute { delay, points, .. }) = of(&stamped) else {
+                panic!("{:?}", of(&stamped))
+            };
+            let times: Vec<_> = points.iter().map(|point| (point.time_s, point.positions[0])).collect();
+            assert_eq!(times, [(1.5, 1.0)]);
+            let expected_ns = if at_ns == 0 { 0 } else { (at_ns - 5_000_000_000).max(0) };
+            assert_eq!(delay, Duration::from_nanos(expected_ns.unsigned_abs()));
+        }
+    }
+
+    #[test]
+    fn a_stamp_of_another_clock_is_refused_with_both_times() {
+        let stamped = |at_ns| of(&JointTrajectory { at_ns, ..trajectory(&["c"], vec![point(&[1.0], 1.5)]) });
+        let late = stamped(4_000_000_000).unwrap_err();
+        assert_eq!(
+            late.to_string(),
+            "its stamp, 4.000 s on the sender's clock, is 1.000 s behind 5.000 s on this computer's clock (allowed: 0.5 s). \
+             Synchronize both clocks, or stamp it with 0 to begin at once"
+        );
+        let early = stamped(36_000_000_000).unwrap_err();
+        assert_eq!(
+            early.to_string(),
+            "its stamp, 36.000 s on the sender's clock, is 31.000 s ahead of 5.000 s on this computer's clock (allowed: 30.0 s). \
+             Synchronize both clocks, or stamp it with 0 to begin at once"
+        );
     }
 
     #[test]
