@@ -206,6 +206,9 @@ pub enum LeaseError {
     /// The process of the controller has no room for another client that commands.
     #[error("too many clients are connected to the controller")]
     TooManyClients,
+    /// The lease has ended while points of a trajectory came, and they were forgotten with it. None of them is carried out.
+    #[error("the lease has ended before all points of the trajectory came: send it again")]
+    Lost,
 }
 
 /// Why points were not taken; none of them was, then.

@@ -253,13 +253,14 @@ impl Client {
     /// Hands the points of a trajectory over, and asks to carry it out.
     pub(super) fn trajectory(
         &self,
+        target: RequestTarget,
         points: &[TrajectoryPoint],
         command: Command,
     ) -> Result<MotionId, CommandError> {
         self.await_stops()?;
         let asked_ns = now_ns();
         let mut commands = self.0.asking.commands.lock().unwrap_or_else(PoisonError::into_inner);
-        for packet in packets_of_points(points) {
+        for packet in packets_of_points(target, points) {
             if let Reply::Refused(error) = self.ask_by(&mut commands, asked_ns, packet)? {
                 return Err(error);
             }

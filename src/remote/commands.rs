@@ -109,11 +109,26 @@ pub enum Command {
         points: Vec<Vec<AxisPoint>>,
     },
     /// Points for [`Command::Execute`] or [`Command::Through`], behind those that came before.
-    Points(Vec<TrajectoryPoint>),
+    Points {
+        /// Whose axes.
+        target: RequestTarget,
+        /// The points.
+        points: Vec<TrajectoryPoint>,
+    },
     /// To carry out the trajectory through the points that have come.
-    Execute(RequestTarget),
+    Execute {
+        /// Whose axes.
+        target: RequestTarget,
+        /// How many points have been sent.
+        points: usize,
+    },
     /// The same through waypoints: the positions of the points that have come.
-    Through(RequestTarget),
+    Through {
+        /// Whose axes.
+        target: RequestTarget,
+        /// How many points have been sent.
+        points: usize,
+    },
     /// Another speed along a trajectory.
     SetSpeed {
         /// The trajectory.
@@ -161,26 +176,32 @@ const QUESTION: u64 = 22;
 
 /// The words of a point of a trajectory beside its values: its time and three counts.
 const POINT_HEAD: usize = 4;
+
+/// The words of a point of a trajectory.
+pub fn words_of_point(
+    TrajectoryPoint { positions, velocities, accelerations, .. }: &TrajectoryPoint,
+) -> usize {
+    POINT_HEAD + positions.len() + velocities.len() + accelerations.len()
+}
 /// The words of a packet before what repeats in it, at most.
 const HEAD: usize = 8;
 
 /// The points of a trajectory, in as many packets as they need. A point for more axes than any controller has is in a packet of its own,
 /// however long that is.
-pub fn packets_of_points(points: &[TrajectoryPoint]) -> Vec<Command> {
+pub fn packets_of_points(target: RequestTarget, points: &[TrajectoryPoint]) -> Vec<Command> {
     let mut packets = vec![];
     let (mut now, mut room) = (vec![], PACKET_WORDS - HEAD);
     for point in points {
-        let values = point.positions.len() + point.velocities.len() + point.accelerations.len();
-        let words = POINT_HEAD + values;
+        let words = words_of_point(point);
         if words > room && !now.is_empty() {
-            packets.push(Command::Points(std::mem::take(&mut now)));
+            packets.push(Command::Points { target, points: std::mem::take(&mut now) });
             room = PACKET_WORDS - HEAD;
         }
         room = room.saturating_sub(words);
         now.push(point.clone());
     }
     if !now.is_empty() {
-        packets.push(Command::Points(now));
+        packets.push(Command::Points { target, points: now });
     }
     packets
 }
@@ -218,7 +239,6 @@ impl Command {
             | Self::Velocity { .. }
             | Self::Torque { .. }
             | Self::ChangeAxisMode { .. }
-            | Self::Points(_)
             | Self::Question { .. } => None,
             Self::SetSpeed { motion, .. }
             | Self::Pause(motion)
@@ -228,8 +248,9 @@ impl Command {
             | Self::Disable(target)
             | Self::ResetFaults(target)
             | Self::BeginStream(target)
-            | Self::Execute(target)
-            | Self::Through(target)
+            | Self::Points { target, .. }
+            | Self::Execute { target, .. }
+            | Self::Through { target, .. }
             | Self::Move { target, .. }
             | Self::MoveBy { target, .. }
             | Self::ChangeMode { target, .. }
@@ -245,7 +266,7 @@ impl Command {
             Self::Lease { .. }
                 | Self::Release
                 | Self::Disable(_)
-                | Self::Points(_)
+                | Self::Points { .. }
                 | Self::Progress(_)
                 | Self::Question { .. }
         )
@@ -297,17 +318,17 @@ impl Command {
                 put.word(CHUNK).target(*target).word(*from_ns).duration(*interval).index(points.len());
                 points.iter().for_each(|axes| put_entries(axes, put));
             }
-            Self::Points(points) => {
-                put.word(POINTS).index(points.len());
+            Self::Points { target, points } => {
+                put.word(POINTS).target(*target).index(points.len());
                 for TrajectoryPoint { time_s, positions, velocities, accelerations } in points {
                     put.number(*time_s).numbers(positions).numbers(velocities).numbers(accelerations);
                 }
             }
-            Self::Execute(target) => {
-                put.word(EXECUTE).target(*target);
+            Self::Execute { target, points } => {
+                put.word(EXECUTE).target(*target).index(*points);
             }
-            Self::Through(target) => {
-                put.word(THROUGH).target(*target);
+            Self::Through { target, points } => {
+                put.word(THROUGH).target(*target).index(*points);
             }
             Self::SetSpeed { motion, rate } => {
                 put_motion(*motion, put.word(SET_SPEED));
@@ -362,6 +383,7 @@ impl Command {
                 Self::Chunk { target, from_ns, interval, points }
             }
             POINTS => {
+                let target = take.target()?;
                 let count = take.count_of(POINT_HEAD)?;
                 let point = |_| {
                     Ok(TrajectoryPoint {
@@ -371,10 +393,10 @@ impl Command {
                         accelerations: take.numbers()?,
                     })
                 };
-                Self::Points((0..count).map(point).collect::<Result<_, _>>()?)
+                Self::Points { target, points: (0..count).map(point).collect::<Result<_, _>>()? }
             }
-            EXECUTE => Self::Execute(take.target()?),
-            THROUGH => Self::Through(take.target()?),
+            EXECUTE => Self::Execute { target: take.target()?, points: take.index()? },
+            THROUGH => Self::Through { target: take.target()?, points: take.index()? },
             SET_SPEED => Self::SetSpeed { motion: take_motion(take)?, rate: take.number()? },
             PAUSE => Self::Pause(take_motion(take)?),
             RESUME => Self::Resume(take_motion(take)?),

@@ -52,6 +52,7 @@ pub use group::ClientGroup;
 pub use stream::ClientStream;
 
 pub use crate::packet::Malformed;
+pub(crate) use commands::words_of_point;
 pub use commands::{Command, Demand, StopRequest};
 pub(crate) use layout::{Description, LeaseShown, STOP_WORDS};
 pub(crate) use memory::Memory;

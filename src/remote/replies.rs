@@ -243,6 +243,9 @@ fn put_lease_error(error: &LeaseError, put: &mut Put) {
         LeaseError::TooManyClients => {
             put.word(4);
         }
+        LeaseError::Lost => {
+            put.word(5);
+        }
     }
 }
 
@@ -253,6 +256,7 @@ fn take_lease_error(take: &mut Take<'_>) -> Result<LeaseError, Malformed> {
         2 => LeaseError::TakenOver { process: process(take.word()?)? },
         3 => LeaseError::ReadOnly,
         4 => LeaseError::TooManyClients,
+        5 => LeaseError::Lost,
         _ => return Err(Malformed),
     })
 }

@@ -91,7 +91,7 @@ impl RunningController for Client {
         target: RequestTarget,
         points: &[TrajectoryPoint],
     ) -> Result<MotionId, CommandError> {
-        self.trajectory(points, Command::Execute(target))
+        self.trajectory(target, points, Command::Execute { target, points: points.len() })
     }
 
     fn begin_through(&self, target: RequestTarget, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
@@ -100,7 +100,7 @@ impl RunningController for Client {
             ..TrajectoryPoint::default()
         };
         let points: Vec<TrajectoryPoint> = waypoints.iter().map(point).collect();
-        self.trajectory(&points, Command::Through(target))
+        self.trajectory(target, &points, Command::Through { target, points: points.len() })
     }
 
     fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError> {

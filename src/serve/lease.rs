@@ -2,8 +2,14 @@
 
 use std::time::Duration;
 
-use crate::command::LeaseError;
-use crate::remote::LeaseShown;
+use crate::command::{CommandError, LeaseError};
+use crate::remote::{LeaseShown, words_of_point};
+use crate::trajectory::{PointQuantity, TrajectoryError, TrajectoryPoint};
+
+/// Points of a trajectory that a client can hand over before it is carried out: 100 s at 1 kHz.
+const POINTS_AT_MOST: usize = 100_000;
+/// The 64-bit words of them: 32 MB. That is 100 s of ten axes at 1 kHz with velocities and accelerations.
+const WORDS_AT_MOST: usize = 4 << 20;
 
 /// A client, by the number of its connection and by its process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,10 +31,48 @@ pub struct Lease {
     generation: u64,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 struct Holder {
     claimant: Claimant,
     until_ns: u64,
+    /// What it has handed over of a trajectory. It goes with the lease.
+    points: KeptPoints,
+}
+
+/// Points of a trajectory that is to come.
+#[derive(Debug, Default)]
+struct KeptPoints {
+    points: Vec<TrajectoryPoint>,
+    words: usize,
+}
+
+impl KeptPoints {
+    /// Keeps points for so many axes, behind those that came before.
+    fn extend(&mut self, axes: usize, points: Vec<TrajectoryPoint>) -> Result<(), CommandError> {
+        for (point, number) in points.iter().zip(self.points.len()..) {
+            check_counts(number, point, axes)?;
+        }
+        self.words += points.iter().map(words_of_point).sum::<usize>();
+        if self.points.len() + points.len() > POINTS_AT_MOST || self.words > WORDS_AT_MOST {
+            return Err(CommandError::Full { waiting: self.points.len() });
+        }
+        self.points.extend(points);
+        Ok(())
+    }
+}
+
+/// Checks that a point has a value for each axis, of every kind that it has.
+fn check_counts(number: usize, point: &TrajectoryPoint, axes: usize) -> Result<(), TrajectoryError> {
+    for (quantity, values) in [
+        (PointQuantity::Position, &point.positions),
+        (PointQuantity::Velocity, &point.velocities),
+        (PointQuantity::Acceleration, &point.accelerations),
+    ] {
+        if !values.is_empty() && values.len() != axes {
+            return Err(TrajectoryError::Count { point: number, quantity, given: values.len(), axes });
+        }
+    }
+    Ok(())
 }
 
 impl Lease {
@@ -58,7 +102,7 @@ impl Lease {
 
     /// A command has been carried out: if its client still has the lease, it has it for the whole length from now on.
     pub fn prolong(&mut self, claimant: Claimant, now_ns: u64) {
-        if self.holder.is_some_and(|holder| holder.claimant == claimant) {
+        if self.holder.as_ref().is_some_and(|holder| holder.claimant == claimant) {
             self.give(claimant, now_ns);
         }
     }
@@ -67,14 +111,15 @@ impl Lease {
     pub fn take_over(&mut self, claimant: Claimant, now_ns: u64) {
         self.ousted.retain(|(connection, _)| *connection != claimant.connection);
         if let Some(holder) = self.other_holder(claimant, now_ns) {
-            self.ousted.push((holder.claimant.connection, claimant.process));
+            let ousted = holder.claimant.connection;
+            self.ousted.push((ousted, claimant.process));
         }
         self.give(claimant, now_ns);
     }
 
     /// A client gives the lease back.
     pub fn release(&mut self, connection: u64) {
-        self.holder = self.holder.filter(|holder| holder.claimant.connection != connection);
+        self.holder.take_if(|holder| holder.claimant.connection == connection);
     }
 
     /// A client has disconnected, or its process has ended.
@@ -83,23 +128,66 @@ impl Lease {
         self.ousted.retain(|(other, _)| *other != connection);
     }
 
+    /// Keeps points of a trajectory for so many axes, behind those that their client has handed over before, for as long as it has the
+    /// lease. After an error none is kept.
+    pub fn keep_points(
+        &mut self,
+        claimant: Claimant,
+        axes: usize,
+        points: Vec<TrajectoryPoint>,
+    ) -> Result<(), CommandError> {
+        let kept = self.points_of(claimant)?;
+        let extended = kept.extend(axes, points);
+        if extended.is_err() {
+            *kept = KeptPoints::default();
+        }
+        extended
+    }
+
+    /// The points that a client has handed over, which are so many.
+    pub fn take_points(
+        &mut self,
+        claimant: Claimant,
+        count: usize,
+    ) -> Result<Vec<TrajectoryPoint>, LeaseError> {
+        let KeptPoints { points, .. } = std::mem::take(self.points_of(claimant)?);
+        if points.len() == count { Ok(points) } else { Err(LeaseError::Lost) }
+    }
+
+    fn points_of(&mut self, claimant: Claimant) -> Result<&mut KeptPoints, LeaseError> {
+        let holder = self.holder.as_mut().filter(|holder| holder.claimant == claimant);
+        holder.map(|holder| &mut holder.points).ok_or(LeaseError::Lost)
+    }
+
+    /// Forgets what belongs to a lease that has expired.
+    pub fn forget_expired(&mut self, now_ns: u64) {
+        if let Some(holder) = self.holder.as_mut().filter(|holder| now_ns >= holder.until_ns) {
+            holder.points = KeptPoints::default();
+        }
+    }
+
     /// As observers see it.
     pub fn shown(&self, now_ns: u64) -> LeaseShown {
-        let holder = self.holder.filter(|holder| now_ns < holder.until_ns);
-        let shown = |holder: Holder| (holder.claimant.process, holder.until_ns);
+        let holder = self.holder.as_ref().filter(|holder| now_ns < holder.until_ns);
+        let shown = |holder: &Holder| (holder.claimant.process, holder.until_ns);
         let (process, until_ns) = holder.map_or((0, 0), shown);
         LeaseShown { process, until_ns, generation: self.generation }
     }
 
     fn give(&mut self, claimant: Claimant, now_ns: u64) {
-        if self.holder.is_none_or(|holder| holder.claimant != claimant) {
-            self.generation += 1;
+        self.forget_expired(now_ns);
+        let until_ns = now_ns.saturating_add(self.length_ns);
+        match &mut self.holder {
+            Some(holder) if holder.claimant == claimant => holder.until_ns = until_ns,
+            _ => {
+                self.generation += 1;
+                self.holder = Some(Holder { claimant, until_ns, points: KeptPoints::default() });
+            }
         }
-        self.holder = Some(Holder { claimant, until_ns: now_ns.saturating_add(self.length_ns) });
     }
 
-    fn other_holder(&self, claimant: Claimant, now_ns: u64) -> Option<Holder> {
-        self.holder.filter(|holder| holder.claimant != claimant && now_ns < holder.until_ns)
+    fn other_holder(&self, claimant: Claimant, now_ns: u64) -> Option<&Holder> {
+        self.holder.as_ref().filter(|holder| holder.claimant != claimant && now_ns < holder.until_ns)
     }
 
     fn ousted_by(&self, claimant: Claimant) -> Option<u32> {
@@ -158,6 +246,59 @@ mod tests {
         assert_eq!(lease.renew(FIRST, 901 * MS), taken_over);
         lease.take_over(FIRST, 902 * MS);
         assert_eq!(lease.renew(FIRST, 903 * MS), Ok(()));
+    }
+
+    fn point(positions: usize) -> TrajectoryPoint {
+        TrajectoryPoint { positions: vec![0.0; positions], ..TrajectoryPoint::default() }
+    }
+
+    #[test]
+    fn points_are_kept_for_the_axes_of_their_target_alone_and_up_to_a_bound_of_their_words() {
+        let mut lease = Lease::new(LENGTH);
+        assert_eq!(lease.keep_points(FIRST, 6, vec![point(6)]), Err(LeaseError::Lost.into()), "it has none");
+        lease.renew(FIRST, 0).unwrap();
+        assert_eq!(lease.keep_points(FIRST, 6, vec![point(6); 3]), Ok(()));
+        let count =
+            TrajectoryError::Count { point: 4, quantity: PointQuantity::Position, given: 8_000, axes: 6 };
+        assert_eq!(lease.keep_points(FIRST, 6, vec![point(6), point(8_000)]), Err(count.into()));
+        let moving = TrajectoryPoint { accelerations: vec![0.0; 7], ..point(6) };
+        let count =
+            TrajectoryError::Count { point: 0, quantity: PointQuantity::Acceleration, given: 7, axes: 6 };
+        assert_eq!(
+            lease.keep_points(FIRST, 6, vec![moving]),
+            Err(count.into()),
+            "those before are forgotten"
+        );
+        for (axes, at_most) in [(6, POINTS_AT_MOST), (96, WORDS_AT_MOST / 100)] {
+            let each = 100;
+            let kept = (0..POINTS_AT_MOST)
+                .take_while(|_| lease.keep_points(FIRST, axes, vec![point(axes); each]).is_ok());
+            let kept = kept.count() * each;
+            assert!((at_most - each..=at_most).contains(&kept), "{kept} points of {axes} axes");
+            assert_eq!(lease.take_points(FIRST, 0), Ok(vec![]), "none is kept after an error");
+        }
+    }
+
+    #[test]
+    fn points_go_with_the_lease_and_no_trajectory_begins_with_a_part_of_them() {
+        let mut lease = Lease::new(LENGTH);
+        let ends: [fn(&mut Lease); 4] = [
+            |lease| lease.release(FIRST.connection),
+            |lease| lease.take_over(SECOND, 100 * MS),
+            |lease| lease.forget_expired(500 * MS),
+            |lease| lease.renew(SECOND, 600 * MS).unwrap(),
+        ];
+        for end in ends {
+            lease = Lease::new(LENGTH);
+            lease.renew(FIRST, 0).unwrap();
+            lease.keep_points(FIRST, 1, vec![point(1); 2]).unwrap();
+            end(&mut lease);
+            lease.take_over(FIRST, 700 * MS);
+            lease.keep_points(FIRST, 1, vec![point(1)]).unwrap();
+            assert_eq!(lease.take_points(FIRST, 3), Err(LeaseError::Lost));
+            lease.keep_points(FIRST, 1, vec![point(1); 3]).unwrap();
+            assert_eq!(lease.take_points(FIRST, 3).map(|points| points.len()), Ok(3));
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::Served;
 use crate::command::{EventSource, WaitError};
-use crate::remote::{ShownWriter, now_ns};
+use crate::remote::{LeaseShown, ShownWriter, now_ns};
 
 /// How often it is shown that this process is alive while no cycle comes.
 const SILENCE: Duration = Duration::from_millis(50);
@@ -34,9 +34,15 @@ impl Publisher {
         }
         self.shown.events_lost(self.events.missed());
         self.shown.timing(self.served.controller.timing());
-        self.shown.lease(self.served.lease().shown(now_ns()));
+        self.shown.lease(self.lease());
         self.shown.state(&state, |target| self.served.controller.newest_stop(target));
         self.slot = state.slot;
+    }
+
+    fn lease(&self) -> LeaseShown {
+        let (mut lease, now_ns) = (self.served.lease(), now_ns());
+        lease.forget_expired(now_ns);
+        lease.shown(now_ns)
     }
 
     /// Shows every state until the controller or the server ends.

@@ -10,25 +10,20 @@ use crate::command::{CommandError, MotionId, StreamError};
 use crate::remote::{Answer, Command, Demand, Malformed, PACKET_WORDS, Packets, Received, Reply, now_ns};
 use crate::trajectory::TrajectoryPoint;
 
-/// Points of a trajectory that a client can hand over before it is carried out: 100 s at 1 kHz.
-const POINTS_AT_MOST: usize = 100_000;
-
 /// Carries the commands of one client out.
 pub struct Worker {
     served: Arc<Served>,
     claimant: Claimant,
-    /// The points of a trajectory that is to come.
-    points: Vec<TrajectoryPoint>,
 }
 
 impl Worker {
     /// For a client.
     pub const fn new(served: Arc<Served>, claimant: Claimant) -> Self {
-        Self { served, claimant, points: vec![] }
+        Self { served, claimant }
     }
 
     /// Carries commands out until the client disconnects, or sends what is no command.
-    pub fn run(mut self, connection: &Packets) {
+    pub fn run(self, connection: &Packets) {
         let mut words = [0; PACKET_WORDS];
         while let Received::Words(count) = connection.receive(&mut words, true) {
             let Ok(demand) = Demand::of(words.get(..count).unwrap_or_default()) else { break };
@@ -49,7 +44,7 @@ impl Worker {
     ///
     /// # Errors
     /// It names a group that there is not: its sender has not read the description.
-    pub fn answer(&mut self, command: Command, asked_ns: Nanoseconds) -> Result<Reply, Malformed> {
+    pub fn answer(&self, command: Command, asked_ns: Nanoseconds) -> Result<Reply, Malformed> {
         if let Some(RequestTarget::Group(group)) = command.target()
             && self.served.controller.axes_of(RequestTarget::Group(group)).is_empty()
         {
@@ -91,7 +86,7 @@ impl Worker {
         command.is_discarded_by_stops() && self.served.stops.came_after(target, asked_ns)
     }
 
-    fn carry_out(&mut self, command: Command) -> Reply {
+    fn carry_out(&self, command: Command) -> Reply {
         let controller = &self.served.controller;
         match command {
             Command::Lease { .. } | Command::Release => Reply::Done,
@@ -115,16 +110,17 @@ impl Worker {
             Command::Chunk { target, from_ns, interval, points } => {
                 taken(controller.push_chunk(target, from_ns, interval, &points))
             }
-            Command::Points(points) => self.keep(points),
-            Command::Execute(target) => {
-                let points = std::mem::take(&mut self.points);
-                motion(controller.begin_trajectory(target, &points))
+            Command::Points { target, points } => {
+                let axes = controller.axes_of(target).len();
+                done(self.served.lease().keep_points(self.claimant, axes, points))
             }
-            Command::Through(target) => {
-                let points = std::mem::take(&mut self.points);
+            Command::Execute { target, points } => motion(
+                self.take_points(points).and_then(|points| controller.begin_trajectory(target, &points)),
+            ),
+            Command::Through { target, points } => motion(self.take_points(points).and_then(|points| {
                 let waypoints: Vec<Vec<f64>> = points.into_iter().map(|point| point.positions).collect();
-                motion(controller.begin_through(target, &waypoints))
-            }
+                controller.begin_through(target, &waypoints)
+            })),
             Command::SetSpeed { motion, rate } => done(controller.set_speed(motion, rate)),
             Command::Pause(motion) => done(controller.pause(motion)),
             Command::Resume(motion) => done(controller.resume(motion)),
@@ -135,13 +131,9 @@ impl Worker {
         }
     }
 
-    fn keep(&mut self, points: Vec<TrajectoryPoint>) -> Reply {
-        if self.points.len() + points.len() > POINTS_AT_MOST {
-            self.points.clear();
-            return Reply::Refused(CommandError::Full { waiting: POINTS_AT_MOST });
-        }
-        self.points.extend(points);
-        Reply::Done
+    /// The points that have come, so many.
+    fn take_points(&self, count: usize) -> Result<Vec<TrajectoryPoint>, CommandError> {
+        Ok(self.served.lease().take_points(self.claimant, count)?)
     }
 }
 

@@ -35,7 +35,7 @@ fn a_stop_overtakes_the_packets_that_wait() {
         [
             remote::Command::Move { target: all, options, positions },
             remote::Command::BeginStream(all),
-            remote::Command::Execute(all),
+            remote::Command::Execute { target: all, points: 0 },
             remote::Command::Velocity { axis: 0, velocity: 0.1, valid_for: LONG },
         ]
     };
@@ -94,4 +94,17 @@ fn points_of_a_client_are_taken_while_it_streams_and_refused_at_any_other_time()
         client.wait_for(Phase::Holding, LONG).unwrap();
         refused(&client);
     }
+}
+
+#[test]
+fn points_of_a_trajectory_for_other_axes_than_those_of_the_group_are_refused_when_they_come() {
+    let served = Served::start("arm6-erob.toml");
+    let raw = Raw::connect(&served);
+    let points = |count| remote::Command::Points {
+        target: RequestTarget::All,
+        points: vec![TrajectoryPoint { positions: vec![0.0; count], ..TrajectoryPoint::default() }; 1],
+    };
+    assert_eq!(raw.ask(ClientStream::now_ns(), points(6)), Reply::Done);
+    let Reply::Refused(refused) = raw.ask(ClientStream::now_ns(), points(8_000)) else { panic!() };
+    assert_eq!(refused.to_string(), "point 1: 8000 values of position are given for 6 axes");
 }

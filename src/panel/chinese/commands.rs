@@ -61,6 +61,10 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "本进程只能观察控制器，不能控制：它无权写入控制器的套接字",
     ),
     ("too many clients are connected to the controller", "连接到控制器的客户端过多"),
+    (
+        "the lease has ended before all points of the trajectory came: send it again",
+        "轨迹的点尚未全部到达，控制权已失效：请重新发送轨迹",
+    ),
     // Of points.
     ("there are {0} axes, and the point has entries for {1}", "共有 {0} 个轴，而该点含有 {1} 个轴的数据"),
     ("point {0}, <1>: <2>", "点 {0}，<1>：<2>"),
@@ -114,6 +118,7 @@ mod tests {
             LeaseError::TakenOver { process: 4711 },
             LeaseError::ReadOnly,
             LeaseError::TooManyClients,
+            LeaseError::Lost,
         ];
         let of_controller = [
             CommandError::Count { given: 1, axes: 2 },
