@@ -82,7 +82,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         if !matches!(self.group.state, GroupState::Enabling) || cycles <= limit {
             return;
         }
-        let late = self.axes.iter().find(|axis| !axis.is_enabled());
+        // One that is enabled already and has not been allowed to be is late, too.
+        let late = self.axes.iter().find(|axis| !(axis.is_enabled() && axis.is_power_granted()));
         let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis.number()));
         self.fail(origin, Fault::EnableTimeout { cycles, limit });
     }

@@ -209,3 +209,14 @@ fn a_drive_without_a_remote_bit_works() {
     rig.run_until(Phase::Holding, 3_000);
     assert_eq!(rules(&rig), []);
 }
+
+#[test]
+fn a_drive_that_enables_itself_while_its_group_is_enabled_is_named_when_that_takes_too_long() {
+    let mut rig = Rig::new(3);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(20);
+    rig.request(Request::Enable);
+    rig.drive(1).enables_itself = true;
+    rig.run(510);
+    assert_eq!(rules(&rig)[0], (Rule::EnableTimeout, Some(1)));
+}

@@ -98,9 +98,13 @@ impl Supervisor {
         }
     }
 
-    /// A drive that has torque although it should have none is the outcome of every run.
+    /// A drive that has torque although it should have none is the outcome of every run that has got as far as to enable it.
     fn note_unreleased(&mut self, snapshot: &Snapshot) {
-        if let Some(stop) = unreleased_stop(snapshot) {
+        let has_run = matches!(
+            self.outcome,
+            Some(Outcome::Finished | Outcome::Interrupted | Outcome::TakenOver { .. } | Outcome::Stopped(_))
+        );
+        if let Some(stop) = unreleased_stop(snapshot).filter(|_| has_run) {
             self.outcome = Some(Outcome::Stopped(stop));
         }
     }

@@ -68,6 +68,12 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             true
         }
         (Rule::ModeNotShown, Origin::Axis(axis)) if is_crowded(axis) => true,
+        // A drive that answers whole cycles late is not heard before it is to be enabled.
+        (Rule::NotDisabled, Origin::Axis(axis))
+            if !seen.snapshot.axes().get(usize::from(axis)).is_some_and(|axis| axis.is_heard) =>
+        {
+            true
+        }
         // Streams and callbacks ask for what the first mode takes, and the axis may be in another one.
         (Rule::NoTorqueInMode, Origin::Axis(axis)) => {
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| !axis.other_modes.is_empty())
