@@ -48,6 +48,19 @@ pub enum Defect {
     },
     /// Safe torque off: the drive leaves operation enabled without a fault.
     TorqueOff,
+    /// The drive does not obey its controlword.
+    Disobedience(Disobedience),
+}
+
+/// How a drive does not obey its controlword (object 6040). It still reacts to faults, and to missing heartbeats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Disobedience {
+    /// It stays in its state.
+    KeepsState,
+    /// It is in operation enabled, whatever it is told.
+    EnablesItself,
+    /// Somebody else has it by its local interface: it stays in its state, and clears statusword bit 9 (remote).
+    IsLocal,
 }
 
 impl Defect {

@@ -101,7 +101,7 @@ pub(crate) mod slcan_adapter;
 pub(crate) mod wire_length;
 pub(crate) mod yz_aim;
 
-pub use defect::{Defect, Unsupported};
+pub use defect::{Defect, Disobedience, Unsupported};
 pub use drive::{Drive, DriveFault, NodeState, Observation};
 #[cfg(feature = "cli")]
 pub(crate) use live::{LiveDrives, LivePort};

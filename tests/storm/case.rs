@@ -7,7 +7,7 @@ use takt::faults::Scenario;
 use crate::dice::Dice;
 use crate::machine;
 use crate::overload::Overload;
-use crate::weather::{KINDS, NEEDS_EROB, fault, fault_of_own_protocol, fault_on_a_line, when};
+use crate::weather::{KINDS, NEEDS_EROB, disobedience, fault, fault_of_own_protocol, fault_on_a_line, when};
 
 pub struct Case {
     pub config: Config,
@@ -134,6 +134,29 @@ impl Case {
         }
         case.scenario = scenario(&case.text, &case.config);
         if dice.chance(0.5) {
+            case.harden(&mut dice);
+        }
+        case
+    }
+
+    /// One on a machine with drives that do not obey.
+    pub fn of_disobedience(seed: u64) -> Self {
+        let mut dice = Dice::new(seed).split(u64::MAX - 10);
+        let mut case = Self::with(seed, Some(machine::any(&mut dice, true)));
+        if dice.chance(0.5) {
+            // Nothing else is wrong.
+            case.text.clear();
+        }
+        let length_ms = (case.length * case.config.cycle.period_ns / 1_000_000) as usize;
+        for _ in 0..dice.pick(&[1, 1, 2, 3]) {
+            let when = when(&mut dice, length_ms);
+            case.text.push_str(&disobedience(&mut dice, &case.config, &when));
+        }
+        case.scenario = scenario(&case.text, &case.config);
+        if case.config.axes.len() > 1 && dice.chance(0.5) {
+            case.divide(&mut dice);
+        }
+        if dice.chance(0.3) {
             case.harden(&mut dice);
         }
         case

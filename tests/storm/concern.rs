@@ -18,6 +18,8 @@ use crate::off_cycle::is_beside_the_cycle;
 pub struct Concern {
     /// A fault concerns this joint, its drive or its bus: it may not obey.
     pub is_present: bool,
+    /// Its drive may have another state than the controller hears of.
+    pub is_misreported: bool,
     /// A torque from outside acts on it, another master commands its drive, or its drive does by itself what it was not asked to.
     pub is_driven_by_others: bool,
     /// What is sent to its drive is corrupted with a right CRC: it does what it hears.
@@ -44,6 +46,7 @@ impl Concern {
     fn or(self, other: Self) -> Self {
         Self {
             is_present: self.is_present || other.is_present,
+            is_misreported: self.is_misreported || other.is_misreported,
             is_driven_by_others: self.is_driven_by_others || other.is_driven_by_others,
             is_misled: self.is_misled || other.is_misled,
             is_beyond_reach: self.is_beyond_reach || other.is_beyond_reach,
@@ -237,6 +240,7 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
     let has_no_end = fault.window.lasts_ns.is_none() && fault.selection.count.is_none();
     Concern {
         is_present,
+        is_misreported: is_present && fault.kind != "disobedience",
         is_misled,
         // A flood leaves no room for anything else.
         is_beyond_reach: has_no_end && (is_misled || is_cut_off || is_flooded_by_commands),
@@ -244,7 +248,8 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
         has_paused: false,
         is_neglected: false,
-        is_driven_by_others: is_own && (matches!(fault.kind, "load" | "foreign-set-points") || is_led_astray)
+        is_driven_by_others: is_own
+            && (matches!(fault.kind, "load" | "foreign-set-points" | "disobedience") || is_led_astray)
             || is_flooded_by_commands,
         is_loaded: is_own && fault.kind == "load",
         missed_heartbeat: MissedHeartbeat::No,

@@ -63,6 +63,8 @@ const BIT_FIELD_MODE_CASES: u64 = 75;
 const OVERLOADED_BIT_FIELD_CASES: u64 = 100;
 /// Of storms over drives that are spoken to outside of the cycle.
 const OFF_CYCLE_CASES: u64 = 75;
+/// Of storms over drives that do not obey.
+const DISOBEDIENCE_CASES: u64 = 60;
 /// Of storms over a drive on a serial line.
 const LINE_CASES: u64 = 100;
 /// A shard ends after so many failures.
@@ -200,6 +202,14 @@ fn the_invariants_hold_where_modes_of_drives_of_bit_fields_are_changed() {
         }
     }
     assert!(changed_cycles > 1000, "in another mode than at first, only {changed_cycles} cycles in motion");
+}
+
+#[test]
+fn the_invariants_hold_for_drives_that_do_not_obey() {
+    let stops = play_all("disobedience", DISOBEDIENCE_CASES, Case::of_disobedience);
+    for rule in [Rule::NotDisabled, Rule::DriveEnabled, Rule::DriveLocal] {
+        assert!(number("TAKT_STORM_CASES").is_some() || stops.contains(rule.key()), "never: {rule:?}");
+    }
 }
 
 #[test]

@@ -4,7 +4,7 @@ use takt::config::{Axis, Config, Travel};
 
 use crate::dice::Dice;
 
-/// Every kind of `configs/faults/reference.toml`.
+/// Every kind of `configs/faults/reference.toml` but disobedience, which has storms of its own.
 pub const KINDS: [&str; 35] = [
     "drop",
     "delay",
@@ -82,6 +82,18 @@ pub fn fault(dice: &mut Dice, config: &Config, kind: &str, when: &str) -> String
         false => String::new(),
     };
     format!("[[fault]]\nkind = \"{kind}\"\n{place}\n{keys}\n{when}\n{lasts}\n")
+}
+
+/// A drive that does not obey its controlword.
+pub fn disobedience(dice: &mut Dice, config: &Config, when: &str) -> String {
+    let able: Vec<&Axis> = config.axes.iter().filter(|axis| axis.drive.word == "erob-canopen").collect();
+    let axis = &able[dice.below(able.len())].name;
+    let how = dice.pick(&["keeps-state", "keeps-state", "enables-itself", "local"]);
+    let lasts = match dice.chance(0.5) {
+        true => format!("for = \"{} ms\"", 1 + dice.below(3000)),
+        false => String::new(),
+    };
+    format!("[[fault]]\nkind = \"disobedience\"\naxis = \"{axis}\"\nhow = \"{how}\"\n{when}\n{lasts}\n")
 }
 
 /// One fault that concerns a drive with a protocol of its own: the pre-defined connection set has no functions for its frames.

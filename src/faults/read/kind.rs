@@ -13,7 +13,7 @@ use crate::faults::effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, Inte
 use crate::faults::injectable::{DriveEffect, InjectError, Injectable};
 use crate::faults::selection::Selection;
 use crate::faults::window::Window;
-use crate::sim::{Defect, DriveFault, SimulatedBus, SimulatedLineDevices};
+use crate::sim::{Defect, Disobedience, DriveFault, SimulatedBus, SimulatedLineDevices};
 
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,13 +51,14 @@ pub enum DriveFaultKind {
     Statusword,
     ModeDisplay,
     TorqueOff,
+    Disobedience,
     Alarm,
     Emergency,
     Cause(DriveFault),
 }
 
 /// All kinds, by their names in the file.
-pub const KINDS: [(&str, FaultKind); 35] = [
+pub const KINDS: [(&str, FaultKind); 36] = [
     ("drop", FaultKind::Drop),
     ("delay", FaultKind::Delay),
     ("duplicate", FaultKind::Duplicate),
@@ -85,6 +86,7 @@ pub const KINDS: [(&str, FaultKind); 35] = [
     ("statusword", FaultKind::Drive(DriveFaultKind::Statusword)),
     ("mode-display", FaultKind::Drive(DriveFaultKind::ModeDisplay)),
     ("torque-off", FaultKind::Drive(DriveFaultKind::TorqueOff)),
+    ("disobedience", FaultKind::Drive(DriveFaultKind::Disobedience)),
     ("alarm", FaultKind::Drive(DriveFaultKind::Alarm)),
     ("emergency", FaultKind::Drive(DriveFaultKind::Emergency)),
     ("over-current", FaultKind::Drive(DriveFaultKind::Cause(DriveFault::OverCurrent))),
@@ -342,6 +344,15 @@ fn drive_trouble(section: &mut Section<'_>, effect: DriveFaultKind, axis: &Axis)
         DriveFaultKind::StuckBrake => Defect::StuckBrake,
         DriveFaultKind::StuckSdo => Defect::SilentSdoServer,
         DriveFaultKind::TorqueOff => Defect::TorqueOff,
+        DriveFaultKind::Disobedience => {
+            let choices = [
+                ("keeps-state", Disobedience::KeepsState),
+                ("enables-itself", Disobedience::EnablesItself),
+                ("local", Disobedience::IsLocal),
+            ];
+            let keeps_state = Some(Disobedience::KeepsState);
+            Defect::Disobedience(section.get("how").map_or(keeps_state, |entry| entry.choice(&choices))?)
+        }
         DriveFaultKind::EncoderJump => {
             let quantity = if is_linear { Quantity::LENGTH } else { Quantity::ANGLE };
             let entry = section.require("by", "how far the position jumps: by = \"5 deg\"")?;

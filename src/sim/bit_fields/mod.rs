@@ -610,6 +610,7 @@ impl Drive for FieldSimulation {
             | Defect::SilentSdoServer
             | Defect::OtherObjectMapped
             | Defect::Statusword { .. }
+            | Defect::Disobedience(_)
             | Defect::Emergency { .. } => {
                 let reason =
                     "a drive of bit fields has no brake, no objects, no statusword and no emergency messages";

@@ -3,6 +3,7 @@
 use takt_rt::{DriveState, NANOSECONDS_PER_SECOND, Nanoseconds, OperationMode};
 
 use crate::config::quirks::Quirks;
+use crate::sim::defect::Disobedience;
 use crate::sim::errors::DeviceError;
 use crate::sim::feedback_defects::JointDefects;
 use crate::sim::motion::{Actual, Measured};
@@ -109,7 +110,7 @@ impl Axis {
 
     /// Restarts everything except the joint.
     pub fn restart(&mut self, dictionary: &mut SimulatedDictionary, quirks: &Quirks) {
-        self.device = Device::starting();
+        self.device = self.device.restarted();
         self.motion = Motion::new();
         self.servo.reset();
         (self.torque, self.mode, self.coming_mode, self.mode_bits) = (0.0, None, None, 0);
@@ -184,6 +185,11 @@ impl Axis {
     /// Adds a jump of the measured position: rad (m).
     pub fn jump(&mut self, distance: f64) {
         self.offset += distance * self.units.position;
+    }
+
+    /// From now on it does not obey its controlword in this way, or obeys it again.
+    pub fn disobey(&mut self, disobedience: Option<Disobedience>) {
+        self.device.disobey(disobedience);
     }
 
     /// Removes the torque without a fault, like safe torque off.

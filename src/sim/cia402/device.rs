@@ -3,6 +3,7 @@
 
 use takt_rt::{Command, DriveState, controlword, statusword};
 
+use crate::sim::defect::Disobedience;
 use crate::sim::object_dictionary::SimulatedDictionary;
 
 use super::places::Places;
@@ -56,12 +57,13 @@ pub struct Device {
     state: DriveState,
     controlword: u16,
     stop: Option<Stop>,
+    disobedience: Option<Disobedience>,
 }
 
 impl Device {
     /// An axis that is booting.
     pub const fn starting() -> Self {
-        Self { state: DriveState::NotReadyToSwitchOn, controlword: 0, stop: None }
+        Self { state: DriveState::NotReadyToSwitchOn, controlword: 0, stop: None, disobedience: None }
     }
 
     /// The state.
@@ -77,6 +79,16 @@ impl Device {
     /// The current deceleration.
     pub fn stop(&self) -> Option<Stop> {
         self.stop
+    }
+
+    /// The same axis after a restart.
+    pub const fn restarted(&self) -> Self {
+        Self { disobedience: self.disobedience, ..Self::starting() }
+    }
+
+    /// From now on it does not obey its controlword in this way, or obeys it again.
+    pub fn disobey(&mut self, disobedience: Option<Disobedience>) {
+        self.disobedience = disobedience;
     }
 
     /// Ends the initialisation (transition 1).
@@ -102,6 +114,12 @@ impl Device {
                 Change::FaultReset
             }
             DriveState::Fault | DriveState::FaultReactionActive => Change::None,
+            DriveState::NotReadyToSwitchOn if self.disobedience.is_some() => Change::None,
+            state if self.disobedience == Some(Disobedience::EnablesItself) => {
+                (self.state, self.stop) = (DriveState::OperationEnabled, None);
+                if state.has_torque() { Change::None } else { Change::Enabled }
+            }
+            _ if self.disobedience.is_some() => Change::None,
             _ => self.evaluate_command(Command::decode(word), places, dictionary),
         }
     }
@@ -194,6 +212,10 @@ impl Device {
             DriveState::NotReadyToSwitchOn | DriveState::Fault => 0,
             _ => VOLTAGE_ENABLED,
         };
-        self.state.statusword_bits() | statusword::REMOTE | voltage | mode_bits
+        let remote = match self.disobedience {
+            Some(Disobedience::IsLocal) => 0,
+            _ => statusword::REMOTE,
+        };
+        self.state.statusword_bits() | remote | voltage | mode_bits
     }
 }

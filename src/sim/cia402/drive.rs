@@ -322,6 +322,7 @@ impl Drive for Cia402Drive {
         match defect {
             Defect::EncoderJump { distance } if is_present => first.jump(distance),
             Defect::TorqueOff if is_present => first.lose_torque(),
+            Defect::Disobedience(how) => first.disobey(is_present.then_some(how)),
             Defect::Alarm { code } if is_present => self.fail(0, DeviceError::Alarm(code)),
             Defect::Emergency { code } if is_present => {
                 self.canopen.errors.raise(DeviceError::Alarm(code), &mut self.canopen.dictionary);

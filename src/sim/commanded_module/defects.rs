@@ -46,6 +46,7 @@ impl CommandedModule {
             Defect::OtherObjectMapped
             | Defect::ShortFeedback
             | Defect::Statusword { .. }
+            | Defect::Disobedience(_)
             | Defect::OperationModeDisplay { .. }
             | Defect::Emergency { .. } => {
                 let reason = "an eRob that commands move has no process data and no emergency messages";

@@ -3,6 +3,7 @@
 use takt_rt::{Command, DriveState, Nanoseconds, controlword, statusword};
 
 use super::objects::at;
+use crate::sim::defect::Disobedience;
 use crate::sim::object_dictionary::SimulatedDictionary;
 
 /// Minimum time for which controlword bit 7 must stay set to reset a fault (field experience: several cycles).
@@ -40,6 +41,7 @@ pub struct ErobDevice {
     /// A state and a controlword that leaves the drive in it.
     settled: Option<(DriveState, u16)>,
     has_warning: bool,
+    disobedience: Option<Disobedience>,
 }
 
 impl ErobDevice {
@@ -52,12 +54,13 @@ impl ErobDevice {
             stop: None,
             settled: None,
             has_warning,
+            disobedience: None,
         }
     }
 
     /// The same unit after a restart.
     pub fn restarted(&self) -> Self {
-        Self::starting(self.has_warning)
+        Self { disobedience: self.disobedience, ..Self::starting(self.has_warning) }
     }
 
     /// The state.
@@ -73,6 +76,11 @@ impl ErobDevice {
     /// The current deceleration.
     pub fn stop(&self) -> Option<Stop> {
         self.stop
+    }
+
+    /// From now on it does not obey its controlword in this way, or obeys it again.
+    pub fn disobey(&mut self, disobedience: Option<Disobedience>) {
+        (self.disobedience, self.settled) = (disobedience, None);
     }
 
     /// Ends the initialisation (transition 1).
@@ -99,6 +107,15 @@ impl ErobDevice {
         self.reset_since_ns = None;
         if self.state == DriveState::FaultReactionActive {
             return Change::None;
+        }
+        match self.disobedience {
+            None => {}
+            Some(Disobedience::EnablesItself) if self.state != DriveState::NotReadyToSwitchOn => {
+                let had_torque = self.state.has_torque();
+                (self.state, self.stop) = (DriveState::OperationEnabled, None);
+                return if had_torque { Change::None } else { Change::Enabled };
+            }
+            Some(_) => return Change::None,
         }
         // Almost every step finds the word of the step before.
         if self.settled == Some((self.state, word)) {
@@ -181,7 +198,7 @@ impl ErobDevice {
         self.state = if self.stop.is_some() { DriveState::FaultReactionActive } else { DriveState::Fault };
     }
 
-    /// The statusword as real units set it: bit 9 always, bit 4 unless there is a fault, bit 7 on some units, bit 12
+    /// The statusword as real units set it: bit 9 unless it is local, bit 4 unless there is a fault, bit 7 on some units, bit 12
     /// except in enabled profile position mode. `mode_bits` are bits 10 to 13, which the mode sets in an enabled drive.
     pub fn statusword(&self, mode_bits: u16) -> u16 {
         let bits = match self.state {
@@ -190,7 +207,11 @@ impl ErobDevice {
         };
         let voltage = if self.state.is_faulted() { 0 } else { VOLTAGE_ENABLED };
         let warning = if self.has_warning { statusword::WARNING } else { 0 };
+        let remote = match self.disobedience {
+            Some(Disobedience::IsLocal) => 0,
+            _ => statusword::REMOTE,
+        };
         // Bit 5 means "no quick stop" only in states that the standard distinguishes by it.
-        self.state.statusword_bits() | statusword::REMOTE | voltage | warning | bits
+        self.state.statusword_bits() | remote | voltage | warning | bits
     }
 }

@@ -308,6 +308,7 @@ impl Drive for ErobJoint {
             Defect::Emergency { code } if is_present => {
                 self.canopen.errors.raise(DeviceError::Alarm(code), &mut self.canopen.dictionary);
             }
+            Defect::Disobedience(how) => self.device.disobey(is_present.then_some(how)),
             Defect::TorqueOff if is_present => {
                 self.device.lose_torque();
                 self.torque = 0.0;

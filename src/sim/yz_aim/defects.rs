@@ -19,6 +19,7 @@ pub fn check_possible(defect: Defect) -> Result<(), Unsupported> {
         Defect::OperationModeDisplay { .. } => "the PDOs of a YZ-AIM show no mode",
         Defect::Emergency { .. } => "a YZ-AIM sends no emergency messages",
         Defect::TorqueOff => "a YZ-AIM has no safe torque off",
+        Defect::Disobedience(_) => "a simulated YZ-AIM obeys its controlword",
     };
     Err(Unsupported { defect, reason })
 }

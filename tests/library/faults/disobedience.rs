@@ -29,3 +29,17 @@ fn a_drive_that_does_not_obey_is_the_outcome_of_a_run_that_another_fault_has_end
     assert_eq!(rules, [(Rule::DriveDisabled, Some(4)), (Rule::NotDisabled, Some(2))]);
     assert_eq!(played.outcome, Some(Outcome::Stopped(played.stops[1])));
 }
+
+#[test]
+fn a_drive_that_keeps_its_torque_or_goes_local_is_named_at_the_end_of_the_run() {
+    for (how, first) in [("keeps-state", Rule::NotDisabled), ("local", Rule::DriveLocal)] {
+        let text = format!(
+            "[[fault]]\nkind = \"disobedience\"\nhow = \"{how}\"\naxis = \"joint2\"\nwhen = \"enabled\"\nat = \"500 ms\"\n"
+        );
+        let played = play(&arm(), &text);
+        assert_eq!((played.stops[0].rule(), played.stops[0].axis()), (first, Some(1)), "{how}");
+        let last = *played.stops.last().unwrap();
+        assert_eq!((last.rule(), last.axis()), (Rule::NotDisabled, Some(1)), "{how}");
+        assert_eq!(played.outcome, Some(Outcome::Stopped(last)), "{how}");
+    }
+}

@@ -13,6 +13,8 @@ const FAULT_RESET: u16 = 0x80;
 const SWITCHED_ON: u8 = 2;
 /// Cycles from a controlword on the wire to a drive that has taken it.
 const OBEYING_CYCLES: u64 = 12;
+/// Cycles in which torque in a disabled group must be noticed: some reports of a bus with a long cycle.
+const NOTICING_CYCLES: u64 = 100;
 
 /// 0 no voltage, 1 ready to switch on, 2 switched on, 3 operation enabled.
 const fn level(controlword: u16) -> u8 {
@@ -28,6 +30,8 @@ const fn level(controlword: u16) -> u8 {
 struct Watched {
     level: u8,
     truth: Option<Observation>,
+    /// Cycles for which it has had torque in a disabled group without a fault.
+    unexplained: u64,
 }
 
 pub struct Power {
@@ -91,6 +95,7 @@ impl Power {
             let checked = self
                 .check_controlword(seen, index)
                 .and_then(|()| self.check_disabled(seen, index))
+                .and_then(|()| self.check_confirmed(seen, index))
                 .and_then(|()| self.check_powerless(seen, index));
             checked.map_err(|wrong| format!("{}: {wrong}", seen.config.axes[index].name))?;
             self.axes[index].truth = Some(seen.truth[index]);
@@ -132,6 +137,25 @@ impl Power {
         let is_late = group.disabled > bounds::cycles(seen.config, to_rest_s);
         match is_late && truth.velocity.abs() > REST {
             true => Err(format!("{} in a disabled group", truth.velocity)),
+            false => Ok(()),
+        }
+    }
+
+    /// A disabled group has no drive with torque, or a latched fault says so.
+    fn check_confirmed(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
+        let (concern, group) = (&seen.concerns[index], seen.group_of(index));
+        let is_heard = !(concern.is_misreported
+            || concern.is_crowded
+            || concern.has_paused
+            || concern.is_neglected
+            || concern.unreachable_since_ns.is_some());
+        let is_explained = group.stop.is_some_and(|stop| stop.rule() != Rule::Requested);
+        let has_torque = seen.truth[index].state == DriveState::OperationEnabled;
+        let is_unexplained = is_heard && has_torque && group.phase == Phase::Disabled && !is_explained;
+        let unexplained = &mut self.axes[index].unexplained;
+        *unexplained = if is_unexplained { *unexplained + 1 } else { 0 };
+        match *unexplained > NOTICING_CYCLES {
+            true => Err(format!("torque in a disabled group without a fault: {:?}", seen.truth[index])),
             false => Ok(()),
         }
     }
