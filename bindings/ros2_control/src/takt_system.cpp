@@ -23,6 +23,8 @@ namespace {
 
 /// The drives are enabled or disabled within this time.
 constexpr double patience_s = 30.0;
+/// After an activation a position that is no farther from the joint is followed: the defaults of start_tolerance.
+constexpr double start_tolerance_rad = 0.02, start_tolerance_m = 0.002;
 /// Object 6060 in cyclic synchronous torque (CiA 402).
 constexpr int cyclic_synchronous_torque = 10;
 
@@ -129,7 +131,9 @@ bool TaktSystem::find_axes() {
         for (std::uint32_t axis = 0; axis < arm_->size() && !is_found; axis++) {
             const auto described = arm_->describe(axis);
             is_found = described && joint.name == described->name;
-            if (is_found) joint.axis = axis;
+            if (!is_found) continue;
+            joint.axis = axis;
+            joint.start_tolerance = described->is_linear ? start_tolerance_m : start_tolerance_rad;
         }
         if (is_found) continue;
         std::string known;
@@ -266,6 +270,11 @@ double *TaktSystem::Joint::command(const std::string &interface) {
     return interface == HW_IF_POSITION ? &position_command : interface == HW_IF_VELOCITY ? &velocity_command : &effort_command;
 }
 
+bool TaktSystem::Joint::is_commanded_nearby() const {
+    // Where it is held exactly, the command may be the one that hold_all() has shown.
+    return kind == Kind::position && position_command != held && std::abs(position_command - held) <= start_tolerance;
+}
+
 bool TaktSystem::Joint::has(const std::string &key, const char *interface) const {
     return key.size() > name.size() && key[name.size()] == '/' && key.compare(0, name.size(), name) == 0 &&
            key.compare(name.size() + 1, std::string::npos, interface) == 0;
@@ -296,6 +305,12 @@ std::optional<TaktSystem::Kind> TaktSystem::kind_after(
     return kind;
 }
 
+bool TaktSystem::is_claimed(const Joint &joint, const std::vector<std::string> &start) {
+    return std::any_of(start.begin(), start.end(), [&](const std::string &key) {
+        return joint.has(key, HW_IF_POSITION) || joint.has(key, HW_IF_VELOCITY) || joint.has(key, HW_IF_EFFORT);
+    });
+}
+
 bool TaktSystem::can_switch(const std::vector<std::string> &start, const std::vector<std::string> &stop) const {
     return std::all_of(joints_.begin(), joints_.end(), [&](const Joint &joint) { return kind_after(joint, start, stop).has_value(); });
 }
@@ -310,8 +325,9 @@ return_type TaktSystem::perform_command_mode_switch(const std::vector<std::strin
     if (!can_switch(start, stop)) return return_type::ERROR;
     for (Joint &joint : joints_) {
         const Kind kind = kind_after(joint, start, stop).value_or(joint.kind);
-        if (joint.kind == kind) continue;
+        if (joint.kind == kind && (joint.is_followed || !is_claimed(joint, start))) continue;
         joint.kind = kind;
+        joint.is_followed = true;
         // It goes on from where it is, whatever the interface was last used for.
         const auto &axis = state_[joint.axis];
         joint.held = joint.position_command = axis.position_set;
@@ -348,9 +364,10 @@ return_type TaktSystem::read(const rclcpp::Time &, const rclcpp::Duration &perio
 return_type TaktSystem::write(const rclcpp::Time &, const rclcpp::Duration &) {
     if (!is_active_) return return_type::OK;
     take_commands();
-    for (const auto &joint : joints_) {
+    for (auto &joint : joints_) {
         takt::target &target = targets_[joint.axis];
-        switch (joint.kind) {
+        joint.is_followed = joint.is_followed || joint.is_commanded_nearby();
+        switch (joint.is_followed ? joint.kind : Kind::hold) {
         case Kind::hold: target = takt::target::position(joint.held); break;
         case Kind::position: target = takt::target::position(joint.position_command); break;
         case Kind::velocity: target = takt::target::velocity(joint.velocity_command); break;
@@ -380,6 +397,7 @@ void TaktSystem::hold_all() {
         joint.held = joint.position_command = state_[joint.axis].position_set;
         joint.velocity_command = 0.0;
         joint.effort_command = 0.0;
+        joint.is_followed = false;
     }
     show_commands();
 }

@@ -126,11 +126,31 @@ int main(int count, char **arguments) {
     CHECK(manager.run(100) == return_type::OK);
     CHECK(std::abs(manager.state("joint1/velocity") - 0.2) < 0.05);
 
-    // There and back.
+    // There and back. A controller that stayed active is not followed until its command asks for no motion, or it claims the joint anew.
+    CHECK(manager.switch_to({"joint1/position"}, {"joint1/velocity"}) == return_type::OK);
+    CHECK(manager.run(50) == return_type::OK);
     CHECK(system.on_deactivate(any_state) == CallbackReturn::SUCCESS);
-    CHECK(manager.run(50) == return_type::OK);
+    const double off = manager.state("joint1/position");
+    const auto far_away = [&](double) { manager.command("joint1/position", off + 0.5); };
+    CHECK(manager.run(50, far_away) == return_type::OK);
     CHECK(system.on_activate(any_state) == CallbackReturn::SUCCESS);
-    CHECK(manager.run(50) == return_type::OK);
+    CHECK(manager.run(250, far_away) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/position") - off) < 0.01);
+    CHECK(manager.run(250, [&](double time_s) { manager.command("joint1/position", off + 0.1 * std::min(time_s, 1.0)); }) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/position") - off - 0.1) < 0.02);
+    CHECK(system.on_deactivate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(system.on_activate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(manager.run(100, far_away) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/position") - off - 0.1) < 0.02);
+    CHECK(manager.switch_to({"joint1/position"}, {"joint1/position"}) == return_type::OK);
+    CHECK(manager.run(500, far_away) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/position") - off - 0.5) < 0.02);
+    CHECK(manager.switch_to({"joint1/velocity"}, {"joint1/position"}) == return_type::OK);
+    CHECK(system.on_deactivate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(system.on_activate(any_state) == CallbackReturn::SUCCESS);
+    CHECK(manager.run(100, [&](double) { manager.command("joint1/velocity", 0.5); }) == return_type::OK);
+    CHECK(std::abs(manager.state("joint1/velocity")) < 0.01);
+    CHECK(manager.switch_to({"joint1/velocity"}, {"joint1/velocity"}) == return_type::OK);
 
     // What is no number is a fault of the command, not of the machine: the write fails, and the manager makes an end of it.
     CHECK(manager.run(5, [&](double) { manager.command("joint1/velocity", std::nan("")); }) == return_type::ERROR);

@@ -81,9 +81,16 @@ private:
         Kind kind = Kind::hold;
         double position = 0.0, velocity = 0.0, effort = 0.0;
         double position_command = 0.0, velocity_command = 0.0, effort_command = 0.0;
-        /// Where it stays while nobody has claimed it.
+        /// Where it stays while it is not claimed, or not followed.
         double held = 0.0;
+        /// How near to it a command of a controller that stayed active must be: rad (m).
+        double start_tolerance = 0.0;
+        /// False from an activation on, until the joint is claimed anew or its command is a position near the joint: a controller that stayed
+        /// active has the command of before.
+        bool is_followed = false;
 
+        /// True if a controller commands a position near the one that is held.
+        bool is_commanded_nearby() const;
         /// Whether a key, as in joint1/velocity, is an interface of this joint.
         bool has(const std::string &key, const char *interface) const;
         /// What a state interface or a command interface of this name is about.
@@ -102,6 +109,8 @@ private:
     void show_commands();
     /// The kind of a joint after a switch; none if it is not possible, with the reason in the log. It allocates only for that.
     std::optional<Kind> kind_after(const Joint &joint, const std::vector<std::string> &start, const std::vector<std::string> &stop) const;
+    /// Whether a switch claims an interface of a joint.
+    static bool is_claimed(const Joint &joint, const std::vector<std::string> &start);
     bool can_switch(const std::vector<std::string> &start, const std::vector<std::string> &stop) const;
     void take_state();
     void hold_all();
