@@ -238,6 +238,8 @@ pub struct AxisSnapshot {
     pub error_code: u16,
     /// Whether the drive has reported since the controller became active.
     pub is_heard: bool,
+    /// True if the drive has confirmed that it has no torque since it was told to have none: by a report that is not old, or by SDO.
+    pub is_confirmed_off: bool,
     /// SYNCs, or set-points where it answers these, that the drive has left without an answer, or has not answered yet. One that stays so may have been lost, or
     /// every answer since then comes so many cycles late: that is looked into whenever the group is enabled.
     pub unanswered: u16,

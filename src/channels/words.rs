@@ -64,6 +64,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         drive_state: DriveState::NotReadyToSwitchOn,
         error_code: 0,
         is_heard: false,
+        is_confirmed_off: false,
         unanswered: 0,
         feedback_age: 0,
         feedback_slot: 0,
@@ -275,10 +276,11 @@ fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
     ];
     numbers.into_iter().for_each(|number| words.put_f64(number));
     let is_heard = u64::from(axis.is_heard) << 32;
+    let is_confirmed_off = u64::from(axis.is_confirmed_off) << 33;
     let drive_state = (axis.drive_state as u64) << 40;
     let unanswered = u64::from(axis.unanswered) << 48;
     let words_of_drive = u64::from(axis.statusword) | u64::from(axis.error_code) << 16;
-    words.put(words_of_drive | is_heard | drive_state | unanswered);
+    words.put(words_of_drive | is_heard | is_confirmed_off | drive_state | unanswered);
     let current = u64::from(axis.current_per_mille.unwrap_or_default() as u16) << 16;
     let mode = u64::from(axis.mode.unwrap_or_default() as u8) << 32;
     let are_reported = [
@@ -318,6 +320,7 @@ fn take_axis(words: &mut Words<'_>) -> AxisSnapshot {
         drive_state: drive_state_of((packed >> 40) as u8),
         error_code: (packed >> 16) as u16,
         is_heard: packed >> 32 & 1 == 1,
+        is_confirmed_off: packed >> 33 & 1 == 1,
         unanswered: (packed >> 48) as u16,
         feedback_age: reported as u16,
         feedback_slot: words.take(),
@@ -426,14 +429,15 @@ pub(super) mod tests {
             (Option<i8>, i8),
             (u16, u16),
             (u16, Option<f32>),
-            bool,
+            (bool, bool),
             u16,
             u16,
             [u64; 2],
         )>();
         (any::<[f64; 6]>(), reported, states).prop_map(|(numbers, reported, drive_state)| {
             let [position_set, velocity_set, torque_set, position, velocity, following_error] = numbers;
-            let (torque, current_per_mille, modes, words, state, is_heard, unanswered, age, at) = reported;
+            let (torque, current_per_mille, modes, words, state, flags, unanswered, age, at) = reported;
+            let (is_heard, is_confirmed_off) = flags;
             let ((mode, mode_set), (controlword, statusword), (error_code, temperature)) =
                 (modes, words, state);
             AxisSnapshot {
@@ -453,6 +457,7 @@ pub(super) mod tests {
                 drive_state,
                 error_code,
                 is_heard,
+                is_confirmed_off,
                 unanswered,
                 feedback_age: age,
                 feedback_slot: at[0],

@@ -84,15 +84,4 @@ impl Axis {
             ErrorControl::None => Supervision::Feedback,
         }
     }
-
-    /// How long after the controller's last sign of life the drive notices that it is gone; `None` if it never does.
-    pub fn controller_timeout_ns(&self, master: &Master) -> Option<u64> {
-        match self.supervision(master) {
-            supervision @ Supervision::Guarding { .. } => supervision.timeout_ns(),
-            _ => master
-                .heartbeat_ns
-                .filter(|_| self.drive.consumes_heartbeat)
-                .map(|_| master.heartbeat_timeout_ns),
-        }
-    }
 }

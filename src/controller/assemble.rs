@@ -128,11 +128,10 @@ fn assembled_here(config: &Config) -> Result<Box<Engine>, AssembleError> {
     });
     let tolerates_missed_slots = !config.simulation.stops_for_missed_slots
         && config.buses.iter().all(|bus| bus.interface == Interface::Simulated);
-    let heartbeat = config.master.heartbeat_ns.map(|ns| Heartbeat {
-        node: config.master.node,
-        cycles: cycles(ns).max(1),
-        timeout_cycles: cycles(config.master.heartbeat_timeout_ns),
-    });
+    let heartbeat = config
+        .master
+        .heartbeat_ns
+        .map(|ns| Heartbeat { node: config.master.node, cycles: cycles(ns).max(1) });
     boxed(EngineParameters {
         period_ns,
         axes,
@@ -239,6 +238,10 @@ fn axis_parameters(
         start_tolerance: axis.start_tolerance,
         follow: axis.follow,
         supervision: supervision(axis, config, cycles),
+        stops_by_itself_cycles: family::stops_by_itself_after(axis, config)
+            .ok()
+            .and_then(|watchdog| watchdog.timeout_ns)
+            .map(cycles),
         following_error_limit: axis.following_error.limit,
         following_error_cycles: cycles(axis.following_error.time_ns),
         missed_feedback_cycles: axis.missed_feedback_cycles,

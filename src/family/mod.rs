@@ -30,11 +30,12 @@ pub mod scan;
 mod simulated_bus;
 mod simulated_joint;
 mod warning;
+mod watchdog;
 pub(crate) mod yz_aim;
 
 use std::pin::Pin;
 
-use takt_rt::{FieldDriveParameters, Frame, Id, MappedObject, Nanoseconds};
+use takt_rt::{FieldDriveParameters, Frame, Id, MappedObject};
 
 pub use crate::procedure::{
     AxisReading, CanopenClient, CanopenSession, Client, Procedure, ProcedureEvent, ProcedureSession,
@@ -49,6 +50,8 @@ pub(crate) use registry::{named, of};
 pub(crate) use simulated_bus::simulated_drives;
 pub(crate) use warning::is_rounded;
 pub use warning::{Warning, WarningKind, WarningSubject};
+pub(crate) use watchdog::least_shut_down_ns;
+pub use watchdog::{SignOfLife, Unwatched, Watchdog, stops_by_itself_after, unreached_words};
 
 use crate::canopen::emcy::ErrorCode;
 use crate::canopen::object::Object;
@@ -77,9 +80,6 @@ pub type ChineseTerm = (&'static str, &'static str);
 
 /// Describes frames in words.
 pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
-
-/// [`Family::least_shut_down_ns`] of drives without a watchdog: longer than a bus is usually disturbed.
-const UNWATCHED_SHUT_DOWN_NS: Nanoseconds = 1_000_000_000;
 
 /// A look at a slave on a Modbus line: what it is, if it is a drive of the family.
 pub type LookingAtSlave<'a> = Pin<Box<dyn Future<Output = Option<FoundDevice>> + 'a>>;
@@ -205,10 +205,13 @@ pub trait Family: ConfiguredFamily {
     /// From operational to pre-operational, without torque, and without the watchdog on the controller's heartbeat.
     fn shut_down<'a>(&'a self, c: &'a AxisSession<'a>) -> SettingUp<'a>;
 
-    /// For how long the drive of an axis is told to stop, at the least, before the controller leaves it. A drive without a watchdog that
-    /// has misheard it would go on without end, and its replies may not show that.
-    fn least_shut_down_ns(&self, _axis: &Axis) -> Nanoseconds {
-        0
+    /// The watchdog by which the drive of an axis stops when its controller is gone. The engine, `takt check`, the end of a run and its
+    /// report read it here alone.
+    ///
+    /// # Errors
+    /// The drive does not stop by itself. At the end of a run it is told to stop for longer.
+    fn stops_by_itself_after(&self, axis: &Axis, config: &Config) -> Result<Watchdog, Unwatched> {
+        Watchdog::of_canopen(axis, config)
     }
 
     /// What an axis has to do without, because its drive lacks something: sentences for people.

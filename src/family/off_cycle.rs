@@ -66,8 +66,6 @@ pub struct OffCycleBudget {
     pub report_ns: u64,
     /// The share of the bus, 1 for all of it, with the most stuff bits that frames can have.
     pub bus_share: f64,
-    /// So long after the last request the drive stops by itself, if the controller is gone; `None` if it never does.
-    pub watchdog_ns: Option<u64>,
 }
 
 /// Speaks to one drive outside of the cycle, without waiting: it is called about once in a millisecond.

@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use crate::canopen::object::ObjectAddress;
-use crate::config::bit_fields::FieldDevice;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Short;
 use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Quantity, Travel};
-use crate::family::{adapter_warning, bring_up, registry, report_cycles};
+use crate::family::{
+    SignOfLife, Unwatched, adapter_warning, bring_up, registry, report_cycles, stops_by_itself_after,
+};
 
 /// A rotary axis that goes round more often than this is unusual.
 const USUAL_TURNS: f64 = 2.0;
@@ -113,7 +114,10 @@ pub enum WarningKind {
         object: ObjectAddress,
     },
     /// The drive goes on with its last command when no more come.
-    NoWatchdog,
+    NoWatchdog {
+        /// Why nothing stops it.
+        because: Unwatched,
+    },
     /// A velocity of a program that the drive cannot have exactly.
     RoundedVelocity {
         /// What is commanded, with its unit.
@@ -197,9 +201,11 @@ impl fmt::Display for WarningKind {
                 f,
                 "bring-up overwrites the value that `dcf` has for {object}, because the controller needs another one"
             ),
-            Self::NoWatchdog => f.write_str(
-                "its drive has no watchdog: if this program or its computer dies, the motor goes on with its last command, in velocity and \
-                 torque mode for ever; have its supply cut by a relay that opens when the controller's output or heartbeat stops",
+            Self::NoWatchdog { because } => write!(
+                f,
+                "{because}: if this program or its computer dies, the motor goes on with its last command, in velocity and torque \
+                 mode for ever; {}",
+                because.cure()
             ),
             Self::SlowReports { report_ns, allowed_ns } => {
                 let show = |ns: u64| Quantity::DURATION.show(ns as f64 / 1e9);
@@ -252,7 +258,10 @@ impl Config {
     pub fn warnings(&self) -> Vec<Warning> {
         let mut warnings = vec![];
         for (index, axis) in self.axes.iter().enumerate() {
-            let mut kinds = of_axis(axis);
+            let unwatched = stops_by_itself_after(axis, self).err();
+            let mut kinds: Vec<_> =
+                unwatched.map(|because| WarningKind::NoWatchdog { because }).into_iter().collect();
+            kinds.extend(of_axis(axis));
             kinds.extend(self.rounded_velocities(index, axis));
             kinds.extend(self.slow_reports(axis));
             kinds.extend(self.short_timeout(axis));
@@ -302,7 +311,8 @@ impl Config {
     /// A drive on a serial line waits for its master longer than some lost rounds take.
     fn short_timeout(&self, axis: &Axis) -> Option<WarningKind> {
         let budget = registry::of(&axis.drive).off_cycle_budget(axis, self)?;
-        let timeout_ns = budget.watchdog_ns.filter(|_| axis.drive.protocol.is_of_serial_line())?;
+        let watchdog = stops_by_itself_after(axis, self).ok()?;
+        let timeout_ns = watchdog.timeout_ns.filter(|_| watchdog.sign == SignOfLife::Request)?;
         let needed_ns = LOST_ROUNDS * budget.report_ns;
         (timeout_ns < needed_ns).then_some(WarningKind::ShortTimeout { timeout_ns, needed_ns })
     }
@@ -356,9 +366,6 @@ fn near_wrap(axis: &Axis) -> Option<WarningKind> {
 fn of_axis(axis: &Axis) -> Vec<WarningKind> {
     let Axis { drive, limits, gear_ratio, travel, .. } = axis;
     let mut kinds = vec![];
-    if drive.description::<FieldDevice>().is_some_and(|device| !device.description.has_watchdog) {
-        kinds.push(WarningKind::NoWatchdog);
-    }
     let turns_per_s = limits.velocity * Counting::of(axis).turns_per_unit();
     let Plausible { fastest_turns_per_s: fastest, usual_velocity, inner_gear_from } = drive.plausible;
     if turns_per_s > fastest {

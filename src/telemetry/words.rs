@@ -36,9 +36,9 @@ pub const fn rule_key(rule: Rule) -> &'static str {
 /// The text of a stop category (IEC 60204-1, 9.2.2).
 pub const fn category(category: StopCategory) -> &'static str {
     match category {
-        StopCategory::Zero => "category 0: power removed at once",
-        StopCategory::One => "category 1: decelerated, then power removed",
-        StopCategory::Two => "category 2: decelerated, held under power",
+        StopCategory::Zero => "category 0: remove power at once",
+        StopCategory::One => "category 1: decelerate, then remove power",
+        StopCategory::Two => "category 2: decelerate, hold under power",
     }
 }
 

@@ -21,7 +21,7 @@ fn turntable() -> Config {
 }
 
 fn budget(config: &Config) -> OffCycleBudget {
-    LineBudget::of(config, LINE).unwrap().of_drive(500)
+    LineBudget::of(config, LINE).unwrap().of_drive()
 }
 
 /// How far off the axis may seem: its position was true so long ago.

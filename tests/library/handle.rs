@@ -91,7 +91,7 @@ fn after_a_fault_each_request_is_refused_with_the_reason_until_the_fault_is_rese
     let stopped = joint.wait(motion, PATIENCE).unwrap_err();
     assert_eq!(
         stopped.to_string(),
-        "the group has stopped: a stop was requested while moving; category 1: decelerated, then power removed"
+        "the group has stopped: a stop was requested while moving; category 1: decelerate, then remove power"
     );
     assert_eq!(joint.wait_for(Phase::Disabled, PATIENCE), Ok(()));
     joint.enable().unwrap();

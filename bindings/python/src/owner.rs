@@ -27,7 +27,8 @@ impl Owned {
             }
             Self::Virtual(controller) => {
                 let handle = controller.handle();
-                (controller.finish(), handle.machine().clone(), vec![])
+                let (outcome, unreached) = controller.finish_with_unreached();
+                (outcome, handle.machine().clone(), unreached)
             }
             Self::Served(client) => {
                 // Another client need not wait for the end of the lease. One that has never commanded has none.
@@ -43,7 +44,7 @@ impl Owned {
             let number = |axis: &usize| u8::try_from(*axis).unwrap_or(u8::MAX);
             let names: Vec<String> = unreached.iter().map(|axis| machine.axis_name(number(axis))).collect();
             return Ok(Some(format!(
-                "the drives of these axes did not answer during the shut-down, and it is unknown whether they have stopped: {}",
+                "the drives of these axes have not confirmed that they have no torque, and it is unknown whether they have stopped: {}",
                 names.join(", ")
             )));
         }

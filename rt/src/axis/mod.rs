@@ -280,6 +280,7 @@ impl Axis {
             drive_state: self.drive_state(),
             error_code: self.error_code(),
             is_heard: self.is_heard(),
+            is_confirmed_off: self.confirms_off(),
             unanswered: self.unanswered(),
             feedback_age: self.cycles_since_report(),
             feedback_slot: shown.feedback_slot,

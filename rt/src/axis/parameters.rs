@@ -197,6 +197,9 @@ pub struct AxisParameters {
     pub follow: Follow,
     /// How it is seen that its node lives. Axes of one node have the same.
     pub supervision: Supervision,
+    /// Slots after the controller's last sign of life in which the drive stops by itself; `None` if it never does, or after a time
+    /// that is not known.
+    pub stops_by_itself_cycles: Option<u32>,
     /// Following error that is allowed at any time (rad or m).
     pub following_error_limit: f64,
     /// Cycles in a row that the following error may be larger.
@@ -371,6 +374,7 @@ pub(super) mod tests {
             start_tolerance: 0.01,
             follow: Follow::Smooth,
             supervision: Supervision::Feedback,
+            stops_by_itself_cycles: None,
             following_error_limit: 0.1,
             following_error_cycles: 10,
             missed_feedback_cycles: 3,

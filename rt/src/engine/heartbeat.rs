@@ -45,11 +45,6 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
         Self { heartbeat, held_cycles, buses: buses.collect() }
     }
 
-    /// Cycles without a heartbeat after which the drives on a bus stop by themselves; `None` where they never do.
-    pub(super) fn timeout_cycles(&self, bus: usize) -> Option<u32> {
-        self.buses.get(bus).is_some_and(Option::is_some).then_some(self.heartbeat.timeout_cycles)
-    }
-
     /// Lets slots pass. After an absence that a drive may have noticed, the heartbeat waits.
     pub(super) fn pass(&mut self, elapsed: u64) {
         let was_away = elapsed > self.heartbeat.cycles.into();

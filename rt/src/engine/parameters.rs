@@ -45,8 +45,6 @@ pub struct Heartbeat {
     pub node: u8,
     /// Cycles from one to the next.
     pub cycles: u32,
-    /// Cycles without one after which the drives stop by themselves.
-    pub timeout_cycles: u32,
 }
 
 /// A group of axes, which start, move, stop and fault together.
@@ -199,8 +197,8 @@ pub enum SetUpError {
 pub enum CycleCount {
     /// From one heartbeat to the next.
     Heartbeat,
-    /// Until the drives stop for want of a heartbeat.
-    HeartbeatTimeout,
+    /// Until a drive stops by itself for want of a sign of life.
+    SelfStop,
     /// From one request of node guarding to the next.
     Guard,
     /// From one TIME message to the next.
@@ -388,10 +386,12 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
     }
 
     fn validate_cycles(&self) -> Result<(), SetUpError> {
-        let heartbeat = |cycles: fn(Heartbeat) -> u32| self.heartbeat.map_or(1, cycles);
         let counts = [
-            (CycleCount::Heartbeat, heartbeat(|heartbeat| heartbeat.cycles)),
-            (CycleCount::HeartbeatTimeout, heartbeat(|heartbeat| heartbeat.timeout_cycles)),
+            (CycleCount::Heartbeat, self.heartbeat.map_or(1, |heartbeat| heartbeat.cycles)),
+            (
+                CycleCount::SelfStop,
+                self.axes.iter().filter_map(|axis| axis.stops_by_itself_cycles).min().unwrap_or(1),
+            ),
             (
                 CycleCount::Guard,
                 self.axes.iter().filter_map(|axis| axis.supervision.guard_cycles()).min().unwrap_or(1),

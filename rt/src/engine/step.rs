@@ -8,7 +8,7 @@ use arrayvec::ArrayVec;
 use super::group::{Commands, Group, GroupContext};
 use super::state::{GroupState, PowerRemoval};
 use super::{CycleInput, Engine};
-use crate::axis::{Axis, FeedbackSince, Supervision};
+use crate::axis::{Axis, FeedbackSince};
 use crate::bit_set::BitSet;
 use crate::fault::Fault;
 use crate::host::HostInterface;
@@ -254,16 +254,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let is_always_late = self.shared.slots.late_cycles > self.shared.not_transmitted_cycles;
         let is_on_way = !self.group.motion.is_finished() && !is_always_late;
         let is_patient = is_on_way || self.group.state_cycles <= self.shared.enable_timeout_cycles;
-        // A drive that says nothing has either received what it was told, or has missed the heartbeats, or guarding, for so long that it has
+        // A drive that says nothing has either received what it was told, or has missed the controller for so long that it has
         // stopped by itself. One that PDOs do not reach is told by SDO.
         let has_stopped_by_itself = |axis: &Axis| {
             let silent_cycles = u32::from(axis.feedback_age()).saturating_mul(self.shared.divider_of(axis));
-            let bus = axis.parameters().bus.into();
-            let timeout_cycles = match axis.parameters().supervision {
-                Supervision::Guarding { life_cycles, .. } => Some(life_cycles),
-                _ => self.shared.heartbeat.as_ref().and_then(|beat| beat.timeout_cycles(bus)),
-            };
-            let is_over = timeout_cycles.is_some_and(|timeout_cycles| silent_cycles > timeout_cycles);
+            let is_over =
+                axis.parameters().stops_by_itself_cycles.is_some_and(|cycles| silent_cycles > cycles);
             is_over && !is_on_way && !axis.is_pdo_unreachable()
         };
         // The set-points of a drive that seems to follow go on to rest, though it may have said otherwise by SDO; and one that shows

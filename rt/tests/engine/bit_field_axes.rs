@@ -99,6 +99,7 @@ fn axis(fields: FieldDriveParameters, law: ControlLaw, node: u8) -> AxisParamete
     AxisParameters {
         exchange: Exchange::BitFields(fields),
         feedback_since: FeedbackSince::SetPoint,
+        stops_by_itself_cycles: None,
         ..axis_in(law, 0, node)
     }
 }
@@ -214,7 +215,7 @@ struct Rig {
 
 impl Rig {
     fn of(axes: [AxisParameters; 2], is_hollow: bool) -> Self {
-        let heartbeat = Heartbeat { node: 127, cycles: 20, timeout_cycles: 100 };
+        let heartbeat = Heartbeat { node: 127, cycles: 20 };
         let parameters = one_bus(axes, 1, Some(heartbeat), 200);
         let motor = |position| Motor { position, ..Motor::default() };
         Self {

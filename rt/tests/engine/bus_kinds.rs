@@ -13,7 +13,10 @@ fn two_kinds() -> EngineParameters {
     let mut parameters = parameters(6);
     parameters.buses[1].canopen = None;
     parameters.time_cycles = Some(10);
-    parameters.axes[3..].iter_mut().for_each(|axis| axis.feedback_since = FeedbackSince::SetPoint);
+    for axis in &mut parameters.axes[3..] {
+        axis.feedback_since = FeedbackSince::SetPoint;
+        axis.stops_by_itself_cycles = None;
+    }
     parameters
 }
 

@@ -13,6 +13,7 @@ fn guarded() -> EngineParameters {
     let mut parameters = parameters(3);
     for axis in &mut parameters.axes[1..] {
         axis.supervision = Supervision::Guarding { guard_cycles: GUARD_CYCLES, life_cycles: LIFE_CYCLES };
+        axis.stops_by_itself_cycles = Some(LIFE_CYCLES);
     }
     parameters
 }

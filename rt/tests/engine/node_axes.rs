@@ -110,6 +110,7 @@ fn a_guarded_node_is_asked_once_however_many_axes_it_has_and_its_silence_stops_a
     let mut parameters = two_in_one_node();
     for axis in &mut parameters.axes[..2] {
         axis.supervision = Supervision::Guarding { guard_cycles: 20, life_cycles: 60 };
+        axis.stops_by_itself_cycles = Some(60);
     }
     let mut rig = enabled(parameters);
     rig.buses[0].sent.clear();

@@ -40,6 +40,7 @@ fn axis() -> AxisParameters {
     AxisParameters {
         exchange: Exchange::OffCycle { report_cycles: 1, stop_frame: Some(stop_frame()) },
         feedback_since: FeedbackSince::CommandPhase,
+        stops_by_itself_cycles: None,
         ..axis_in(ControlLaw::Position, 0, 1)
     }
 }

@@ -311,9 +311,9 @@ fn disable_in_vain(mut rig: Rig) {
 }
 
 #[test]
-fn a_silent_drive_without_a_watchdog_is_waited_for_longer() {
+fn a_silent_drive_without_a_watchdog_is_waited_for_longer_whatever_heartbeats_leave_on_its_bus() {
     let mut unwatched = parameters(3);
-    unwatched.heartbeat = None;
+    unwatched.axes[1].stops_by_itself_cycles = None;
     let mut rig = Rig::of(unwatched).enable();
     rig.drive(1).is_silent = true;
     disable_in_vain(rig);

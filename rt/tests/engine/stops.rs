@@ -13,7 +13,7 @@ fn disabling_in_vain() -> Rig {
     // What the silent drive lacks is no fault of its own here.
     parameters.axes[0].missed_feedback_cycles = u16::MAX;
     // And nothing makes it stop by itself.
-    parameters.heartbeat = None;
+    parameters.axes[0].stops_by_itself_cycles = None;
     let mut rig = Rig::of(parameters).enable();
     rig.drive(0).is_silent = true;
     rig.request(Request::Disable);

@@ -47,7 +47,8 @@ impl LineCheck {
             | Interface::Slcan(_)
             | Interface::Converter(_) => None,
         };
-        let watchdogs: Option<Vec<u64>> = budgets.iter().map(|budget| budget.watchdog_ns).collect();
+        let timeout_ns = |axis| family::stops_by_itself_after(axis, config).ok()?.timeout_ns;
+        let watchdogs: Option<Vec<u64>> = config.axes_of_bus(bus).map(timeout_ns).collect();
         Some(Self {
             name: settings.name.clone(),
             interface: settings.interface.to_string(),

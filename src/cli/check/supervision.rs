@@ -1,6 +1,7 @@
 //! How an axis and the controller see that the other one is there.
 
 use crate::config::{Axis, Config, Supervision};
+use crate::family::{SignOfLife, stops_by_itself_after};
 use serde::Serialize;
 
 /// By what, and after which time, the one notices that the other is gone.
@@ -12,7 +13,7 @@ pub struct SupervisionCheck {
     pub drive_lost_after_ns: u64,
     /// How the drive sees that the controller lives; `None` if it does not.
     pub controller: Option<Sign>,
-    /// After so long without a sign of life the drive stops by itself.
+    /// After so long without a sign of life the drive stops by itself; `None` if it does not, or after a time that is not known.
     pub controller_lost_after_ns: Option<u64>,
 }
 
@@ -32,6 +33,10 @@ pub enum Sign {
         /// The guard time.
         period_ns: u64,
     },
+    /// A command.
+    Command,
+    /// A request on its serial line.
+    Request,
 }
 
 impl SupervisionCheck {
@@ -43,19 +48,22 @@ impl SupervisionCheck {
             Supervision::Heartbeat { period_ns } => Sign::Heartbeat { period_ns },
             Supervision::Guarding { guard_time_ns, .. } => Sign::NodeGuarding { period_ns: guard_time_ns },
         };
-        let controller_lost_after_ns = axis.controller_timeout_ns(&config.master);
-        let own = config.master.heartbeat_ns.map(|period_ns| Sign::Heartbeat { period_ns });
-        let controller = match drive {
-            Sign::NodeGuarding { .. } => Some(drive),
-            Sign::Feedback | Sign::Heartbeat { .. } => own,
-        };
+        let watchdog = stops_by_itself_after(axis, config).ok();
+        let controller = watchdog.and_then(|watchdog| match watchdog.sign {
+            SignOfLife::Heartbeat => {
+                config.master.heartbeat_ns.map(|period_ns| Sign::Heartbeat { period_ns })
+            }
+            SignOfLife::Guarding => Some(drive),
+            SignOfLife::Command => Some(Sign::Command),
+            SignOfLife::Request => Some(Sign::Request),
+        });
         let cycle_ns = config.bus_cycle(axis.bus).period_ns;
         let feedback_ns = u64::from(axis.missed_feedback_cycles).saturating_mul(cycle_ns);
         Self {
             drive,
             drive_lost_after_ns: supervision.timeout_ns().unwrap_or(feedback_ns),
-            controller: controller.filter(|_| controller_lost_after_ns.is_some()),
-            controller_lost_after_ns,
+            controller,
+            controller_lost_after_ns: watchdog.and_then(|watchdog| watchdog.timeout_ns),
         }
     }
 }
@@ -67,6 +75,8 @@ impl Sign {
             Self::Feedback => "feedback alone".to_owned(),
             Self::Heartbeat { period_ns } => format!("heartbeat every {}", time(period_ns)),
             Self::NodeGuarding { period_ns } => format!("node guarding every {}", time(period_ns)),
+            Self::Command => "commands".to_owned(),
+            Self::Request => "requests".to_owned(),
         }
     }
 }

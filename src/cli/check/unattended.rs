@@ -1,7 +1,7 @@
 //! What an axis does when the controller is gone, by `kill -9` or by a broken cable, until its drive acts.
 
-use crate::config::{Axis, Config, Control, PositionUnit, Protocol};
-use crate::family;
+use crate::config::{Axis, Config, Control, PositionUnit};
+use crate::family::{self, Watchdog};
 use serde::Serialize;
 
 /// What an axis does without the controller.
@@ -24,6 +24,8 @@ pub enum Unattended {
         /// The travel until the joint is at rest, from full speed: rad (m).
         travel: f64,
     },
+    /// It goes on until a watchdog of its own acts, whose time takt does not know.
+    UntilItsWatchdog,
     /// It goes on, and nothing stops it.
     GoesOnForEver {
         /// Why.
@@ -46,12 +48,13 @@ impl Unattended {
         match self {
             Self::EndsItsMove => 0.0,
             Self::HoldsLastSetPoint { travel } | Self::GoesOn { travel, .. } => *travel,
+            Self::UntilItsWatchdog => f64::MAX,
             Self::GoesOnForEver { .. } => f64::INFINITY,
         }
     }
 
     fn in_mode(control: &Control, axis: &Axis, config: &Config) -> Self {
-        let (limits, master) = (&axis.limits, &config.master);
+        let limits = &axis.limits;
         // A drive that is spoken to beside the cycle is told velocities, whatever the mode of its axis.
         let off_cycle = family::of(&axis.drive).off_cycle_budget(axis, config);
         match *control {
@@ -61,19 +64,10 @@ impl Unattended {
             }
             Control::ProfilePosition if off_cycle.is_none() => Self::EndsItsMove,
             control => {
-                let watchdog_ns = match off_cycle {
-                    Some(budget) => budget.watchdog_ns,
-                    None => axis.controller_timeout_ns(master),
-                };
-                let Some(timeout_ns) = watchdog_ns else {
-                    return Self::GoesOnForEver {
-                        because: match master.heartbeat_ns {
-                            _ if off_cycle.is_some() => "the drive has no watchdog on its controller",
-                            _ if axis.drive.protocol == Protocol::BitFields => "the drive has no watchdog",
-                            None => "[master] heartbeat is off",
-                            Some(_) => "the drive has neither a consumer heartbeat (1016) nor node guarding",
-                        },
-                    };
+                let timeout_ns = match family::stops_by_itself_after(axis, config) {
+                    Ok(Watchdog { timeout_ns: Some(timeout_ns), .. }) => timeout_ns,
+                    Ok(_) => return Self::UntilItsWatchdog,
+                    Err(unwatched) => return Self::GoesOnForEver { because: unwatched.words() },
                 };
                 let timeout_s = timeout_ns as f64 / 1e9;
                 // A torque goes on to accelerate the joint; a speed is kept.
@@ -115,6 +109,9 @@ impl Unattended {
                 milliseconds(*time_ns),
                 distance(*travel)
             ),
+            Self::UntilItsWatchdog => {
+                "goes on until its own watchdog acts, after a time that is set in it".to_owned()
+            }
             Self::GoesOnForEver { because } => format!("goes on FOR EVER: {because}"),
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::config::{Axis, Config, Master};
+use crate::config::Config;
 use crate::controller::Outcome;
 use crate::controller::realtime_thread::StartError;
 use crate::controller::session::{Session, SessionError};
@@ -21,7 +21,7 @@ struct Printed<'a> {
     report: &'a RunReport,
     /// Why the run ended, in words, where it was neither its end, nor Ctrl-C, nor a stop of the group.
     failure: Option<String>,
-    /// The axes whose drives could not be reached in the end.
+    /// The axes whose drives did not confirm in the end that they have no torque.
     unreached: Vec<&'a str>,
     /// The errors that drives showed in the end.
     drive_errors: Vec<DriveError>,
@@ -81,17 +81,13 @@ pub(super) fn tell(config: &Config, session: &Session, as_json: bool) -> Exit {
         stop: stop_of(session),
     };
     let report = RunReport::new(&session.log, &outcome);
-    let named: Vec<&Axis> = session.unreached.iter().filter_map(|axis| config.axes.get(*axis)).collect();
-    let (on_line, on_bus): (Vec<&Axis>, Vec<&Axis>) =
-        named.iter().partition(|axis| axis.drive.protocol.is_of_serial_line());
-    let unreached: Vec<&str> = named.iter().map(|axis| axis.name.as_str()).collect();
-    let on_bus: Vec<&str> = on_bus.iter().map(|axis| axis.name.as_str()).collect();
-    if !on_bus.is_empty() {
-        say!("takt: {}", unreachable(&on_bus, &by_themselves(&config.master)));
-    }
-    for axis in on_line {
-        say!("takt: {}", unreachable(&[axis.name.as_str()], &by_itself(axis, config)));
-    }
+    let unreached: Vec<&str> = session
+        .unreached
+        .iter()
+        .filter_map(|axis| config.axes.get(*axis))
+        .map(|axis| axis.name.as_str())
+        .collect();
+    family::unreached_words(config, &session.unreached).iter().for_each(|words| say!("takt: {words}"));
     let drive_errors = drive_errors(session);
     drive_errors.iter().for_each(|DriveError { axis, error, cure }| {
         say!("takt: {axis}: the drive shows {error}; try: {cure}");
@@ -137,38 +133,6 @@ fn stop_of(session: &Session) -> Option<StopReason> {
         Outcome::Interrupted | Outcome::TakenOver { .. } => session.snapshot.first_stop(),
         _ => None,
     }
-}
-
-/// What a drive on a serial line does without its master.
-fn by_itself(axis: &Axis, config: &Config) -> String {
-    let watchdog_ns =
-        family::of(&axis.drive).off_cycle_budget(axis, config).and_then(|budget| budget.watchdog_ns);
-    watchdog_ns.map_or("nothing stops it, since its communication time-out is off".to_owned(), |ns| {
-        format!(
-            "its communication time-out is over {} ms after the last request that it has heard",
-            ns / 1_000_000
-        )
-    })
-}
-
-/// What drives on a CAN bus do without their master.
-fn by_themselves(master: &Master) -> String {
-    match master.heartbeat_ns {
-        Some(_) => format!(
-            "each stops by itself {} ms after the last heartbeat that it has heard",
-            master.heartbeat_timeout_ns / 1_000_000
-        ),
-        None => "nothing stops them, since `heartbeat` is off".to_owned(),
-    }
-}
-
-/// The warning about drives that no longer answered.
-fn unreachable(axes: &[&str], by_themselves: &str) -> String {
-    format!(
-        "{}: no answer in the end, so it is not known whether they have stopped; {by_themselves}. Make sure of that before you come near, \
-         and switch their power off before you repair the bus",
-        axes.join(", ")
-    )
 }
 
 /// Why the run ended, where the report does not say it.

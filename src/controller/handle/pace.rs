@@ -87,6 +87,11 @@ impl VirtualPace {
         self.lock().run.supervisor().outcome().cloned()
     }
 
+    /// The axes whose drives did not confirm in the end that they have no torque.
+    pub(super) fn unreached(&self) -> Vec<usize> {
+        self.lock().run.supervisor().unreached().to_vec()
+    }
+
     /// After a panic in a cycle the run goes on with the next one, as far as it can.
     fn lock(&self) -> MutexGuard<'_, Parts> {
         self.parts.lock().unwrap_or_else(PoisonError::into_inner)

@@ -154,11 +154,18 @@ impl VirtualController {
 
     /// Brings the axes to rest, disables and shuts down the drives, and returns how the run has ended.
     pub fn finish(self) -> Outcome {
-        match self.end() {
+        self.finish_with_unreached().0
+    }
+
+    /// As [`VirtualController::finish`], with the axes whose drives did not confirm that they have no torque: see
+    /// [`Session::unreached`](crate::Session::unreached).
+    pub fn finish_with_unreached(self) -> (Outcome, Vec<usize>) {
+        let outcome = match self.end() {
             // An interrupt is the regular end of this run.
             Outcome::Interrupted => Outcome::Finished,
             outcome => outcome,
-        }
+        };
+        (outcome, self.handle.virtual_pace().map_or(vec![], |pace| pace.unreached()))
     }
 
     fn end(&self) -> Outcome {

@@ -124,20 +124,16 @@ impl Supervisor {
         let outcome = self.shutdown.outcome();
         let unsettled = self.off_cycle.lines().unsettled();
         let is_awaited = !unsettled.is_empty() && elapsed_ns <= LINES_NS;
-        let is_over = outcome.is_some() && !is_awaited && self.are_told_to_stop(elapsed_ns, snapshot);
+        let not_shut_down = [self.shutdown.not_done(), unsettled].concat();
+        let unconfirmed = self.unconfirmed(snapshot, Some(&not_shut_down));
+        let is_over =
+            outcome.is_some() && !is_awaited && self.are_told_to_stop(elapsed_ns, snapshot, &unconfirmed);
         if is_over || elapsed_ns > self.stage_timeout_ns {
-            match outcome {
-                Some(Err(error)) if !self.facts.is_empty() => {
-                    let silent = error.failures.into_iter().filter(|failure| failure.cause.is_silence());
-                    self.unreached = silent.map(|failure| failure.axis).collect();
-                }
-                Some(Ok(facts)) => {
-                    let codes = facts.iter().map(|facts| facts.error_code.0).enumerate();
-                    self.drive_errors = codes.filter(|(_, code)| *code != 0).collect();
-                }
-                _ => {}
+            if let Some(Ok(facts)) = outcome {
+                let codes = facts.iter().map(|facts| facts.error_code.0).enumerate();
+                self.drive_errors = codes.filter(|(_, code)| *code != 0).collect();
             }
-            self.unreached.extend(unsettled);
+            self.unreached = unconfirmed;
             self.request(Request::Sync(false));
             self.request(Request::Shutdown);
             self.enter(Stage::Done, now_ns);
@@ -148,23 +144,48 @@ impl Supervisor {
         // The last controlwords take effect at the next SYNC, and may wait for the bus. So the loop goes on until the
         // group is disabled.
         let is_off = is_every_group_off(snapshot) && elapsed_ns > 0;
-        if is_off && self.are_told_to_stop(elapsed_ns, snapshot) || elapsed_ns > self.stage_timeout_ns {
+        let unconfirmed = self.unconfirmed(snapshot, None);
+        if is_off && self.are_told_to_stop(elapsed_ns, snapshot, &unconfirmed)
+            || elapsed_ns > self.stage_timeout_ns
+        {
             self.note_unreleased(snapshot);
+            self.unreached = unconfirmed;
             self.request(Request::Shutdown);
             self.enter(Stage::Done, now_ns);
         }
     }
 
-    /// Whether the drives that would go on without the controller have been told to stop for long enough, and the newest reply of
-    /// none shows torque.
-    fn are_told_to_stop(&self, elapsed_ns: u64, snapshot: &Snapshot) -> bool {
+    /// The axes whose drives have been brought up and have not confirmed that they have no torque, in their order. A drive with PDOs
+    /// confirms it by its part of the shut-down, which ends its reports, and every drive by its newest report, if that is not old.
+    /// `not_shut_down` are those that have not carried out their part, where there is a shut-down.
+    fn unconfirmed(&self, snapshot: &Snapshot, not_shut_down: Option<&[usize]>) -> Vec<usize> {
+        if self.facts.is_empty() {
+            return vec![];
+        }
+        // None has been told to start.
+        let is_passive = is_any(snapshot, |phase| phase == Phase::Passive);
+        let is_unconfirmed = |axis: &usize| match not_shut_down {
+            Some(axes) if axes.contains(axis) => true,
+            Some(_) if self.has_pdos.get(*axis) == Some(&true) => false,
+            _ => !is_passive && snapshot.axes.get(*axis).is_some_and(|own| !own.is_confirmed_off),
+        };
+        (0..self.axes).filter(is_unconfirmed).collect()
+    }
+
+    /// Whether the drives that do not stop by themselves have been told to stop for long enough, and the last report of none shows
+    /// torque, however old it is. What a drive with PDOs confirms is no misheard reply.
+    fn are_told_to_stop(&self, elapsed_ns: u64, snapshot: &Snapshot, unconfirmed: &[usize]) -> bool {
         if is_any(snapshot, |phase| phase == Phase::Passive) {
             // None has been told to start.
             return true;
         }
-        self.axes_of(snapshot).iter().zip(&self.least_shut_down_ns).all(|(axis, least_ns)| {
-            let has_torque = axis.drive_state.has_torque() && axis.feedback_age == 0;
-            *least_ns == 0 || elapsed_ns >= *least_ns && !has_torque
-        })
+        let axes = self.axes_of(snapshot).iter().zip(&self.has_pdos).zip(&self.least_shut_down_ns);
+        axes.enumerate().filter(|(_, (_, least_ns))| **least_ns > 0).all(
+            |(index, ((axis, has_pdos), least_ns))| {
+                let is_confirmed = !unconfirmed.contains(&index);
+                let may_have_torque = !is_confirmed && axis.drive_state.has_torque();
+                is_confirmed && *has_pdos || elapsed_ns >= *least_ns && !may_have_torque
+            },
+        )
     }
 }

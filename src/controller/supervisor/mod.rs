@@ -90,8 +90,8 @@ pub struct Supervisor {
     stage_timeout_ns: u64,
     bring_up: BringUp,
     off_cycle: OffCycleDrives,
-    /// Whether the drive of an axis tells its position at bring-up.
-    tells_position: Vec<bool>,
+    /// Whether the drive of an axis has PDOs: such a one tells its position at bring-up, and confirms its shut-down by SDO.
+    has_pdos: Vec<bool>,
     shutdown: Shutdown,
     /// For how long the drive of each axis is told to stop at least.
     least_shut_down_ns: Vec<u64>,
@@ -130,12 +130,12 @@ impl Supervisor {
             stage_timeout_ns: STAGE_TIMEOUT_NS + enabled_from_ns(config),
             bring_up: BringUp::new(config),
             off_cycle: OffCycleDrives::new(config),
-            tells_position: config.axes.iter().map(|axis| family::has_pdos(axis, config)).collect(),
+            has_pdos: config.axes.iter().map(|axis| family::has_pdos(axis, config)).collect(),
             shutdown: Shutdown::new(config),
             least_shut_down_ns: config
                 .axes
                 .iter()
-                .map(|axis| family::of(&axis.drive).least_shut_down_ns(axis))
+                .map(|axis| family::least_shut_down_ns(axis, config))
                 .collect(),
             programs: (0..config.groups.len().max(1))
                 .map(|group| {
@@ -194,7 +194,8 @@ impl Supervisor {
         if self.stage == Stage::Done { self.outcome.as_ref() } else { None }
     }
 
-    /// The axes whose drives were brought up and did not answer during the shut-down. It is unknown whether they have stopped.
+    /// The axes whose drives were brought up and did not confirm in the end that they have no torque: their newest report is old, or
+    /// shows torque, or they did not carry out the shut-down. It is unknown whether they have stopped.
     pub fn unreached(&self) -> &[usize] {
         &self.unreached
     }

@@ -37,7 +37,7 @@ impl Supervisor {
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
                 // Some drives send feedback by process data only after they have received a target.
-                let told = (0..).zip(&facts).zip(&self.tells_position).filter(|(_, tells)| **tells);
+                let told = (0..).zip(&facts).zip(&self.has_pdos).filter(|(_, tells)| **tells);
                 let positions: Vec<_> = told
                     .map(|((axis, facts), _)| Request::Position { axis, counts: facts.position_counts })
                     .collect();

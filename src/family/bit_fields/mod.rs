@@ -19,7 +19,7 @@ use takt_rt::{
 use super::bring_up::{AxisSession, ProcessData};
 use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
-use super::{ChinesePhrase, DataSheet, Family, LookingAtSlave, SettingUp, UNWATCHED_SHUT_DOWN_NS};
+use super::{ChinesePhrase, DataSheet, Family, LookingAtSlave, SettingUp, SignOfLife, Unwatched, Watchdog};
 use crate::config::bit_fields::{
     self, BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings,
 };
@@ -305,8 +305,11 @@ impl Family for BitFieldFamily {
         device(axis).compile(axis).ok()
     }
 
-    fn least_shut_down_ns(&self, axis: &Axis) -> Nanoseconds {
-        if device(axis).description.has_watchdog { 0 } else { UNWATCHED_SHUT_DOWN_NS }
+    fn stops_by_itself_after(&self, axis: &Axis, _: &Config) -> Result<Watchdog, Unwatched> {
+        match device(axis).description.has_watchdog {
+            true => Ok(Watchdog::new(SignOfLife::Command, None)),
+            false => Err(Unwatched::NoWatchdog),
+        }
     }
 
     /// Sends the frames that set the drive up. Whether it is there, the cycle sees, which stops it first.

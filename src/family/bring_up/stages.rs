@@ -204,6 +204,11 @@ impl Shutdown {
     pub fn outcome(&self) -> Option<Result<Vec<AxisFacts>, BringUpError>> {
         self.group.outcome()
     }
+
+    /// The axes that have not been shut down, as indices into the configuration: not yet, or not at all.
+    pub fn not_done(&self) -> Vec<usize> {
+        self.group.not_done()
+    }
 }
 
 /// The nodes of a configuration, and their running procedures.
@@ -382,6 +387,19 @@ impl Group {
         }
         failures.sort_by_key(|failure| failure.axis);
         Some(if failures.is_empty() { Ok(facts) } else { Err(BringUpError { failures }) })
+    }
+
+    fn not_done(&self) -> Vec<usize> {
+        let mut axes = vec![];
+        for (member, procedure) in self.members.iter().zip(self.procedures.procedures()) {
+            let done = match procedure.outcome() {
+                Some(Ok(_)) => member.axes.len(),
+                Some(Err(error)) => error.failure.place,
+                None => 0,
+            };
+            axes.extend(member.axes.iter().skip(done));
+        }
+        axes
     }
 
     /// The failure of a node: that of the axis at which it failed, and, where the node is silent, of those that were to follow.

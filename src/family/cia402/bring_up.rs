@@ -17,6 +17,7 @@ use crate::family::bring_up::{
     AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat, identity,
     pdo_mapping,
 };
+use crate::family::stops_by_itself_after;
 
 const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::U32, "following error window");
 const ABORT_CONNECTION_OPTION: Object = Object::new(0x6007, 0, DataType::I16, "abort connection option code");
@@ -311,7 +312,7 @@ impl Sheet<'_> {
             self.set(GUARD_TIME, rounded_up(guard_time_ns, 1_000_000)).await?;
             self.set(LIFE_TIME_FACTOR, life_time_factor.into()).await?;
         }
-        if c.axis.controller_timeout_ns(&c.config.master).is_some() {
+        if stops_by_itself_after(c.axis, c.config).is_ok() {
             self.set(COMMUNICATION_ERROR_BEHAVIOUR, error_behaviour::STOPPED.into()).await?;
             self.set(ABORT_CONNECTION_OPTION, FAULT_SIGNAL).await?;
         }

@@ -7,8 +7,9 @@ use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, Operati
 use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
 use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::canopen::objects::{
-    CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MODES_OF_OPERATION, POSITION_ACTUAL_VALUE,
-    PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection, PdoParameters, STATUSWORD,
+    CONSUMER_HEARTBEAT_TIME, CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MODES_OF_OPERATION,
+    POSITION_ACTUAL_VALUE, PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection,
+    PdoParameters, STATUSWORD,
 };
 use crate::config::quirks::{MotionUnit, Quirks};
 use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, VelocityUnit};
@@ -270,9 +271,9 @@ impl Device {
         }
     }
 
-    /// Whether the drive can watch the heartbeat of the controller.
+    /// Whether the drive can be made to watch the heartbeat of the controller.
     pub(super) fn consumes_heartbeat(&self) -> bool {
-        self.entry(ObjectAddress::new(0x1016, 1)).is_some()
+        self.is_writable(CONSUMER_HEARTBEAT_TIME.address)
     }
 
     /// What is known of the drive.

@@ -28,20 +28,8 @@ pub(crate) fn remarks(device: &Device) -> Vec<&'static str> {
     let is_absent = |(index, subindex, _): &&(u16, u8, &str)| {
         device.entry(ObjectAddress::new(*index, *subindex)).is_none()
     };
-    let control = device.error_control();
-    let unsupervised = [
-        (!device.consumes_heartbeat() && !matches!(control, ErrorControl::Guarding { .. })).then_some(
-            "the drive does not notice that the controller is gone (no consumer heartbeat, 1016, and no node guarding in its \
-             place): it goes on with its last command",
-        ),
-        (control == ErrorControl::None).then_some(
-            "the drive has neither a heartbeat (1017) nor node guarding (100C, 100D): only its process data shows that it is \
-             there",
-        ),
-    ];
-    unsupervised
-        .into_iter()
-        .flatten()
-        .chain(LOSSES.iter().filter(is_absent).map(|(_, _, loss)| *loss))
-        .collect()
+    let unsupervised = (device.error_control() == ErrorControl::None).then_some(
+        "the drive has neither a heartbeat (1017) nor node guarding (100C, 100D): only its process data shows that it is there",
+    );
+    unsupervised.into_iter().chain(LOSSES.iter().filter(is_absent).map(|(_, _, loss)| *loss)).collect()
 }

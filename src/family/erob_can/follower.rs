@@ -50,7 +50,6 @@ pub fn budget(cycle_ns: Nanoseconds, bit_rate: u32) -> OffCycleBudget {
         requests_per_s,
         report_ns: REQUESTS_PER_ROUND * longest_ns,
         bus_share: requests_per_s * f64::from(bits) / f64::from(bit_rate.max(1)),
-        watchdog_ns: None,
     }
 }
 

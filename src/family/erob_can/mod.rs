@@ -22,13 +22,13 @@ mod simulated;
 pub use facts::FACTS;
 pub use scan::MAKER;
 
-use takt_rt::{Frame, Id, Nanoseconds};
+use takt_rt::{Frame, Id};
 
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
 use super::{
     ChinesePhrase, ChineseTerm, Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol,
-    SettingUp, UNWATCHED_SHUT_DOWN_NS, erob,
+    SettingUp, Unwatched, Watchdog, erob,
 };
 use crate::canopen::function_code;
 use crate::canopen::objects::DEVICE_TYPE;
@@ -90,15 +90,8 @@ impl Family for ErobCan {
         Some(follower::budget(config.cycle.period_ns, config.buses.get(axis.bus)?.bit_rate))
     }
 
-    fn least_shut_down_ns(&self, _: &Axis) -> Nanoseconds {
-        UNWATCHED_SHUT_DOWN_NS
-    }
-
-    fn remarks(&self, _: &Axis) -> Vec<&'static str> {
-        vec![
-            "it has no watchdog: it goes on with its last velocity if the controller or the bus fails, so that its supply must \
-             be cut by other means (a relay that the controller holds closed)",
-        ]
+    fn stops_by_itself_after(&self, _: &Axis, _: &Config) -> Result<Watchdog, Unwatched> {
+        Err(Unwatched::NoWatchdog)
     }
 
     /// It has no object dictionary, and nothing to set up by one.

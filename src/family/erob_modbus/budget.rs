@@ -66,14 +66,13 @@ impl LineBudget {
         ROUND.iter().map(|(request, reply)| self.line.duration_ns(request + reply)).sum()
     }
 
-    /// What a drive of the line asks of it. `watchdog_ms`: register 0x0002, 0 for none.
-    pub fn of_drive(&self, watchdog_ms: u16) -> OffCycleBudget {
+    /// What a drive of the line asks of it.
+    pub fn of_drive(&self) -> OffCycleBudget {
         let round_ns = self.round_ns();
         OffCycleBudget {
             requests_per_s: ROUND.len() as f64 * 1e9 / round_ns as f64,
             report_ns: round_ns,
             bus_share: self.bytes_ns() as f64 / round_ns as f64,
-            watchdog_ns: (watchdog_ms > 0).then_some(u64::from(watchdog_ms) * 1_000_000),
         }
     }
 }
@@ -93,8 +92,6 @@ mod tests {
         assert_eq!(held_back.round_ns(), alone.round_ns() + 3 * 16_000_000);
         let slow = LineBudget { line: LineTiming::new(9_600), ..alone };
         assert_eq!(slow.round_ns() / 1_000_000, 104);
-        assert_eq!(alone.of_drive(0).watchdog_ns, None);
-        assert_eq!(alone.of_drive(500).watchdog_ns, Some(500_000_000));
-        assert!((140.0..142.0).contains(&alone.of_drive(0).requests_per_s));
+        assert!((140.0..142.0).contains(&alone.of_drive().requests_per_s));
     }
 }

@@ -35,8 +35,8 @@ use takt_rt::Frame;
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
 use super::scan::{FoundDevice, StartingKeys};
 use super::{
-    ChinesePhrase, Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, erob,
-    erob_can,
+    ChinesePhrase, Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, SignOfLife,
+    Unwatched, Watchdog, erob, erob_can,
 };
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
@@ -107,21 +107,23 @@ impl Family for ErobModbus {
     }
 
     fn off_cycle_budget(&self, axis: &Axis, config: &Config) -> Option<OffCycleBudget> {
-        let watchdog_ms = LineKeys::of(axis).communication_timeout_ms;
-        Some(LineBudget::of(config, axis.bus)?.of_drive(watchdog_ms))
+        Some(LineBudget::of(config, axis.bus)?.of_drive())
+    }
+
+    fn stops_by_itself_after(&self, axis: &Axis, _: &Config) -> Result<Watchdog, Unwatched> {
+        match LineKeys::of(axis).communication_timeout_ms {
+            0 => Err(Unwatched::TimeoutOff),
+            ms => Ok(Watchdog::new(SignOfLife::Request, Some(u64::from(ms) * 1_000_000))),
+        }
     }
 
     fn remarks(&self, axis: &Axis) -> Vec<&'static str> {
-        vec![match LineKeys::of(axis).communication_timeout_ms {
-            0 => {
-                "its communication time-out is off: it goes on with its last velocity if the controller or the line fails, so that its \
-                 supply must be cut by other means (a relay that the controller holds closed)"
-            }
-            _ => {
-                "what its motor does after the communication time-out (0x0FA2) stands in no manual: try it without a load before you \
-                 rely on it"
-            }
-        }]
+        let unknown = "what its motor does after the communication time-out (0x0FA2) stands in no manual: try it without a load before \
+                       you rely on it";
+        match LineKeys::of(axis).communication_timeout_ms {
+            0 => vec![],
+            _ => vec![unknown],
+        }
     }
 
     /// It has no object dictionary, and nothing to set up by one.

@@ -6,9 +6,9 @@ use crate::family::ChinesePhrase;
 pub const PHRASES: &[ChinesePhrase] = &[
     ("<0> while <1>; <2>", "<0>（当时状态：<1>）；<2>"),
     ("<0> while <1>; <2>; try: <3>", "<0>（当时状态：<1>）；<2>；建议：<3>"),
-    ("category 0: power removed at once", "0 类停止：立即断开动力"),
-    ("category 1: decelerated, then power removed", "1 类停止：减速停下后断开动力"),
-    ("category 2: decelerated, held under power", "2 类停止：减速停下后带电保持"),
+    ("category 0: remove power at once", "0 类停止：立即断开动力"),
+    ("category 1: decelerate, then remove power", "1 类停止：减速停下后断开动力"),
+    ("category 2: decelerate, hold under power", "2 类停止：减速停下后带电保持"),
     ("a stop was requested", "收到停止请求"),
     (
         "{0} would come to rest at {1}, outside its position limit of {2}",

@@ -413,7 +413,7 @@ mod tests {
     fn the_text_of_a_stop_has_cause_phase_and_category() {
         assert_eq!(
             stop(&reason(Rule::Requested, Origin::Group, 0.0, 0.0), &machine()),
-            "a stop was requested while moving; category 1: decelerated, then power removed"
+            "a stop was requested while moving; category 1: decelerate, then remove power"
         );
     }
 

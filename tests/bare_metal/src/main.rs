@@ -93,6 +93,7 @@ fn axis() -> Option<AxisParameters> {
         start_tolerance: 0.02,
         follow: Follow::Smooth,
         supervision: Supervision::Feedback,
+        stops_by_itself_cycles: None,
         following_error_limit: 0.1,
         following_error_cycles: 50,
         missed_feedback_cycles: 5,

@@ -5,6 +5,7 @@ use std::io::Write as _;
 use takt::Config;
 use takt::Outcome;
 use takt::config::{ErrorControl, Supervision};
+use takt::family::{Unwatched, WarningKind, stops_by_itself_after};
 use takt::internals::RunInside;
 use takt::internals::family::bring_up;
 use takt::schedule::{self, MessageKind};
@@ -56,13 +57,15 @@ fn a_drive_without_a_heartbeat_is_guarded_at_the_period_of_the_controllers_heart
 fn what_is_lost_without_heartbeat_and_without_guarding_is_said() {
     let guarded = machine("", "", HEARTBEATS);
     let about = |config: &Config, words: &str| config.losses().iter().any(|loss| loss.contains(words));
-    assert!(!about(&guarded, "does not notice") && !about(&guarded, "neither"));
+    assert!(guarded.warnings().is_empty() && !about(&guarded, "neither"));
     let none = machine("", "heartbeat = \"50 ms\"\n", "\"1016\", \"1017\", \"100C\"");
     assert_eq!(none.axes[1].drive.error_control, ErrorControl::None);
     assert_eq!(none.axes[1].supervision(&none.master), Supervision::Feedback);
-    assert!(about(&none, "`guarded`: the drive does not notice that the controller is gone"));
+    let warnings = none.warnings();
+    let [unwatched] = &warnings[..] else { panic!("{warnings:?}") };
+    assert_eq!(unwatched.kind, WarningKind::NoWatchdog { because: Unwatched::NoErrorControl });
     assert!(about(&none, "`guarded`: the drive has neither a heartbeat (1017) nor node guarding"));
-    assert_eq!(none.axes[1].controller_timeout_ns(&none.master), None);
+    assert_eq!(stops_by_itself_after(&none.axes[1], &none), Err(Unwatched::NoErrorControl));
 }
 
 #[test]

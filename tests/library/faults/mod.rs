@@ -14,5 +14,6 @@ mod reactions;
 mod rearming;
 mod repeatability;
 mod unreachable;
+mod unreached;
 mod without_canopen;
 mod wrapper;
