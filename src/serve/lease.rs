@@ -281,7 +281,6 @@ mod tests {
 
     #[test]
     fn points_go_with_the_lease_and_no_trajectory_begins_with_a_part_of_them() {
-        let mut lease = Lease::new(LENGTH);
         let ends: [fn(&mut Lease); 4] = [
             |lease| lease.release(FIRST.connection),
             |lease| lease.take_over(SECOND, 100 * MS),
@@ -289,7 +288,7 @@ mod tests {
             |lease| lease.renew(SECOND, 600 * MS).unwrap(),
         ];
         for end in ends {
-            lease = Lease::new(LENGTH);
+            let mut lease = Lease::new(LENGTH);
             lease.renew(FIRST, 0).unwrap();
             lease.keep_points(FIRST, 1, vec![point(1); 2]).unwrap();
             end(&mut lease);
