@@ -381,8 +381,8 @@ fn a_gear_ratio_of_the_gear_inside_an_erob_is_warned_about() {
 fn limits_near_a_wrap_of_the_drive_s_count_are_warned_about() {
     // The joint is at about 3.3 rad where the count of its drive wraps; its limits are ±2.9671 rad.
     let zero_at = |count: &str| {
-        let line = format!("drive = \"erob-canopen\"\nzero_counts = {count}");
-        move |arm: String| arm.replacen("drive = \"erob-canopen\"", &line, 1)
+        let line = format!("node = 1\nzero_counts = {count}");
+        move |arm: String| arm.replacen("node = 1\n", &format!("{line}\n"), 1)
     };
     for count in ["2147208000", "-2147208000"] {
         let near = warnings(zero_at(count));

@@ -98,11 +98,13 @@ fn a_file_is_executed_as_one_trajectory_at_its_times() {
     for has_velocities in [false, true] {
         place.write(reaching(has_velocities));
         let (report, rows) = place.commanded();
+        // The slopes of positions alone are estimated: monotone, and not those of the motion between the points.
+        let (off_by, slower_by) = if has_velocities { (1e-6, 1e-4) } else { (1e-4, 1e-2) };
         for row in &rows {
             let (position, velocity) = reach((row[0] - 0.1) / 2.0);
-            assert!((row[2] - 0.6 * position).abs() < 1e-6, "{row:?}");
-            assert!((row[5] + 0.9 * position).abs() < 1e-6, "{row:?}");
-            assert!((row[8] - 0.3 * velocity).abs() < 1e-4, "{row:?}");
+            assert!((row[2] - 0.6 * position).abs() < off_by, "{row:?}");
+            assert!((row[5] + 0.9 * position).abs() < off_by, "{row:?}");
+            assert!((row[8] - 0.3 * velocity).abs() < slower_by, "{row:?}");
             assert!([1, 3, 4, 6].iter().all(|joint| row[*joint] == 0.0), "a joint that is not named moves");
         }
         assert_eq!((rows[0][0], rows[1][0]), (0.1, 0.101));

@@ -11,8 +11,8 @@ use takt::sim::Observation;
 use takt::{Outcome, VirtualRun};
 use takt_rt::{AxisSnapshot, DriveState, EventKind, Phase, StopReason};
 
-/// Timeout: twenty seconds are longer than the shortened program.
-const CYCLES_AT_MOST: u64 = 20_000;
+/// Timeout: a minute is longer than the shortened program and every stage of its end.
+const CYCLES_AT_MOST: u64 = 60_000;
 
 pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("configs")

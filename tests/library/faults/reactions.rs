@@ -15,7 +15,9 @@ fn in_motion(fault: &str) -> Played {
 /// The invariants for all faults. The tolerance of the velocity limit is for rounding.
 fn assert_safe(fault: &str, played: &Played) {
     assert!(played.outcome.is_some(), "{fault}: the run does not end");
-    assert!(played.stops.len() <= 1, "{fault}: {:?}", played.stops);
+    // A drive that no controlword reaches has not confirmed that it has no torque: that is reported in addition.
+    let reasons = played.stops.iter().filter(|stop| stop.rule() != Rule::NotDisabled).count();
+    assert!(reasons <= 1, "{fault}: {:?}", played.stops);
     assert!(played.largest_step <= 1.0 + 1e-6, "{fault}: {} velocity limits", played.largest_step);
     assert!(played.speed_at_end < 1e-3, "{fault}: {} rad/s at the end", played.speed_at_end);
     assert_eq!(played.missed_slots, 0, "{fault}");
@@ -128,7 +130,7 @@ fn every_fault_with_a_rule_stops_the_whole_arm_in_time_with_the_reason() {
     for Stops(fault, rule, origin, within_ms) in STOPS {
         let played = in_motion(fault);
         assert_safe(fault, &played);
-        let [stop] = played.stops.as_slice() else { panic!("{fault}: {:?}", played.outcome) };
+        let Some(stop) = played.stops.first() else { panic!("{fault}: {:?}", played.outcome) };
         assert_eq!((stop.rule(), stop.origin), (rule, origin), "{fault}");
         assert_eq!((stop.category, stop.phase), (StopCategory::One, Phase::Moving), "{fault}");
         assert!(played.detection_ms.is_some_and(|ms| (0.0..=within_ms).contains(&ms)), "{fault}: {played:?}");

@@ -90,9 +90,11 @@ struct Ended {
 
 /// Runs to the end with an axis that falls silent in motion, and with an interrupt 100 ms after that.
 fn ended(config: &Config, silent: Option<&str>, interrupt: Option<Interrupt>) -> Ended {
-    let fault = silent.map_or(String::new(), |axis| {
-        format!("[[fault]]\nkind = \"silent-node\"\naxis = {axis:?}\nwhen = \"moving\"\nat = \"300 ms\"\n")
+    // One that never begins where none is wanted: a scenario has at least one fault.
+    let (axis, when) = silent.map_or((config.axes[0].name.as_str(), "at = \"3600 s\""), |axis| {
+        (axis, "when = \"moving\"\nat = \"300 ms\"")
     });
+    let fault = format!("[[fault]]\nkind = \"silent-node\"\naxis = {axis:?}\n{when}\n");
     let injector = Arc::new(FaultInjector::new(scenario(&fault, config)));
     let (mut run, _) = VirtualRun::<Port>::with_faults(config, injector).unwrap();
     let (mut moving_ns, mut disabled_ns) = (None, None);
@@ -234,7 +236,7 @@ fn a_consumer_heartbeat_that_cannot_be_written_is_no_watchdog() {
         .unwrap();
         let text = format!(
             "name = \"one\"\n[[bus]]\nname = \"can\"\n[[axis]]\nname = \"joint\"\nbus = \"can\"\nnode = 1\ndrive = \"cia402\"\n\
-             eds = {:?}\nquirks = {:?}\nlimits = {{ position = [-1, 1], velocity = 1, acceleration = 5, torque = 10 }}\n",
+             counts_per_turn = 524288\neds = {:?}\nquirks = {:?}\nlimits = {{ position = [-1, 1], velocity = 1, acceleration = 5, torque = 10 }}\n",
             sheet.display().to_string(),
             quirks.path().display().to_string()
         );
