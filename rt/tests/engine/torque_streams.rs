@@ -304,7 +304,11 @@ fn gains_whose_products_are_not_numbers_are_a_stop_and_the_torque_stays_as_it_wa
     rig.run_until(Phase::Holding, 2_000);
     let torques = || rig.host.records.iter().map(|record| f64::from(record.axes[0].torque_set));
     assert!(torques().all(|torque| torque.abs() <= LIMITS.torque));
-    assert!((torques().last().unwrap() - 5.0).abs() < 2.0, "the load is held: {:?}", torques().last());
+    assert!(
+        (torques().next_back().unwrap() - 5.0).abs() < 2.0,
+        "the load is held: {:?}",
+        torques().next_back()
+    );
 }
 
 #[test]
