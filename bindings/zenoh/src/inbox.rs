@@ -64,7 +64,7 @@ impl Inbox {
         waiting.messages.pop_front().map(|message| Taken { message, stops })
     }
 
-    /// How many stops have come.
+    /// Number of stops received.
     pub fn stops(&self) -> u64 {
         self.lock().stops
     }

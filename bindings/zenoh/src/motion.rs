@@ -103,7 +103,7 @@ pub enum Wanted {
     Execute {
         /// The number of the group.
         group: usize,
-        /// How long it waits before it begins. The wait is no part of it.
+        /// Wait before it starts. The wait is not part of the trajectory.
         delay: Duration,
         /// Its points, for the axes of the group in their order.
         points: Vec<TrajectoryPoint>,
@@ -160,7 +160,7 @@ pub fn wanted(
     Ok(Wanted::Execute { group, delay, points })
 }
 
-/// How long a trajectory with a stamp waits.
+/// Wait of a trajectory with a stamp.
 fn delay(at_ns: i64, now_ns: i64) -> Result<Duration, Unfit> {
     let ahead_ns = if at_ns == 0 { 0 } else { at_ns.saturating_sub(now_ns) };
     let (stamp_s, now_s) = (seconds(at_ns), seconds(now_ns));

@@ -53,7 +53,7 @@ impl DriveReport {
         };
     }
 
-    /// Whether an enabled drive does not obey the bus any more: it has obeyed it by its statusword since it was enabled.
+    /// Returns true if an enabled drive no longer obeys the bus: it has obeyed it by its statusword since it was enabled.
     #[inline]
     pub(super) fn is_local(&self) -> bool {
         self.without_remote.is_some_and(|reports| reports >= LOCAL_REPORTS)

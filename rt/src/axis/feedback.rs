@@ -224,7 +224,7 @@ impl Axis {
         self.joint.position()
     }
 
-    /// Whether the drive can be commanded where the joint is: the joint is not beyond a wrap of the drive's position counter, nor may it
+    /// Returns true if the drive can be commanded where the joint is: the joint is not beyond a wrap of the drive's position counter, nor may it
     /// as well be a lap of that away.
     pub fn is_position_commandable(&self) -> bool {
         self.joint.is_commandable(JointFacts::of(&self.parameters))
@@ -246,7 +246,7 @@ impl Axis {
         self.duplicate_node.is_found()
     }
 
-    /// Whether the enabled drive does not obey the bus any more, by statusword bit 9 (remote).
+    /// Returns true if the enabled drive no longer obeys the bus, by statusword bit 9 (remote).
     #[inline]
     pub(crate) fn is_local(&self) -> bool {
         self.report.is_local()

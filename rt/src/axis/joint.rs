@@ -119,7 +119,7 @@ impl JointEstimate {
         !self.is_known()
     }
 
-    /// Whether the drive can be commanded where the joint is: its counter has no wrap between the joint and the position limits, and the
+    /// Returns true if the drive can be commanded where the joint is: its counter has no wrap between the joint and the position limits, and the
     /// joint is not so far beyond them that it may as well be a lap of the counter away.
     pub(super) fn is_commandable(&self, facts: JointFacts<'_>) -> bool {
         /// Share of the counts outside of the limits, on either side, in which the joint is not taken to be a lap away.
