@@ -160,7 +160,7 @@ pub fn wanted(
     Ok(Wanted::Execute { group, delay, points })
 }
 
-/// Wait of a trajectory with a stamp.
+/// Returns the wait of a trajectory with a stamp.
 fn delay(at_ns: i64, now_ns: i64) -> Result<Duration, Unfit> {
     let ahead_ns = if at_ns == 0 { 0 } else { at_ns.saturating_sub(now_ns) };
     let (stamp_s, now_s) = (seconds(at_ns), seconds(now_ns));

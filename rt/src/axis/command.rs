@@ -45,7 +45,7 @@ impl Axis {
         self.command.set(CommandSlot::TorqueOffset, 0);
     }
 
-    /// True if the torque to command was NaN.
+    /// Returns true if the torque to command was NaN.
     #[inline]
     pub(crate) fn is_torque_undefined(&self) -> bool {
         self.torque_loop.is_undefined()
