@@ -194,7 +194,9 @@ proptest! {
             (0..=400).map(|step| {
                 let time_s = duration_s * f64::from(step) / 400.0;
                 let State { position, velocity, acceleration } = polynomial.state(time_s);
-                let steepest = if velocity * acceleration >= 0.0 { LIMITS.acceleration } else { LIMITS.deceleration };
+                // Where the axis turns round, rounding decides the sign of the velocity: the samples beside it judge.
+                let is_faster = velocity * acceleration > 1e-9;
+                let steepest = if is_faster { LIMITS.acceleration } else { LIMITS.deceleration };
                 [
                     position.abs() / LIMITS.position_max, velocity.abs() / LIMITS.velocity, acceleration.abs() / steepest,
                     polynomial.jerk(time_s).abs() / LIMITS.jerk,

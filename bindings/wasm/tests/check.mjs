@@ -147,7 +147,10 @@ for (const [what, rule, isState, isMended] of [
     arm.takt.command({ do: "clear_faults", group: null });
     arm.pass(2000);
     if (arm.phase === "disabled") {
-      arm.takt.command({ do: "enable", group: null });
+      const enable = () => arm.takt.command({ do: "enable", group: null });
+      // A drive that has left the bus has confirmed nothing.
+      if (isState && !isMended) return assert.throws(enable, (refusal) => /not_disabled/.test(refusal.words.en));
+      enable();
       arm.pass(6000);
     }
     // A drive that has lost its supply or its master is brought up by a new run alone.

@@ -160,7 +160,7 @@ def test_what_is_not_possible_is_refused_and_nothing_moves(peer, bridge, states)
         (b"\x00\x01\x00\x00rubbish", "no trajectory_msgs/msg/JointTrajectory in CDR"),
         (trajectory(["elbow"], [(1.0, [0.0])]), 'there is no axis "elbow"'),
         (trajectory(["joint1"], [(1.0, [99.0])]), "point 0, joint1: position 99"),
-        (trajectory(["joint1"], [(1.0, [0.0])], stamp=(1, 0)), "are the clocks of both computers alike?"),
+        (trajectory(["joint1"], [(1.0, [0.0])], stamp=(1, 0)), "Synchronize both clocks"),
     ]
     for message, words in refused:
         before = bridge.path.read_text().count("a trajectory was refused")
