@@ -56,6 +56,14 @@ impl BusPort for Watched {
     }
 }
 
+/// Pages that the kernel has moved since it started, to have larger ranges free. Each costs a page fault at its next access, locked or not,
+/// unless the kernel has PREEMPT_RT (vm.compact_unevictable_allowed).
+fn moved_pages() -> u64 {
+    let counters = std::fs::read_to_string("/proc/vmstat").unwrap();
+    let count = counters.lines().find_map(|line| line.strip_prefix("pgmigrate_success "));
+    count.map_or(0, |count| count.parse().unwrap())
+}
+
 #[test]
 fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
@@ -96,6 +104,7 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
     let running = realtime_thread::start(realtime_thread::thread_config(&config.realtime), work).unwrap();
     let memory_locked = running.begun().report.memory_locked;
 
+    let moved_before = moved_pages();
     let mut supervisor = Supervisor::new(&config, None);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);
@@ -107,7 +116,7 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
     assert_eq!(supervisor.outcome(), Some(&Outcome::Finished));
     assert!(log.statistics.cycles > 1_000, "{} cycles", log.statistics.cycles);
     assert_eq!(calls_in_loop.load(Ordering::Relaxed), 0);
-    if memory_locked {
+    if memory_locked && moved_pages() == moved_before {
         assert_eq!((ended.page_faults.minor, ended.page_faults.major), (0, 0));
     }
 }
