@@ -454,7 +454,9 @@ impl Machine {
             let shown = self.engine.axes()[index].is_enabled().then_some((target, 0));
             if let (Some((last, cycles)), Some((now, _))) = (self.targets[index], shown) {
                 let per_unit = self.engine.axes()[index].parameters().scale.resolution();
-                let most = axis.limits.velocity * period_s * per_unit * f64::from(cycles);
+                // A drive gets the way of one cycle of its bus in that cycle, however many slots of it were used.
+                let slots = cycles.max(self.config.buses[axis.bus].divider);
+                let most = axis.limits.velocity * period_s * per_unit * f64::from(slots);
                 let step = f64::from(now) - f64::from(last);
                 assert!(step.abs() <= most + 2.0, "{}: {step} counts, at most {most}; {before:?}", axis.name);
                 let is_at_rest = phase == Phase::Holding && before == Phase::Holding;
