@@ -49,17 +49,15 @@ pub(super) struct Successor {
 }
 
 impl<const AXES: usize> Execution<AXES> {
-    /// As it will be in the next cycle.
-    fn next(&self) -> Self {
+    /// As it is when one more cycle has been carried out. What takes its place does so at once: from then on, another one may be to
+    /// take the place of that.
+    fn after_cycle(&self) -> Self {
+        let cycles = self.cycles + 1;
         match self.successor {
-            Some(successor) if self.cycles >= successor.after_cycles => Self {
-                motion: successor.motion,
-                trajectory: successor.trajectory,
-                cycles: 1,
-                successor: None,
-                wanted: self.wanted,
-            },
-            _ => Self { cycles: self.cycles + 1, ..*self },
+            Some(Successor { trajectory, motion, after_cycles }) if cycles >= after_cycles => {
+                Self { motion, trajectory, cycles: 0, successor: None, wanted: self.wanted }
+            }
+            _ => Self { cycles, ..*self },
         }
     }
 
@@ -79,8 +77,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
                 host.keep_trajectories(number, [None; 2]);
                 continue;
             };
-            let next = execution.next();
-            execution.wanted = host.trajectory(number, next.trajectory, next.cycles as f64 * period_s);
+            let at_s = (execution.cycles + 1) as f64 * period_s;
+            execution.wanted = host.trajectory(number, execution.trajectory, at_s);
             host.keep_trajectories(number, execution.in_use());
         }
     }
@@ -162,7 +160,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         next.extend(self.axes.iter().map(|axis| axis.own(&wanted.states)));
         self.check(&next)?;
         self.take_set_points(&next);
-        let following = execution.next();
+        let following = execution.after_cycle();
         if following.motion != execution.motion {
             self.shared.snapshot.motions.replace(execution.motion, following.motion);
         }

@@ -273,6 +273,19 @@ fn the_same_path_goes_on_at_another_speed_as_the_same_motion() {
 }
 
 #[test]
+fn a_trajectory_that_has_taken_over_is_the_present_one_before_its_first_cycle() {
+    let mut rig = Rig::enabled(1);
+    let (begun, copy) = (from_here(&rig), from_here(&rig));
+    let request = execute(&mut rig, begun, ExecutionStart::Now);
+    let slow = execute(&mut rig, slower(&copy, 300), after(request, 300, true));
+    rig.run(298);
+    assert_eq!(rig.engine.axes()[0].set_point(), copy.sample(0.3).states[0]);
+    execute(&mut rig, slower(&copy, 310), after(slow, 50, true));
+    let reason = last_rejection(&rig);
+    assert!(matches!(reason, RejectReason::StartMismatch { .. }), "{reason:?}");
+}
+
+#[test]
 fn another_trajectory_takes_over_where_it_was_said_and_is_a_motion_of_its_own() {
     let mut rig = Rig::enabled(1);
     let (begun, copy) = (from_here(&rig), from_here(&rig));
