@@ -79,7 +79,8 @@ pub trait BusPort {
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch);
 
     /// Own frames that were taken by [`BusPort::send`] and have not yet been seen on the wire. While there are
-    /// any at a command phase, no set-points are queued behind them: stale ones would be sent late.
+    /// any at a command phase, no set-points are queued behind them: stale ones would be sent late. A frame whose confirmation was lost
+    /// counts until a later one has been seen.
     fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize;
 
     /// The state of the interface, with its counters since it was opened.
@@ -115,7 +116,7 @@ pub struct BusHealth {
     pub tx_overruns: u64,
     /// Received frames that were lost before they could be read.
     pub rx_overruns: u64,
-    /// Error frames and bus errors.
+    /// Error frames, bus errors, and own frames whose confirmation was lost.
     pub errors: u64,
     /// How long the wire was occupied, in nanoseconds, by the frames that this port saw; for the bus load. A SocketCAN port
     /// leaves out the stuff bits: the wire is then occupied for up to 22 % longer. A simulated bus counts every bit.

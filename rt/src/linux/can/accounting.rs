@@ -1,14 +1,17 @@
 //! Tx/rx accounting: the counters of a port and the state of its bus, without any input or output.
 
-use arrayvec::ArrayVec;
-
 use super::super::wire_time::WireTime;
 use super::arrival::{Arrival, Sender};
-use super::batch::SEND_BATCH;
 use super::error_frame;
+use super::in_flight::InFlight;
 use super::wire_format::Message;
 use crate::frame::{Frame, FrameKind};
 use crate::port::{BusHealth, BusState};
+
+/// Own frames that come back without any error until a controller counts as error-active again, where its driver does not say so. From the
+/// highest count that is not bus-off, 128 frames lead back to error-active (ISO 11898-1); the rest is for drivers that report changes of the
+/// state and no single errors. At 1 ms, six axes send as many in a second and a half.
+const RECOVERED_AFTER: u32 = 10_000;
 
 /// The counters of one port and the state of its bus.
 #[derive(Clone, Debug, Default)]
@@ -16,15 +19,24 @@ pub(super) struct TxRxAccounting {
     /// All but the time that the wire was occupied.
     health: BusHealth,
     wire_time: WireTime,
-    /// Frames that the kernel took and that have not come back from the wire.
-    unconfirmed: usize,
-    /// The unconfirmed frames that another socket of this process sent, oldest first. The kernel does not mark them as our
-    /// own when they come back.
-    sent_by_another: ArrayVec<Frame, SEND_BATCH>,
+    /// Frames that the kernel took and that have not come back from the wire. The kernel does not mark those that another socket of
+    /// this process sent as our own when they come back: they are recognised by their content.
+    in_flight: InFlight,
     /// Whether a frame was still unconfirmed when the socket was last read empty.
     is_behind: bool,
     /// The overflow counter of the socket at its last reading.
     lost: u32,
+    /// What has passed the wire since the last error.
+    since_error: SinceError,
+}
+
+/// What has passed the wire since the last error.
+#[derive(Clone, Copy, Debug, Default)]
+struct SinceError {
+    /// Own frames that came back.
+    sent: u32,
+    /// True if a frame of another sender was received, which leads a receiver back to error-active (ISO 11898-1).
+    has_received: bool,
 }
 
 impl TxRxAccounting {
@@ -33,19 +45,26 @@ impl TxRxAccounting {
         Self { wire_time: WireTime::new(bit_rate, data_bit_rate), ..Self::default() }
     }
 
+    /// The bus is in this state: a driver reports changes alone.
+    pub(super) const fn begin_in(&mut self, state: BusState) {
+        self.health.state = state;
+    }
+
     /// The state of the bus and its counters.
     pub(super) fn health(&self) -> BusHealth {
         BusHealth { busy_ns: self.wire_time.busy_ns(), ..self.health }
     }
 
     /// How many own frames have not come back from the wire.
-    pub(super) const fn unconfirmed(&self) -> usize {
-        self.unconfirmed
+    pub(super) fn unconfirmed(&self) -> usize {
+        self.in_flight.count()
     }
 
-    /// Notes that everything that had arrived has been read.
-    pub(super) const fn read_empty(&mut self) {
-        self.is_behind = self.unconfirmed > 0;
+    /// Notes that everything that had arrived has been read. A frame that a later one has overtaken was lost: it is an error, and
+    /// holds nothing back.
+    pub(super) fn read_empty(&mut self) {
+        self.health.errors += self.in_flight.end_reading() as u64;
+        self.is_behind = self.unconfirmed() > 0;
     }
 
     /// Whether own frames still waited for the wire when the socket was last read empty.
@@ -58,12 +77,7 @@ impl TxRxAccounting {
     /// Remote frames count as sent at once. The kernel's filters of one identifier each let only data frames pass, so a
     /// remote frame does not come back.
     pub(super) fn taken(&mut self, frames: &[Frame]) {
-        let remote = frames.iter().filter(|frame| frame.kind() == FrameKind::Remote).count();
-        self.health.tx_frames += remote as u64;
-        self.unconfirmed += frames.len() - remote;
-        if self.health.state == BusState::Down && !frames.is_empty() {
-            self.health.state = BusState::ErrorActive;
-        }
+        self.add(frames, Sender::ThisSocket);
     }
 
     /// As [`TxRxAccounting::taken`], for frames that another socket of this process sent to this port's interface.
@@ -71,13 +85,18 @@ impl TxRxAccounting {
     /// Such a frame is recognised by its content when it comes back. Another process of this machine can send an equal frame
     /// meanwhile. Then the first of both counts as ours, and the second one as received from another sender.
     pub(super) fn taken_by_another(&mut self, frames: &[Frame]) {
-        self.taken(frames);
-        for frame in frames.iter().filter(|frame| frame.kind() != FrameKind::Remote) {
-            if self.sent_by_another.is_full() {
-                // Its confirmation was lost: no more frames than these are ever sent while one is unconfirmed.
-                self.sent_by_another.remove(0);
+        self.add(frames, Sender::ThisMachine);
+    }
+
+    fn add(&mut self, frames: &[Frame], sender: Sender) {
+        for frame in frames {
+            match frame.kind() {
+                FrameKind::Remote => self.health.tx_frames += 1,
+                _ => self.in_flight.add(*frame, sender),
             }
-            self.sent_by_another.push(*frame);
+        }
+        if self.health.state == BusState::Down && !frames.is_empty() {
+            self.health.state = BusState::ErrorActive;
         }
     }
 
@@ -109,14 +128,15 @@ impl TxRxAccounting {
         }
         match arrival.message {
             Message::Frame(frame) if self.is_own(&frame, arrival.sender) => {
-                if frame.kind() != FrameKind::Remote {
-                    self.unconfirmed = self.unconfirmed.saturating_sub(1);
-                    self.health.tx_frames += 1;
-                }
+                self.health.tx_frames += u64::from(frame.kind() != FrameKind::Remote);
+                self.since_error.sent = self.since_error.sent.saturating_add(1);
+                self.recover();
                 None
             }
             Message::Frame(frame) => {
                 self.health.rx_frames += 1;
+                self.since_error.has_received |= arrival.sender == Sender::Wire;
+                self.recover();
                 Some(frame)
             }
             Message::Error { class, details } => {
@@ -132,16 +152,28 @@ impl TxRxAccounting {
 
     fn is_own(&mut self, frame: &Frame, sender: Sender) -> bool {
         match sender {
-            Sender::ThisSocket => true,
-            Sender::ThisMachine => {
-                let place = self.sent_by_another.iter().position(|sent| sent == frame);
-                place.map(|place| self.sent_by_another.remove(place)).is_some()
+            // A frame that is waited for no longer is own, too.
+            Sender::ThisSocket => {
+                self.in_flight.take(frame, sender);
+                true
             }
+            Sender::ThisMachine => self.in_flight.take(frame, sender),
             Sender::Wire => false,
         }
     }
 
+    /// Ends the error-passive state when enough has passed the wire without an error.
+    fn recover(&mut self) {
+        let SinceError { sent, has_received } = self.since_error;
+        if self.health.state == BusState::ErrorPassive && sent >= RECOVERED_AFTER && has_received {
+            self.health.state = BusState::ErrorActive;
+        }
+    }
+
     fn reported(&mut self, report: error_frame::Report) {
+        if report.is_error {
+            self.since_error = SinceError::default();
+        }
         if let Some(state) = report.state {
             self.health.state = state;
         }
@@ -161,7 +193,7 @@ impl TxRxAccounting {
         let more = lost.wrapping_sub(self.lost);
         self.lost = lost;
         self.health.rx_overruns += u64::from(more);
-        self.unconfirmed = self.unconfirmed.saturating_sub(usize::try_from(more).unwrap_or(usize::MAX));
+        self.in_flight.give_up(usize::try_from(more).unwrap_or(usize::MAX));
     }
 
     /// The interface does not send the frames that it takes. A controller in the bus-off state does not send either, and
@@ -179,9 +211,8 @@ impl TxRxAccounting {
     }
 
     fn forget_transmissions(&mut self) {
-        self.unconfirmed = 0;
+        self.in_flight.clear();
         self.is_behind = false;
-        self.sent_by_another.clear();
     }
 }
 
@@ -264,16 +295,39 @@ mod tests {
         for node in (1..=100).cycle().take(1_000) {
             accounting.taken_by_another(&[frame(node)]);
         }
-        assert_eq!(accounting.arrived(&arrival(Message::Frame(frame(100)), Sender::ThisMachine)), None);
-        assert_eq!(
-            accounting.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisMachine)),
-            Some(frame(1))
-        );
+        // The last 128 of them are remembered.
+        let mut arrives =
+            |node| accounting.arrived(&arrival(Message::Frame(frame(node)), Sender::ThisMachine));
+        assert_eq!([arrives(100), arrives(100)], [None, None]);
+        assert_eq!([arrives(1), arrives(1)], [None, Some(frame(1))]);
         accounting.receive_failed(libc::ENETDOWN);
         assert_eq!(
             accounting.arrived(&arrival(Message::Frame(frame(99)), Sender::ThisMachine)),
             Some(frame(99))
         );
+    }
+
+    #[test]
+    fn a_lost_confirmation_is_an_error_and_holds_nothing_back_when_a_later_frame_has_come_back() {
+        for by_another in [false, true] {
+            let mut accounting = TxRxAccounting::default();
+            let sender = if by_another { Sender::ThisMachine } else { Sender::ThisSocket };
+            let send = |accounting: &mut TxRxAccounting, node| match by_another {
+                true => accounting.taken_by_another(&[frame(node)]),
+                false => accounting.taken(&[frame(node)]),
+            };
+            send(&mut accounting, 1);
+            (0..1_000).for_each(|_| accounting.read_empty());
+            assert_eq!((accounting.unconfirmed(), accounting.is_behind()), (1, true), "it may still wait");
+            send(&mut accounting, 2);
+            accounting.arrived(&arrival(Message::Frame(frame(2)), sender));
+            accounting.read_empty();
+            assert_eq!((accounting.unconfirmed(), accounting.is_behind()), (0, false));
+            assert_eq!((accounting.health().tx_frames, accounting.health().errors), (1, 1));
+            // It comes after all, and is nobody else's frame.
+            assert_eq!(accounting.arrived(&arrival(Message::Frame(frame(1)), sender)), None);
+            assert_eq!((accounting.health().tx_frames, accounting.health().rx_frames), (2, 0));
+        }
     }
 
     #[test]
@@ -353,6 +407,47 @@ mod tests {
         accounting.arrived(&error(libc::CAN_ERR_RESTARTED));
         assert_eq!((accounting.health().state, accounting.unconfirmed()), (BusState::ErrorActive, 0));
         assert_eq!(accounting.health().errors, 1);
+    }
+
+    #[test]
+    fn an_error_passive_controller_is_active_again_when_enough_has_passed_without_an_error() {
+        let passive = || {
+            let details = [0, libc::CAN_ERR_CRTL_TX_PASSIVE as u8, 0, 0, 0, 0, 0, 0];
+            arrival(Message::Error { class: libc::CAN_ERR_CRTL, details }, Sender::Wire)
+        };
+        let own = arrival(Message::Frame(frame(1)), Sender::ThisSocket);
+        let foreign = arrival(Message::Frame(frame(9)), Sender::Wire);
+        let mut reported = TxRxAccounting::default();
+        reported.arrived(&passive());
+        let mut begun = TxRxAccounting::default();
+        begun.begin_in(BusState::ErrorPassive);
+        for mut accounting in [reported, begun] {
+            (0..2 * RECOVERED_AFTER).for_each(|_| assert_eq!(accounting.arrived(&own), None));
+            assert_eq!(accounting.health().state, BusState::ErrorPassive, "it may be passive as a receiver");
+            accounting.arrived(&foreign);
+            assert_eq!(accounting.health().state, BusState::ErrorActive);
+
+            accounting.arrived(&passive());
+            accounting.arrived(&foreign);
+            (1..RECOVERED_AFTER).for_each(|_| assert_eq!(accounting.arrived(&own), None));
+            accounting.arrived(&error(libc::CAN_ERR_PROT));
+            accounting.arrived(&foreign);
+            (1..RECOVERED_AFTER).for_each(|_| assert_eq!(accounting.arrived(&own), None));
+            assert_eq!(accounting.health().state, BusState::ErrorPassive);
+            accounting.arrived(&own);
+            assert_eq!(accounting.health().state, BusState::ErrorActive);
+        }
+    }
+
+    #[test]
+    fn a_controller_that_has_left_the_bus_comes_back_by_its_restart_alone() {
+        let mut accounting = TxRxAccounting::default();
+        accounting.begin_in(BusState::BusOff);
+        accounting.arrived(&arrival(Message::Frame(frame(9)), Sender::Wire));
+        for _ in 0..2 * RECOVERED_AFTER {
+            accounting.arrived(&arrival(Message::Frame(frame(1)), Sender::ThisSocket));
+        }
+        assert_eq!(accounting.health().state, BusState::BusOff);
     }
 
     #[test]

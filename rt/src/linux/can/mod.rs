@@ -5,8 +5,8 @@
 //! - `batch`: many frames in one system call; `wire_format`: the kernel's layout of a frame.
 //! - `reading`: takes what has arrived, with bounded work; `arrival`: one message as the kernel hands it over;
 //!   `arrival_time`: its time of arrival on the monotonic clock.
-//! - `accounting`: the counters and the state of the bus; `error_frame`: what the driver reports; `link`: whether the
-//!   interface can send at all.
+//! - `accounting`: the counters and the state of the bus; `in_flight`: the own frames that have not come back;
+//!   `error_frame`: what the driver reports; `link`: whether the interface can send at all.
 //!
 //! No call here waits or allocates, except [`SocketCanPort::wait`], which waits on request.
 
@@ -16,6 +16,7 @@ mod arrival_time;
 mod batch;
 mod bus_port;
 mod error_frame;
+mod in_flight;
 mod link;
 mod port;
 mod reading;

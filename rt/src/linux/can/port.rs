@@ -6,6 +6,7 @@ use super::accounting::TxRxAccounting;
 use super::batch::{self, Destination, SEND_BATCH, SocketSource};
 use super::link::Link;
 use crate::frame::Frame;
+use crate::port::BusState;
 use crate::time::Nanoseconds;
 
 /// A raw CAN socket as a bus port.
@@ -13,15 +14,18 @@ use crate::time::Nanoseconds;
 /// The caller opens and configures the socket. The port needs these settings:
 ///
 /// - own frames are received back (`CAN_RAW_RECV_OWN_MSGS`), and the filters let them pass. Otherwise
-///   [`BusPort::unconfirmed`](crate::port::BusPort::unconfirmed) never returns to zero.
+///   [`BusPort::unconfirmed`](crate::port::BusPort::unconfirmed) never returns to zero. A frame that does not come back is lost when a later
+///   one has.
 ///
 /// The port uses these settings where they are on: error frames, kernel time stamps (`SO_TIMESTAMPNS`), the overflow
 /// counter (`SO_RXQ_OVFL`), CAN FD frames. Its calls never wait, even on a blocking socket.
 ///
 /// # State of the interface
-/// An interface that goes down is [`BusState::Down`](crate::port::BusState::Down) from the first frame that it has dropped. It
-/// comes back by itself. An interface that is removed (an adapter is unplugged) unbinds the socket for good: make a new
-/// port.
+/// An interface that goes down is [`BusState::Down`] from the first frame that it has dropped. It comes back by itself. An interface
+/// that is removed (an adapter is unplugged) unbinds the socket for good: make a new port.
+///
+/// An error-passive controller is error-active when its driver says so. Some drivers do not: then it is, after 10,000 own frames and a
+/// received one without an error.
 ///
 /// # Time of arrival
 /// The kernel stamps a frame on `CLOCK_REALTIME` when the driver hands it over. The stamp is moved to the monotonic clock
@@ -74,6 +78,14 @@ impl SocketCanPort {
             accounting: TxRxAccounting::new(bit_rate, data_bit_rate),
             takes_fd: data_bit_rate.is_some(),
         })
+    }
+
+    /// This port, of a controller that is in this state now. A driver reports changes alone; without this, a port begins as
+    /// error-active.
+    #[must_use]
+    pub fn begun_in(mut self, state: BusState) -> Self {
+        self.accounting.begin_in(state);
+        self
     }
 
     /// Waits until a message has arrived, but not longer than `timeout_ns`.
