@@ -8,6 +8,8 @@ use takt_rt::Id;
 use takt_rt::linux::SocketCanPort;
 use thiserror::Error;
 
+use super::interface::interface_status;
+
 /// Bytes that the kernel reserves for one frame that waits in the buffer of a socket. The frame with its bookkeeping takes 768 bytes
 /// on Linux 6.1, and up to 960 since 6.3.
 const BYTES_PER_FRAME: usize = 1_024;
@@ -78,9 +80,14 @@ pub fn open_socketcan(interface: &str, options: &SocketCanOptions) -> Result<Soc
     socket
         .set_socket_option_int(libc::SOL_SOCKET, libc::SO_RXQ_OVFL, 1)
         .map_err(failed("asking for the overflow counter"))?;
-    SocketCanPort::new(socket.as_raw_fd(), options.bit_rate, options.data_bit_rate)
+    let port = SocketCanPort::new(socket.as_raw_fd(), options.bit_rate, options.data_bit_rate)
         .map_err(|error| io::Error::from_raw_os_error(error.errno))
-        .map_err(failed("duplicating the socket"))
+        .map_err(failed("duplicating the socket"))?;
+    // Changes from here on are reported to the socket.
+    Ok(match interface_status(interface) {
+        Ok(status) => port.begun_in(status.state),
+        Err(_) => port,
+    })
 }
 
 /// Sets one filter for each identifier. The kernel keeps filters for exactly one identifier and only data frames in a table of
