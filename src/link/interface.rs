@@ -55,6 +55,49 @@ pub struct InterfaceStatus {
     pub error_counters: Option<(u16, u16)>,
     /// Whether the interface has a CAN controller; vcan, vxcan and slcan have none.
     pub has_controller: bool,
+    /// The modes of its controller in which no drive can be commanded.
+    pub unfit_modes: Vec<UnfitMode>,
+}
+
+/// A mode of a controller in which no drive can be commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UnfitMode {
+    /// Sends nothing, not even acknowledgements.
+    ListenOnly,
+    /// Receives its own frames, and need not send them.
+    Loopback,
+    /// Sends a frame once, even if it loses arbitration or is not acknowledged.
+    OneShot,
+}
+
+impl UnfitMode {
+    const ALL: [Self; 3] = [Self::ListenOnly, Self::Loopback, Self::OneShot];
+
+    const fn mode(self) -> CanCtrlMode {
+        match self {
+            Self::ListenOnly => CanCtrlMode::ListenOnly,
+            Self::Loopback => CanCtrlMode::Loopback,
+            Self::OneShot => CanCtrlMode::OneShot,
+        }
+    }
+
+    /// Its name in the commands of `ip link`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::ListenOnly => "listen-only",
+            Self::Loopback => "loopback",
+            Self::OneShot => "one-shot",
+        }
+    }
+
+    /// The reason why no drive can be commanded.
+    const fn effect(self) -> &'static str {
+        match self {
+            Self::ListenOnly => "it sends nothing",
+            Self::Loopback => "its frames need not reach the bus",
+            Self::OneShot => "a frame that loses arbitration is not sent again",
+        }
+    }
 }
 
 /// The bit timing in force.
@@ -117,6 +160,18 @@ pub enum InterfaceError {
     NoFd {
         /// The interface.
         name: String,
+        /// The command that sets it up, once it is down.
+        command: String,
+    },
+    /// The controller is in a mode in which no drive can be commanded.
+    #[error(
+        "{name} is in {} mode: {}; to end it: sudo ip link set {name} down && {command}", mode.name(), mode.effect()
+    )]
+    UnfitMode {
+        /// The interface.
+        name: String,
+        /// The mode.
+        mode: UnfitMode,
         /// The command that sets it up, once it is down.
         command: String,
     },
@@ -196,7 +251,7 @@ pub fn prepare_interface(
     };
     if is_controller {
         interface
-            .set_can_params(&parameters(settings))
+            .set_can_params(&parameters(settings, &status.unfit_modes))
             .map_err(|error| refused("setting the bit rate", &error))?;
     } else if settings.data_bit_rate.is_some() {
         interface.set_mtu(Mtu::Fd).map_err(|error| refused("allowing CAN FD frames", &error))?;
@@ -246,6 +301,10 @@ fn status_of(name: &str, details: &InterfaceDetails) -> InterfaceStatus {
         state,
         error_counters: can.berr_counter.map(|counter| (counter.txerr, counter.rxerr)),
         has_controller,
+        unfit_modes: UnfitMode::ALL
+            .into_iter()
+            .filter(|unfit| can.ctrl_mode.is_some_and(|modes| modes.has_mode(unfit.mode())))
+            .collect(),
     }
 }
 
@@ -258,13 +317,19 @@ fn timing_of(timing: CanBitTiming) -> Option<ControllerTiming> {
 }
 
 /// The kernel chooses the sample point as CiA recommends (75 % above 800 kbit/s, 80 % above 500 kbit/s, else 87.5 %),
-/// or as near to it as the controller's clock allows.
-fn parameters(settings: &InterfaceSettings) -> InterfaceCanParams {
+/// or as near to it as the controller's clock allows. Modes are kept while an interface is down, unless they are set anew.
+fn parameters(settings: &InterfaceSettings, unfit_modes: &[UnfitMode]) -> InterfaceCanParams {
+    let fd = settings.data_bit_rate.map(|_| (CanCtrlMode::Fd, true));
+    let changed = unfit_modes.iter().map(|unfit| (unfit.mode(), false)).chain(fd);
     let timing = |bitrate| CanBitTiming { bitrate, ..CanBitTiming::default() };
     InterfaceCanParams {
         bit_timing: Some(timing(settings.bit_rate)),
         data_bit_timing: settings.data_bit_rate.map(timing),
-        ctrl_mode: settings.data_bit_rate.map(|_| CanCtrlModes::from_mode(CanCtrlMode::Fd, true)),
+        ctrl_mode: changed.fold(None, |modes, (mode, is_on)| {
+            let mut modes = modes.unwrap_or_default();
+            CanCtrlModes::add(&mut modes, mode, is_on);
+            Some(modes)
+        }),
         restart_ms: Some(settings.restart_ms),
         ..InterfaceCanParams::default()
     }
@@ -274,6 +339,10 @@ fn parameters(settings: &InterfaceSettings) -> InterfaceCanParams {
 fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(), InterfaceError> {
     if status.state == BusState::BusOff && status.restart_ms == Some(0) {
         return Err(InterfaceError::IsOff { name: status.name.clone() });
+    }
+    if let Some(mode) = status.unfit_modes.first().copied() {
+        let command = command(status, settings);
+        return Err(InterfaceError::UnfitMode { name: status.name.clone(), mode, command });
     }
     let differs = |timing: Option<ControllerTiming>, wanted: Option<u32>| {
         Some((timing?.bit_rate, wanted?)).filter(|(found, wanted)| found != wanted)
@@ -299,8 +368,12 @@ fn command(status: &InterfaceStatus, settings: &InterfaceSettings) -> String {
         (false, Some(_)) => format!("sudo ip link set {name} mtu 72 up"),
         (true, data_bit_rate) => {
             let data = data_bit_rate.map(|rate| format!(" dbitrate {rate} fd on")).unwrap_or_default();
+            let unfit = status.unfit_modes.iter();
+            let modes: String = unfit.map(|mode| format!(" {} off", mode.name())).collect();
             let InterfaceSettings { bit_rate, restart_ms, .. } = settings;
-            format!("sudo ip link set {name} up type can bitrate {bit_rate}{data} restart-ms {restart_ms}")
+            format!(
+                "sudo ip link set {name} up type can bitrate {bit_rate}{data} restart-ms {restart_ms}{modes}"
+            )
         }
     }
 }
@@ -360,6 +433,7 @@ mod tests {
             state: BusState::ErrorActive,
             error_counters: None,
             has_controller: timing.is_some(),
+            unfit_modes: vec![],
         }
     }
 
@@ -397,6 +471,53 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("dbitrate 5000000 fd on"), "{text}");
+    }
+
+    #[test]
+    fn a_controller_in_a_mode_in_which_it_commands_nothing_is_refused_with_the_command_that_ends_it() {
+        let in_modes = |unfit_modes| InterfaceStatus { unfit_modes, ..up(Some(1_000_000)) };
+        for (mode, words) in [
+            (UnfitMode::ListenOnly, "can0 is in listen-only mode: it sends nothing; to end it: "),
+            (UnfitMode::Loopback, "can0 is in loopback mode: its frames need not reach the bus; to end it: "),
+            (
+                UnfitMode::OneShot,
+                "can0 is in one-shot mode: a frame that loses arbitration is not sent again; to end it: ",
+            ),
+        ] {
+            let text = compare(&in_modes(vec![mode]), &CLASSIC).unwrap_err().to_string();
+            let command = "sudo ip link set can0 down && sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
+            assert_eq!(text, format!("{words}{command} {} off", mode.name()));
+        }
+        let both = in_modes(vec![UnfitMode::Loopback, UnfitMode::OneShot]);
+        assert!(command(&both, &CLASSIC).ends_with("restart-ms 100 loopback off one-shot off"));
+        // A bit rate that differs is set by the same command.
+        let slow = InterfaceSettings { bit_rate: 500_000, ..CLASSIC };
+        assert!(matches!(compare(&both, &slow), Err(InterfaceError::UnfitMode { .. })));
+    }
+
+    #[test]
+    fn the_modes_of_a_controller_are_read_and_set_anew_when_it_is_brought_up() {
+        let details = |flags| {
+            let can =
+                InterfaceCanParams { ctrl_mode: Some(CanCtrlModes::new(!0, flags)), ..Default::default() };
+            InterfaceDetails { can, ..InterfaceDetails::default() }
+        };
+        let flags = |modes: &[CanCtrlMode]| modes.iter().fold(0, |flags, mode| flags | mode.mask());
+        let read = |modes: &[CanCtrlMode]| status_of("can0", &details(flags(modes))).unfit_modes;
+        assert_eq!(read(&[CanCtrlMode::Fd, CanCtrlMode::BerrReporting, CanCtrlMode::TripleSampling]), []);
+        let unfit = read(&[CanCtrlMode::OneShot, CanCtrlMode::ListenOnly, CanCtrlMode::Loopback]);
+        assert_eq!(unfit, UnfitMode::ALL);
+
+        // The library does not show the mask otherwise.
+        let set = |settings: &InterfaceSettings, unfit: &[UnfitMode]| {
+            format!("{:?}", parameters(settings, unfit).ctrl_mode)
+        };
+        let of = |mask, flags| format!("{:?}", Some(CanCtrlModes::new(mask, flags)));
+        let (fd, one_shot) = (CanCtrlMode::Fd.mask(), CanCtrlMode::OneShot.mask());
+        assert_eq!(set(&CLASSIC, &[]), "None");
+        assert_eq!(set(&FLEXIBLE, &[]), of(fd, fd));
+        assert_eq!(set(&CLASSIC, &[UnfitMode::OneShot]), of(one_shot, 0));
+        assert_eq!(set(&FLEXIBLE, &[UnfitMode::OneShot]), of(fd | one_shot, fd));
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub(crate) use adapter_latency::{adapter_latency_ns, shortest_latency_command};
 #[cfg(target_os = "linux")]
 pub use converter::ConverterError;
 #[cfg(target_os = "linux")]
-pub use interface::InterfaceError;
+pub use interface::{InterfaceError, UnfitMode};
 #[cfg(target_os = "linux")]
 pub(crate) use interface::{
     ControllerTiming, InterfaceSettings, InterfaceStatus, interface_status, transmit_queue_length,

@@ -178,6 +178,7 @@ pub mod tests {
             state: BusState::ErrorPassive,
             error_counters: Some((128, 0)),
             has_controller: true,
+            unfit_modes: vec![],
         };
         let link = Link::of_status(&status, Some(10));
         assert_eq!(link.timing, Some(LinkTiming { bit_rate: 1_000_000, sample_point: 0.75 }));
