@@ -1,29 +1,38 @@
-//! Why frames found no room in the queue of an interface, and what mends it.
+//! Why frames do not leave an interface, and what mends it.
 
 use crate::config::{Bus, Config, Interface};
-use crate::link::transmit_queue_length;
+use crate::link::{QUEUE_FRAMES, transmit_queue_length};
 use takt_rt::{BusHealth, BusState, Snapshot};
 
-/// As many frames as takt hands to an interface at once, at most. A queue that is shorter can be full on a healthy bus.
-const FRAMES_AT_ONCE: u32 = 64;
+/// How long an error-passive controller sends in vain until that counts. It may have been error-passive before the run, and a frame
+/// takes less than a millisecond.
+const UNACKNOWLEDGED_NS: u64 = 300_000_000;
 
-/// Explains once for each bus why frames found no room.
+/// Explains once for each bus why its frames do not leave.
 pub struct FullQueues {
     /// The buses that have not been explained yet, with their index.
     unmentioned: Vec<(usize, Bus)>,
+    /// The time of the first look.
+    first_ns: Option<u64>,
 }
 
 impl FullQueues {
     /// For the buses of a configuration.
     pub fn new(config: &Config) -> Self {
-        Self { unmentioned: config.buses.iter().cloned().enumerate().collect() }
+        Self { unmentioned: config.buses.iter().cloned().enumerate().collect(), first_ns: None }
     }
 
     /// The explanations that are due now.
     pub fn poll(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = String> + use<> {
         let mut said = vec![];
+        let first_ns = *self.first_ns.get_or_insert(snapshot.at_ns);
+        let is_sending = snapshot.at_ns.saturating_sub(first_ns) >= UNACKNOWLEDGED_NS;
+        let is_stuck = |health: &&BusHealth| {
+            health.tx_overruns > 0
+                || is_sending && health.tx_frames == 0 && health.state == BusState::ErrorPassive
+        };
         self.unmentioned.retain(|(index, bus)| {
-            let health = snapshot.buses.get(*index).filter(|health| health.tx_overruns > 0);
+            let health = snapshot.buses.get(*index).filter(is_stuck);
             said.extend(health.map(|health| explanation(bus, health, queue_length(bus))));
             health.is_none()
         });
@@ -54,12 +63,12 @@ fn explanation(bus: &Bus, health: &BusHealth, queue_length: Option<u32>) -> Stri
     let is_acknowledged = health.tx_frames > 0 && health.state == BusState::ErrorActive;
     match queue_length {
         _ if !is_acknowledged => format!(
-            "bus {name} takes no more frames: no node acknowledges them. Is the drives' power on, is the bus terminated, \
-             is the bit rate right?"
+            "bus {name}: no node acknowledges a frame. Is the drives' power on, is the bus terminated, is the bit rate \
+             right?"
         ),
-        Some(length) if length < FRAMES_AT_ONCE => format!(
+        Some(length) if length < QUEUE_FRAMES => format!(
             "bus {name} takes no more frames: the queue of {interface} holds only {length} (txqueuelen). A longer one: \
-             sudo ip link set {interface} txqueuelen 1000"
+             sudo ip link set {interface} txqueuelen {QUEUE_FRAMES}"
         ),
         _ => format!(
             "bus {name} takes no more frames: they leave more slowly than they come. Do frames of a higher priority \
@@ -86,10 +95,29 @@ mod tests {
         assert_eq!(queues.poll(&snapshot).count(), 0);
         snapshot.buses[1].tx_overruns = 1;
         let said: Vec<String> = queues.poll(&snapshot).collect();
-        assert!(said.len() == 1 && said[0].starts_with("bus wrist "), "{said:?}");
+        assert!(said.len() == 1 && said[0].starts_with("bus wrist: "), "{said:?}");
         assert_eq!(queues.poll(&snapshot).count(), 0);
         snapshot.buses[0].tx_overruns = 1;
         assert_eq!(queues.poll(&snapshot).count(), 1);
+    }
+
+    #[test]
+    fn a_bus_on_which_nobody_acknowledges_is_named_at_the_start_and_not_when_its_queue_is_full() {
+        let mut queues = FullQueues::new(&arm());
+        let mut snapshot = Snapshot::default();
+        snapshot.at_ns = 1_000_000_000;
+        snapshot.buses[1].state = BusState::ErrorPassive;
+        assert_eq!(queues.poll(&snapshot).count(), 0, "it may have been error-passive before");
+        snapshot.at_ns += UNACKNOWLEDGED_NS;
+        let said: Vec<String> = queues.poll(&snapshot).collect();
+        assert!(
+            said.len() == 1 && said[0].starts_with("bus wrist: no node acknowledges a frame."),
+            "{said:?}"
+        );
+        assert_eq!(queues.poll(&snapshot).count(), 0);
+        // One that is acknowledged may be error-passive for other causes.
+        snapshot.buses[0] = BusHealth { tx_frames: 1, ..snapshot.buses[1] };
+        assert_eq!(queues.poll(&snapshot).count(), 0);
     }
 
     #[test]
@@ -99,7 +127,7 @@ mod tests {
         let said = |health: &BusHealth, length| explanation(&bus, health, length);
         assert!(
             said(&healthy, Some(1))
-                .ends_with("holds only 1 (txqueuelen). A longer one: sudo ip link set can0 txqueuelen 1000")
+                .ends_with("holds only 1 (txqueuelen). A longer one: sudo ip link set can0 txqueuelen 64")
         );
         assert!(said(&healthy, Some(1000)).ends_with("flood the bus?"));
         assert!(said(&healthy, None).ends_with("flood the bus?"));
@@ -107,7 +135,7 @@ mod tests {
         let unheard = BusHealth { tx_frames: 0, ..healthy };
         for health in [passive, unheard] {
             assert!(
-                said(&health, Some(1)).contains("no node acknowledges them"),
+                said(&health, Some(1)).contains("no node acknowledges a frame"),
                 "{}",
                 said(&health, Some(1))
             );

@@ -35,7 +35,7 @@ pub use converter::ConverterError;
 pub use interface::{InterfaceError, UnfitMode};
 #[cfg(target_os = "linux")]
 pub(crate) use interface::{
-    ControllerTiming, InterfaceSettings, InterfaceStatus, interface_status, transmit_queue_length,
+    ControllerTiming, InterfaceSettings, InterfaceStatus, QUEUE_FRAMES, interface_status, transmit_queue_length,
 };
 #[cfg(target_os = "linux")]
 pub use open::OpenError;

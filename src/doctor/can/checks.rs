@@ -3,6 +3,7 @@
 use super::link::{Link, LinkTiming};
 use crate::doctor::finding::{Check, Finding, Group};
 use crate::doctor::subject::WantedBus;
+use crate::link::QUEUE_FRAMES;
 
 const SOURCE: &str = "ip -details -statistics -json link show";
 
@@ -227,7 +228,9 @@ pub fn queue(link: &Link) -> Finding {
     let read = format!("{length} frames, {queueing}");
     let keeps_order = matches!(queueing, "pfifo_fast" | "pfifo" | "pfifo_head_drop" | "prio" | "mq");
     if !keeps_order {
-        QUEUE.could_be_better(read).mend(format!("sudo tc qdisc replace dev {name} root pfifo limit 32"))
+        QUEUE
+            .could_be_better(read)
+            .mend(format!("sudo tc qdisc replace dev {name} root pfifo limit {QUEUE_FRAMES}"))
     } else {
         queue_of_length(name, read, length)
     }
@@ -237,7 +240,7 @@ fn queue_of_length(name: &str, read: String, length: u64) -> Finding {
     if QUEUE_LENGTHS.contains(&length) {
         QUEUE.good(read)
     } else {
-        QUEUE.could_be_better(read).mend(format!("sudo ip link set {name} txqueuelen 32"))
+        QUEUE.could_be_better(read).mend(format!("sudo ip link set {name} txqueuelen {QUEUE_FRAMES}"))
     }
 }
 
@@ -326,8 +329,8 @@ mod tests {
         };
         assert_eq!(queue(&with(10, "pfifo_fast")).verdict, Verdict::Good);
         assert_eq!(queue(&with(1_000, "noqueue")).verdict, Verdict::Good);
-        assert_eq!(queue(&with(1_000, "pfifo_fast")).mend, ["sudo ip link set can0 txqueuelen 32"]);
-        assert_eq!(queue(&with(10, "fq_codel")).mend, ["sudo tc qdisc replace dev can0 root pfifo limit 32"]);
+        assert_eq!(queue(&with(1_000, "pfifo_fast")).mend, ["sudo ip link set can0 txqueuelen 64"]);
+        assert_eq!(queue(&with(10, "fq_codel")).mend, ["sudo tc qdisc replace dev can0 root pfifo limit 64"]);
         assert_eq!(queue(&with(1, "pfifo")).verdict, Verdict::CouldBeBetter);
         let without_ip = Link { queueing: None, queue_length: Some(10), ..can0() };
         assert_eq!(queue(&without_ip).read, "10 frames");
