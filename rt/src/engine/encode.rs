@@ -1,7 +1,7 @@
 //! What leaves in a cycle: SYNC, controlwords and set-points, the heartbeat, TIME, a request of node guarding, service frames.
 //!
 //! One rule decides, in one place ([`Engine::may_leave`]): after its deadline, or behind a backlog, nothing leaves except what
-//! stops the drives.
+//! stops the drives, and from time to time one SYNC that shows whether the backlog is one ([`Backlog`](super::backlog::Backlog)).
 
 use super::group::{Commands, Group};
 use super::heartbeat::HeartbeatProducer;
@@ -21,19 +21,23 @@ use crate::time::Nanoseconds;
 /// cycle of a bus is, so that its drives see each part.
 pub(super) const FAULT_RESET_CYCLES: u32 = 10;
 
-/// What a frame is for.
+/// What a frame is for. What stops a drive leaves in any case, and does not ask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Purpose {
+    /// It lets the drives report, and take up their set-points.
+    Sync,
     /// It keeps the drives working.
     Operate,
-    /// It stops a drive.
-    Stop,
 }
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// After its deadline, or behind a backlog, nothing leaves except what stops the drives.
     fn may_leave(&self, bus: usize, deadline: Deadline, purpose: Purpose) -> bool {
-        purpose == Purpose::Stop || deadline == Deadline::Met && !self.shared.backlog.behind().contains(bus)
+        let held_back = match purpose {
+            Purpose::Sync => self.shared.backlog.without_sync(),
+            Purpose::Operate => self.shared.backlog.held_back(),
+        };
+        deadline == Deadline::Met && !held_back.contains(bus)
     }
 
     /// The buses that were behind in the last cycle: before [`Engine::sync`], whoever drives the engine may look again, and name
@@ -52,11 +56,14 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let parameters = self.shared.buses.get(bus)?;
         let CanopenNetwork { sync_id } = parameters.canopen?;
         let is_due = self.shared.requested.sync && has_cycle(parameters, slot);
-        if !is_due || !self.may_leave(bus, Deadline::Met, Purpose::Operate) {
+        if !is_due || !self.may_leave(bus, Deadline::Met, Purpose::Sync) {
             return None;
         }
         self.shared.asked_by_sync.insert(bus);
         let is_skipped = self.shared.skip_sync.take(bus);
+        if !is_skipped {
+            self.shared.backlog.note_leaving(bus);
+        }
         for place in self.shared.places_on(bus).iter() {
             let Some(axis) = self.axes.get_mut(place) else { break };
             match axis.parameters().feedback_since {
@@ -94,6 +101,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
         }
         self.encode_services(bus, deadline, host, batch);
+        if !batch.is_empty() {
+            self.shared.backlog.note_leaving(bus);
+        }
     }
 
     fn push(&mut self, frame: Frame, batch: &mut SendBatch) {

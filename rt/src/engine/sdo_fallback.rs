@@ -1,6 +1,7 @@
 //! Stopping drives that PDOs do not reach: their controlword (object 6040) by SDO, or without SDO by the frame that carries it, or that
-//! means the same to a drive of bit fields, from the real-time thread, before the service frames of the host. PDOs do not reach a node that another master has stopped or reset, and none while the thread is
-//! always late or the bus always behind: the way to switch a drive off does not need a punctual set-point.
+//! means the same to a drive of bit fields, from the real-time thread, before the service frames of the host. PDOs do not reach a node
+//! that another master has stopped or reset, and none while the thread is always late or the bus always behind: the way to stop a drive
+//! and to switch it off does not need a punctual set-point.
 
 use super::Engine;
 use super::group::GroupContext;
@@ -24,15 +25,28 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let Self { group, axes, shared, .. } = self;
         let has_power = group.state.has_power();
         let is_disabling = matches!(group.state, GroupState::Disabling(_));
+        let is_stopping = matches!(group.state, GroupState::Stopping);
         let is_overdue = Nanoseconds::from(group.state_cycles).saturating_mul(shared.period_ns) > OBEYING_NS;
         let is_always_late = shared.slots.late_cycles > shared.not_transmitted_cycles;
-        let must_be_switched_off = |axis: &Axis| {
+        let is_on_stuck_bus = |axis: &Axis| {
             let behind_cycles = shared.backlog.behind_cycles(axis.parameters().bus.into());
-            let is_cut_off = is_always_late || behind_cycles > shared.not_transmitted_cycles;
+            behind_cycles > shared.not_transmitted_cycles
+        };
+        let must_be_switched_off = |axis: &Axis| {
+            let is_cut_off = is_always_late || is_on_stuck_bus(axis);
             // Whether such a drive receives its PDOs is not known. Whoever speaks to a drive outside of the cycle goes on asking it.
             let is_silent =
                 !axis.is_off_cycle() && axis.feedback_age() > axis.parameters().missed_feedback_cycles;
             axis.is_pdo_unreachable() || axis.may_have_torque() && (is_cut_off || is_silent && is_overdue)
+        };
+        // A drive without SDO has no controlword that stops it and leaves it its power.
+        let has_sdo = |axis: &Axis| {
+            let bus = shared.buses.get(usize::from(axis.parameters().bus));
+            axis.has_pdos() && bus.is_some_and(|bus| bus.canopen.is_some())
+        };
+        let must_stop_by_sdo = |axis: &Axis| {
+            axis.is_pdo_unreachable()
+                || is_stopping && is_on_stuck_bus(axis) && axis.may_have_torque() && has_sdo(axis)
         };
         for axis in axes.iter_mut() {
             if has_power {
@@ -42,7 +56,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 None
             } else if is_disabling && must_be_switched_off(axis) {
                 Some(controlword::DISABLE_VOLTAGE)
-            } else if axis.is_pdo_unreachable() {
+            } else if must_stop_by_sdo(axis) {
                 Some(axis.sdo_stop_word())
             } else {
                 None

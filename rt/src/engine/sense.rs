@@ -138,7 +138,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             time.pass(elapsed, input.now_ns);
         }
         let in_cycle = self.shared.buses_in_cycle(input.slot);
-        self.shared.backlog.pass(input.behind, in_cycle);
+        let with_sync =
+            if self.shared.requested.sync { self.shared.canopen_buses() } else { BitSet::default() };
+        self.shared.backlog.pass(input.behind, in_cycle, with_sync);
         let elapsed_s = self.shared.period_s * elapsed as f64;
         let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);
         // A drive that was not asked, because the thread was late or the bus behind, has not missed its answer.

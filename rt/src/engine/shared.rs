@@ -115,7 +115,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             deadline: Deadline::Met,
             now_ns: 0,
             slots: SlotWatch::new(parameters.timing),
-            backlog: Backlog::new(buses),
+            backlog: Backlog::new(buses, parameters.not_transmitted_cycles),
             skip_sync: BitSet::default(),
             asked_by_sync: BitSet::default(),
             stopped_by_sdo: BitSet::default(),
@@ -156,6 +156,14 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
     /// Slots in one cycle of the bus of an axis.
     pub(super) fn divider_of(&self, axis: &Axis) -> u32 {
         self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider)
+    }
+
+    /// The buses that are CANopen networks.
+    pub(super) fn canopen_buses(&self) -> BitSet {
+        let mut canopen = BitSet::default();
+        let numbers = self.buses.iter().enumerate().filter(|(_, bus)| bus.canopen.is_some());
+        numbers.for_each(|(number, _)| canopen.insert(number));
+        canopen
     }
 
     /// The buses that have a cycle in this slot.

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::fixture::{PERIOD_NS, Rig, flexible, parameters, pdos, scale};
 use takt_rt::{
-    DriveState, Engine, EngineParameters, Fault, FeedbackSince, Frame, Id, MAX_AXES, MAX_BUSES, Phase,
-    Request, Rule, SetUpError, StopCause, Supervision, nmt_command,
+    BusPort, DriveState, Engine, EngineParameters, Fault, FeedbackSince, Frame, Id, MAX_AXES, MAX_BUSES,
+    Phase, Request, Rule, SetUpError, StopCause, Supervision, nmt_command,
 };
 
 /// Three axes on a CANopen bus, three on one that is none, whose drives answer set-points. The drives are told the time of day.
@@ -60,6 +60,20 @@ fn on_a_bus_that_is_no_canopen_network_nothing_leaves_but_set_points() {
     assert_eq!(sent(&rig, 1), BTreeSet::from(SET_POINTS));
     let canopen = [0x080, 0x100, 0x77F].into_iter().chain(SET_POINTS);
     assert_eq!(sent(&rig, 0), canopen.collect());
+}
+
+#[test]
+fn a_confirmation_that_was_lost_on_a_bus_without_sync_stops_nobody_either() {
+    let mut rig = rig().enable();
+    rig.move_to(1.25);
+    for bus in [1, 0, 1] {
+        rig.run(50);
+        rig.buses[bus].loses_confirmation = true;
+    }
+    rig.run_until(Phase::Holding, 5_000);
+    rig.assert_limits_kept();
+    assert_eq!(rig.stops(), []);
+    assert!(rig.buses.iter_mut().all(|bus| !bus.loses_confirmation && bus.unconfirmed(0) == 0));
 }
 
 #[test]

@@ -2,10 +2,15 @@
 //! to a defined stop that takes the power.
 
 use crate::fixture::{PERIOD_NS, Rig, parameters, pdos};
-use takt_rt::{Engine, Frame, Id, MAX_AXES, MappedObject, Mapping, Pdo, Phase, Request, Rule, SetUpError};
+use takt_rt::{
+    BusPort, Engine, EngineParameters, Frame, Id, MAX_AXES, MappedObject, Mapping, Pdo, Phase, Request, Rule,
+    SetUpError, StopCategory,
+};
 
 /// Object 6040 = 0 (disable voltage), as an SDO download.
 const DISABLE_VOLTAGE_BY_SDO: [u8; 8] = [0x2B, 0x40, 0x60, 0, 0, 0, 0, 0];
+/// Object 6040 = 2 (quick stop), as an SDO download.
+const QUICK_STOP_BY_SDO: [u8; 8] = [0x2B, 0x40, 0x60, 0, 2, 0, 0, 0];
 
 fn sent_since(rig: &Rig, first: usize) -> Vec<Frame> {
     rig.buses[0].sent[first..].iter().map(|(_, frame)| *frame).collect()
@@ -104,10 +109,79 @@ fn behind_a_backlog_nothing_leaves_except_what_stops_the_drives() {
     let first = rig.buses[0].sent.len();
     rig.run(400);
     let sent = sent_since(&rig, first);
-    let is_stopping = |frame: &Frame| function(frame) == 0x600 && frame.payload() == DISABLE_VOLTAGE_BY_SDO;
-    assert!(sent.iter().all(is_stopping), "{sent:?}");
-    assert!((1..=3 * 40).contains(&sent.len()), "told again from time to time: {}", sent.len());
+    let (syncs, stopping): (Vec<_>, Vec<_>) = sent.iter().partition(|frame| function(frame) == 0x080);
+    // After two slots, and each time that the bus has been behind for twice as long.
+    assert!((2..=8).contains(&syncs.len()), "{}", syncs.len());
+    let is_stopping = |frame: &&Frame| {
+        function(frame) == 0x600
+            && [QUICK_STOP_BY_SDO, DISABLE_VOLTAGE_BY_SDO].contains(&frame.payload().try_into().unwrap())
+    };
+    assert!(stopping.iter().all(is_stopping), "{sent:?}");
+    assert!((1..=3 * 40).contains(&stopping.len()), "told again from time to time: {}", stopping.len());
     assert_eq!((rig.stops()[0].rule(), rig.host.services.len()), (Rule::NotTransmitted, 20));
+}
+
+#[test]
+fn a_drive_on_a_bus_that_is_always_behind_is_told_to_stop_before_its_power_is_taken() {
+    let mut rig = moving();
+    rig.buses[0].unconfirmed = 3;
+    let first = rig.buses[0].sent.len();
+    rig.run_until(Phase::Disabled, 1_000);
+    for node in 1..=3 {
+        let told: Vec<Frame> = sent_since(&rig, first)
+            .into_iter()
+            .filter(|frame| frame.id() == Id::canopen(0x600, node))
+            .collect();
+        assert_eq!(told.first().unwrap().payload(), QUICK_STOP_BY_SDO, "node {node}");
+    }
+    assert!((0..3).all(|axis| !rig.drive(axis).state.has_torque()));
+}
+
+#[test]
+fn a_confirmation_that_was_lost_on_a_free_bus_costs_some_slots_and_stops_nobody() {
+    let mut rig = moving();
+    for _ in 0..10 {
+        rig.buses[0].loses_confirmation = true;
+        rig.run(20);
+        assert!(!rig.buses[0].loses_confirmation && rig.buses[0].unconfirmed(0) == 0);
+    }
+    rig.run_until(Phase::Holding, 5_000);
+    rig.assert_limits_kept();
+    assert_eq!(rig.stops(), []);
+}
+
+#[test]
+fn a_bus_that_may_be_behind_for_one_slot_alone_is_not_stopped_by_a_lost_confirmation() {
+    for allowed in 1..4 {
+        let own = EngineParameters { not_transmitted_cycles: allowed, ..parameters(3) };
+        let mut rig = Rig::of(own).enable();
+        rig.move_to(1.0);
+        rig.run(100);
+        rig.buses[0].loses_confirmation = true;
+        rig.run_until(Phase::Holding, 5_000);
+        assert_eq!(rig.stops(), [], "{allowed}");
+    }
+}
+
+#[test]
+fn a_stop_decelerates_although_a_confirmation_was_lost() {
+    let mut rig = moving();
+    rig.buses[0].loses_confirmation = true;
+    rig.request(Request::Stop(StopCategory::One));
+    let before = rig.drive(0).position;
+    rig.run_until(Phase::Disabled, 1_000);
+    rig.assert_limits_kept();
+    assert!(rig.drive(0).position > before);
+    assert!(rig.stops().iter().all(|stop| stop.rule() == Rule::Requested));
+}
+
+#[test]
+fn a_confirmation_that_was_lost_before_anything_is_enabled_holds_no_service_frame_back_for_long() {
+    let mut rig = Rig::new(3);
+    rig.buses[0].loses_confirmation = true;
+    rig.host.services.extend([read_request(); 20]);
+    rig.run(10);
+    assert_eq!(rig.host.services.len(), 0);
 }
 
 #[test]
