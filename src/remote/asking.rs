@@ -36,10 +36,13 @@ struct Commands {
 }
 
 impl Asking {
-    /// A controller of these names is asked.
-    pub fn new(names: &Names) -> Self {
+    /// The controller of these names that is observed is asked.
+    pub fn new(names: &Names, observer: &Packets) -> Self {
+        let stops = Packets::connect_as(names.command(), Role::Stops).map_err(|error| error.kind());
+        let is_same = |stops: &Packets| stops.peer() == observer.peer();
         Self {
-            stops: Packets::connect_as(names.command(), Role::Stops).map_err(|error| error.kind()),
+            // Another process may have the name by now.
+            stops: stops.and_then(|stops| is_same(&stops).then_some(stops).ok_or(io::ErrorKind::NotFound)),
             stops_sent: AtomicU64::new(0),
             stops_taken: AtomicU64::new(0),
             commands: Mutex::default(),
@@ -167,8 +170,7 @@ impl Client {
         let connection = Packets::connect_as(self.0.names.command(), Role::Commands);
         let connection = connection.map_err(|error| refused(error.kind()))?;
         // Another process may have the name by now.
-        if connection.process() != self.0.observer.process() || connection.wait_at_most(REPLY_WITHIN).is_err()
-        {
+        if connection.peer() != self.0.observer.peer() || connection.wait_at_most(REPLY_WITHIN).is_err() {
             return Err(NoAnswer::Ended);
         }
         Ok(connection)

@@ -53,6 +53,6 @@ pub fn connect(name: &str) -> Result<Client, ConnectError> {
         Unreadable::Foreign => foreign(),
         Unreadable::Version(theirs) => ConnectError::Version { theirs },
     })?;
-    let asking = Asking::new(&names);
+    let asking = Asking::new(&names, &observer);
     Ok(Client(Arc::new(Shared { names, shown, description, observer, asking })))
 }

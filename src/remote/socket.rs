@@ -20,6 +20,7 @@ use nix::sys::time::TimeVal;
 
 use super::layout::{MAGIC, VERSION};
 use super::memory::{Memory, owned};
+use crate::link::ownership::Process;
 
 /// The words of the longest packet.
 pub const PACKET_WORDS: usize = 8192;
@@ -40,6 +41,11 @@ pub enum Role {
 }
 
 impl Role {
+    /// The first packet of a connection.
+    pub const fn words(self) -> [u64; 3] {
+        [MAGIC, VERSION, self as u64]
+    }
+
     /// The role of the first packet of a connection.
     pub fn of(words: &[u64]) -> Option<Self> {
         match words {
@@ -255,7 +261,7 @@ impl Packets {
     /// Connects to a socket in a role.
     pub fn connect_as(path: &Path, role: Role) -> io::Result<Self> {
         let own = Self::connect(path)?;
-        own.send(&[MAGIC, VERSION, role as u64])?;
+        own.send(&role.words())?;
         Ok(own)
     }
 
@@ -313,9 +319,11 @@ impl Packets {
         poll(&mut watched, PollTimeout::ZERO).is_ok_and(|count| count > 0)
     }
 
-    /// The process at the other side, as the kernel knows it.
-    pub fn process(&self) -> u32 {
-        getsockopt(&self.0, sockopt::PeerCredentials).map_or(0, |peer| peer.pid() as u32)
+    /// The process at the other side, as the kernel knows it (`SO_PEERCRED`).
+    pub fn peer(&self) -> Process {
+        let unknown = Process { pid: 0, user: u32::MAX };
+        let peer = getsockopt(&self.0, sockopt::PeerCredentials);
+        peer.map_or(unknown, |peer| Process { pid: peer.pid(), user: peer.uid() })
     }
 
     /// Ends the connection, for whoever waits at this side, too.

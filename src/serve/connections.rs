@@ -4,10 +4,11 @@ use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::errno::Errno;
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::unistd::geteuid;
 use takt_rt::RequestTarget;
 
 use super::Served;
@@ -18,10 +19,15 @@ use crate::remote::{
     Answer, Listener, Memory, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest, accept, now_ns,
 };
 
-/// Observers, and connections for stops, at most.
+/// Places for observers, for connections that ask for stops, and for those that have not said their role: none of them takes one of
+/// the others.
 const PEERS: usize = 128;
-/// Clients with commands, at most: each has a thread.
+/// Places for clients with commands: each has a thread.
 const WORKERS: usize = 32;
+/// Time for a connection to say its role.
+const DECIDED_WITHIN: Duration = Duration::from_secs(1);
+/// Connections that are accepted before the peers are attended to again.
+const ACCEPTED_AT_ONCE: usize = 64;
 /// Stops of one client that are taken before those of the next one.
 const STOPS_AT_ONCE: usize = 16;
 /// The pause after the system has no more descriptors.
@@ -34,7 +40,7 @@ pub struct Connections {
     memory: Arc<Memory>,
     wake: OwnedFd,
     peers: Vec<Peer>,
-    workers: Vec<Packets>,
+    workers: Vec<Employed>,
     working: Arc<AtomicUsize>,
     connections: u64,
 }
@@ -42,6 +48,7 @@ pub struct Connections {
 /// A connection that this thread looks after.
 struct Peer {
     connection: Packets,
+    user: u32,
     kind: Kind,
 }
 
@@ -49,10 +56,54 @@ struct Peer {
 enum Kind {
     /// It has the memory; the connection shows each side the end of the other.
     Observer,
-    /// A client that has not said its role yet.
-    Undecided,
-    /// A client that may ask for stops, and has asked for so many.
-    Stops { taken: u64 },
+    /// A client that has not said its role yet, and is closed at this time.
+    Undecided { until: Instant },
+    /// A client that may ask for stops, and has asked for this many. One that has found no place is closed at `until`.
+    Stops { taken: u64, until: Option<Instant> },
+}
+
+impl Kind {
+    /// The time at which it is closed.
+    const fn until(self) -> Option<Instant> {
+        match self {
+            Self::Undecided { until } => Some(until),
+            Self::Stops { until, .. } => until,
+            Self::Observer => None,
+        }
+    }
+
+    const fn is_observer(self) -> bool {
+        matches!(self, Self::Observer)
+    }
+
+    /// True if it asks for stops, and has a place for that.
+    const fn is_placed_for_stops(self) -> bool {
+        matches!(self, Self::Stops { until: None, .. })
+    }
+
+    /// True if it has only time, and no place.
+    const fn is_temporary(self) -> bool {
+        self.until().is_some()
+    }
+}
+
+/// A thread that carries the commands of a client out.
+struct Employed {
+    connection: Packets,
+    user: u32,
+}
+
+/// Whether a connection of `user` finds one of `places`, which connections of `present` have. The user of this process and root may have
+/// all of them. Another user may have a quarter, and all others together three quarters.
+fn has_room(places: usize, user: u32, own: u32, present: impl Iterator<Item = u32>) -> bool {
+    let is_stranger = |user: u32| user != own && user != 0;
+    let (mut all, mut of_strangers, mut of_user) = (0, 0, 0);
+    for other in present {
+        all += 1;
+        of_strangers += usize::from(is_stranger(other));
+        of_user += usize::from(other == user);
+    }
+    all < places && (!is_stranger(user) || of_user < places / 4 && of_strangers < places / 4 * 3)
 }
 
 impl Connections {
@@ -69,15 +120,19 @@ impl Connections {
             self.attend_peers(&ready);
             self.let_in();
         }
-        self.workers.iter().for_each(Packets::shut_down);
+        self.workers.iter().for_each(|worker| worker.connection.shut_down());
     }
 
-    /// Waits until something happens, and returns at which peers.
+    /// Waits until something happens or the time of a peer is over, and returns the peers at which something has happened.
     fn wait(&self) -> Vec<bool> {
         let own = [self.wake.as_fd(), self.listener.observers.as_fd(), self.listener.clients.as_fd()];
         let peers = self.peers.iter().map(|peer| peer.connection.descriptor());
         let mut all: Vec<PollFd<'_>> = own.into_iter().chain(peers).map(watched).collect();
-        match poll(&mut all, PollTimeout::NONE) {
+        let next = self.peers.iter().filter_map(|peer| peer.kind.until()).min();
+        // Rounded up: in the last millisecond it would return at once, again and again.
+        let left = next.map(|next| next.saturating_duration_since(Instant::now()) + Duration::from_millis(1));
+        let at_most = left.map_or(PollTimeout::NONE, |left| left.try_into().unwrap_or(PollTimeout::MAX));
+        match poll(&mut all, at_most) {
             Ok(_) | Err(Errno::EINTR) => {}
             Err(_) => thread::sleep(PAUSE),
         }
@@ -86,15 +141,13 @@ impl Connections {
 
     fn attend_peers(&mut self, ready: &[bool]) {
         let mut words = [0; PACKET_WORDS];
-        let peers = std::mem::take(&mut self.peers);
-        let mut ready = ready.iter();
-        for peer in peers {
-            if ready.next() == Some(&true) {
-                self.attend(peer, &mut words);
-            } else {
-                self.peers.push(peer);
-            }
-        }
+        let peers = std::mem::take(&mut self.peers).into_iter().zip(ready.iter().copied());
+        let (ready, idle): (Vec<_>, Vec<_>) = peers.partition(|(_, is_ready)| *is_ready);
+        // All of them count for the places.
+        self.peers.extend(idle.into_iter().map(|(peer, _)| peer));
+        ready.into_iter().for_each(|(peer, _)| self.attend(peer, &mut words));
+        let now = Instant::now();
+        self.peers.retain(|peer| peer.kind.until().is_none_or(|until| now < until));
     }
 
     /// Takes what a peer has sent. One that is gone, or sends what it may not, is disconnected.
@@ -108,8 +161,15 @@ impl Connections {
             let words = words.get(..count).unwrap_or_default();
             match &mut peer.kind {
                 Kind::Observer => return,
-                Kind::Undecided => return self.decide(peer.connection, Role::of(words)),
-                Kind::Stops { taken } => match StopRequest::of(words) {
+                Kind::Undecided { until } => match Role::of(words) {
+                    None => return,
+                    Some(Role::Stops) => {
+                        let has_place = self.has_room(PEERS, peer.user, Kind::is_placed_for_stops);
+                        peer.kind = Kind::Stops { taken: 0, until: (!has_place).then_some(*until) };
+                    }
+                    Some(Role::Commands) => return self.employ(peer.connection, peer.user),
+                },
+                Kind::Stops { taken, .. } => match StopRequest::of(words) {
                     Ok(stop) if self.is_known(stop.target) => {
                         self.served.stops.note(stop.target, now_ns());
                         // It fails only when the controller has ended.
@@ -129,27 +189,26 @@ impl Connections {
         target == RequestTarget::All || !self.served.controller.axes_of(target).is_empty()
     }
 
-    fn decide(&mut self, connection: Packets, role: Option<Role>) {
-        match role {
-            None => {}
-            Some(Role::Stops) => self.peers.push(Peer { connection, kind: Kind::Stops { taken: 0 } }),
-            Some(Role::Commands) => self.employ(connection),
-        }
+    fn has_room(&self, places: usize, user: u32, is_of_kind: impl Fn(Kind) -> bool) -> bool {
+        let present = self.peers.iter().filter(|peer| is_of_kind(peer.kind)).map(|peer| peer.user);
+        has_room(places, user, geteuid().as_raw(), present)
     }
 
     /// Begins a thread for the commands of a client.
-    fn employ(&mut self, connection: Packets) {
-        self.workers.retain(|worker| !worker.is_closed());
+    fn employ(&mut self, connection: Packets, user: u32) {
+        self.workers.retain(|worker| !worker.connection.is_closed());
         let refuse = |connection: &Packets| {
             // The client may be gone already.
             let reply = Reply::lease(LeaseError::TooManyClients);
             let _ = connection.send(&Answer { number: u64::MAX, slot: 0, reply }.words());
         };
-        let (Ok(own), true) = (connection.try_clone(), self.working.load(Ordering::Acquire) < WORKERS) else {
+        let has_place = self.working.load(Ordering::Acquire) < WORKERS
+            && has_room(WORKERS, user, geteuid().as_raw(), self.workers.iter().map(|worker| worker.user));
+        let (Ok(own), true) = (connection.try_clone(), has_place) else {
             return refuse(&connection);
         };
         self.connections += 1;
-        let claimant = Claimant { connection: self.connections, process: connection.process() };
+        let claimant = Claimant { connection: self.connections, process: connection.peer().pid as u32 };
         let worker = Worker::new(Arc::clone(&self.served), claimant);
         let counted = Counted::new(&self.working);
         let run = move || {
@@ -157,20 +216,32 @@ impl Connections {
             worker.run(&connection);
         };
         match thread::Builder::new().name("takt-worker".into()).spawn(run) {
-            Ok(_) => self.workers.push(own),
+            Ok(_) => self.workers.push(Employed { connection: own, user }),
             Err(_) => refuse(&own),
         }
     }
 
     fn let_in(&mut self) {
-        while let Some(connection) = accepted(self.listener.observers.as_fd()) {
-            if self.peers.len() < PEERS && connection.send_memory(&self.memory).is_ok() {
-                self.peers.push(Peer { connection, kind: Kind::Observer });
+        for _ in 0..ACCEPTED_AT_ONCE {
+            let Some(connection) = accepted(self.listener.observers.as_fd()) else { break };
+            let user = connection.peer().user;
+            if self.has_room(PEERS, user, Kind::is_observer) && connection.send_memory(&self.memory).is_ok() {
+                self.peers.push(Peer { connection, user, kind: Kind::Observer });
             }
         }
-        while let Some(connection) = accepted(self.listener.clients.as_fd()) {
-            if self.peers.len() < PEERS {
-                self.peers.push(Peer { connection, kind: Kind::Undecided });
+        for _ in 0..ACCEPTED_AT_ONCE {
+            let Some(connection) = accepted(self.listener.clients.as_fd()) else { break };
+            let user = connection.peer().user;
+            // Without a free place it takes that of the oldest one of its user.
+            let oldest = self.peers.iter().position(|peer| peer.user == user && peer.kind.is_temporary());
+            if !self.has_room(PEERS, user, Kind::is_temporary)
+                && let Some(oldest) = oldest
+            {
+                self.peers.remove(oldest);
+            }
+            if self.has_room(PEERS, user, Kind::is_temporary) {
+                let kind = Kind::Undecided { until: Instant::now() + DECIDED_WITHIN };
+                self.peers.push(Peer { connection, user, kind });
             }
         }
     }
@@ -203,5 +274,24 @@ impl Counted {
 impl Drop for Counted {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strangers_leave_places_to_each_other_and_to_the_user_of_this_process_and_root() {
+        let (own, one, other) = (1000, 65_534, 65_533);
+        let room = |user, present: &[(u32, usize)]| {
+            let present = present.iter().flat_map(|(user, count)| std::iter::repeat_n(*user, *count));
+            has_room(128, user, own, present)
+        };
+        assert!(room(one, &[(one, 31)]) && !room(one, &[(one, 32)]));
+        assert!(room(other, &[(one, 32)]));
+        let strangers = [(1, 32), (2, 32), (3, 32)];
+        assert!(!room(one, &strangers) && room(own, &strangers) && room(0, &strangers));
+        assert!(room(own, &[(own, 127)]) && !room(own, &[(own, 128)]));
     }
 }

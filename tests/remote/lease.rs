@@ -106,9 +106,6 @@ fn a_name_is_served_once_and_again_after_its_end() {
     assert!(matches!(refused, Err(ServeError::Mode { .. })));
 }
 
-/// An ordinary user.
-const NOBODY: u32 = 65_534;
-
 #[test]
 fn file_permissions_say_who_observes_and_who_commands() {
     // For root there are no permissions: another user observes then.
@@ -121,18 +118,7 @@ fn file_permissions_say_who_observes_and_who_commands() {
     if !is_root {
         return only_observes(&served.connect());
     }
-    fs::set_permissions(served.folder.path(), fs::Permissions::from_mode(0o755)).unwrap();
-    let program = served.folder.path().join("another_process");
-    fs::copy(env::current_exe().unwrap(), &program).unwrap();
-    let mut other = Command::new("setpriv");
-    other.args([format!("--reuid={NOBODY}"), format!("--regid={NOBODY}"), "--clear-groups".to_owned()]);
-    let status = other
-        .arg(program)
-        .args(["--exact", "lease::observe", "--ignored"])
-        .env(NAME, served.name())
-        .stdout(Stdio::null())
-        .status()
-        .unwrap();
+    let status = served.other_user("lease::observe").0.wait().unwrap();
     assert!(status.success());
     let closed = serve(
         served.controller.handle(),

@@ -2,6 +2,7 @@
 //! the ignored tests, or `takt run --serve`.
 
 mod calls;
+mod crowds;
 mod deaths;
 mod garbage;
 mod lease;
@@ -10,14 +11,16 @@ mod stops;
 use std::env;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::unistd::geteuid;
-use takt::internals::remote::{self, Answer, Demand, PACKET_WORDS, Packets, Received, Reply, Role};
+use takt::internals::remote::{
+    self, Answer, Demand, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest,
+};
 use takt::{
     AxisPoint, Client, ClientStream, CommandError, Config, ConnectError, Controller, EventKind, LeaseError,
     MotionError, MoveOptions, OperationMode, Phase, RunningController, ServeError, ServeOptions, Server,
@@ -27,6 +30,8 @@ use takt_rt::{Frame, Id, RequestTarget};
 use tempfile::TempDir;
 
 const LONG: Duration = Duration::from_secs(30);
+/// An ordinary user.
+const NOBODY: u32 = 65_534;
 /// Names the controller for the other process.
 const NAME: &str = "TAKT_TEST_SERVED";
 
@@ -68,6 +73,17 @@ impl Served {
 
     fn connect(&self) -> Client {
         connect(&self.name()).unwrap()
+    }
+
+    /// This test program as another user, who may enter the folder and write into it. For root alone.
+    fn other_user(&self, test: &str) -> Other {
+        fs::set_permissions(self.folder.path(), fs::Permissions::from_mode(0o1777)).unwrap();
+        let program = self.folder.path().join("another_process");
+        fs::copy(env::current_exe().unwrap(), &program).unwrap();
+        let mut other = Command::new("setpriv");
+        other.args([format!("--reuid={NOBODY}"), format!("--regid={NOBODY}"), "--clear-groups".to_owned()]);
+        other.arg(program).args(["--exact", test, "--ignored"]).env(NAME, self.name());
+        Other(other.stdout(Stdio::null()).spawn().unwrap())
     }
 }
 
