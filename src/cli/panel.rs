@@ -1,7 +1,9 @@
 //! `takt panel`, and the options of the panel that `takt run` has too.
 
-use std::fs;
+use std::fs::File;
+use std::io::{self, Read};
 use std::net::SocketAddr;
+use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -16,7 +18,7 @@ use crate::link::ownership::Ownership;
 use crate::link::serial_line::SerialSettings;
 use crate::monitor::BusDecoder;
 use crate::panel::{
-    self, BenchBus, BenchDrive, BenchLink, Listening, Panel, PanelError, PanelOptions, Workplace,
+    self, BenchBus, BenchDrive, BenchLink, Listening, Panel, PanelError, PanelOptions, PanelToken, Workplace,
 };
 use crate::remote;
 
@@ -31,12 +33,19 @@ use super::usage_error::UsageError;
 /// How often it is looked whether the panel is to end.
 const LOOK: Duration = Duration::from_millis(50);
 
+/// The largest file of a token, in bytes.
+const TOKEN_FILE_AT_MOST: u64 = 4096;
+
 /// Who may open the panel.
 #[derive(Args, Debug)]
 pub struct AccessArguments {
-    /// A file with the token that pages of the panel must give; needed where it listens elsewhere than on loopback
+    /// File with the token that pages of the panel must give, readable by you alone (default: a new token, in the address that is
+    /// printed)
     #[arg(long = "panel-token", value_name = "FILE")]
     token: Option<PathBuf>,
+    /// Demand no token: every user of this computer may command (loopback only)
+    #[arg(long = "panel-open", conflicts_with = "token")]
+    is_open: bool,
     /// Where a reverse proxy shows the panel, as https://robot.example
     #[arg(long = "panel-origin", value_name = "ORIGIN")]
     origins: Vec<String>,
@@ -45,23 +54,37 @@ pub struct AccessArguments {
 impl AccessArguments {
     /// Begins to listen.
     pub fn listen(&self, address: SocketAddr) -> Result<Listening, UsageError> {
-        let token = self.token.as_deref().map(token).transpose()?;
+        let token = match &self.token {
+            Some(path) => PanelToken::Given(token(path)?),
+            None if self.is_open => PanelToken::Open,
+            None => PanelToken::New,
+        };
         let options = PanelOptions { address, token, origins: self.origins.clone() };
         Listening::begin(&options).map_err(|error| error.to_string().into())
     }
 }
 
-/// The first line of a file.
+/// The first line of a file that no other user can read or write.
 fn token(path: &Path) -> Result<String, UsageError> {
-    let text = fs::read_to_string(path).map_err(|error| {
-        UsageError::from(format!("the token cannot be read from {}: {error}", path.display()))
-    })?;
+    let path_shown = path.display();
+    let failed = |error: io::Error| format!("the token cannot be read from {path_shown}: {error}");
+    let file = File::open(path).map_err(failed)?;
+    let mode = file.metadata().map_err(failed)?.permissions().mode() & 0o777;
+    if mode & 0o077 != 0 {
+        let words = format!(
+            "other users can read or write the token in {path_shown} (mode {mode:o}, allowed: 600): make a new one, as with \
+             `(umask 077; openssl rand -hex 16 > FILE)`"
+        );
+        return Err(words.into());
+    }
+    let mut text = String::new();
+    file.take(TOKEN_FILE_AT_MOST).read_to_string(&mut text).map_err(failed)?;
     Ok(text.lines().next().unwrap_or_default().trim().to_owned())
 }
 
 /// Says where a panel is to be opened.
-pub fn greeting(address: SocketAddr) -> String {
-    format!("the panel is at http://{address}/, until Ctrl-C")
+pub fn greeting(panel: &Panel) -> String {
+    format!("the panel is at {}, until Ctrl-C", panel.url())
 }
 
 /// Show and command a controller of another process in the browser, or commission drives without one
@@ -161,7 +184,7 @@ fn keep_open(
             return Exit::Stopped;
         }
     };
-    say!("takt: {}", greeting(panel.address()));
+    say!("takt: {}", greeting(&panel));
     while !interrupted.load(Ordering::Relaxed) {
         std::thread::sleep(LOOK);
         if let Some(exit) = is_over(&panel) {

@@ -36,9 +36,12 @@ pub enum Denied {
         /// The site.
         origin: String,
     },
-    /// The token is missing or wrong.
+    /// The token is missing.
     #[error("the panel needs its token")]
-    Token,
+    NoToken,
+    /// It is another token.
+    #[error("this is not the token of the panel")]
+    WrongToken,
 }
 
 /// Why a token, or an origin, cannot be one.
@@ -109,12 +112,12 @@ impl Access {
     /// Whether a request has the token, where there is one.
     ///
     /// # Errors
-    /// [`Denied::Token`].
+    /// [`Denied::NoToken`], [`Denied::WrongToken`].
     pub fn check_token(&self, headers: &HeaderMap) -> Result<(), Denied> {
         let Some(token) = &self.token else { return Ok(()) };
-        let given = headers.get(AUTHORIZATION).and_then(|value| value.to_str().ok());
-        let given = given.and_then(|value| value.strip_prefix("Bearer ")).unwrap_or_default();
-        if is_same(given.as_bytes(), token.as_bytes()) { Ok(()) } else { Err(Denied::Token) }
+        let given = headers.get(AUTHORIZATION).ok_or(Denied::NoToken)?;
+        let given = given.as_bytes().strip_prefix(b"Bearer ").unwrap_or_default();
+        if is_same(given, token.as_bytes()) { Ok(()) } else { Err(Denied::WrongToken) }
     }
 }
 
@@ -207,9 +210,9 @@ mod tests {
         for wrong in
             ["Bearer 0123456789abcde", "Bearer 0123456789abcdeff", "Bearer ", "0123456789abcdef", "Basic x"]
         {
-            assert_eq!(with(wrong), Err(Denied::Token), "{wrong}");
+            assert_eq!(with(wrong), Err(Denied::WrongToken), "{wrong}");
         }
-        assert_eq!(access.check_token(&HeaderMap::new()), Err(Denied::Token));
+        assert_eq!(access.check_token(&HeaderMap::new()), Err(Denied::NoToken));
         let short = Access::new(Some("0123".to_owned()), &[]).unwrap_err();
         assert_eq!(short, AccessError::ShortToken { given: 4 });
         assert!(Access::new(Some("0123456789 abcdef".to_owned()), &[]).is_err());

@@ -1,8 +1,13 @@
 //! The sockets of the panel, and their bounds: how many, how long a request may take to come, and that nobody who reads slowly holds up
 //! anybody else.
+//!
+//! Connections that have shown the token, and those that have not, have places of their own. Without the token a connection has a second
+//! for each request, and gives its place to a newer one when there are too many. So strangers, silent or not, keep nobody with the token out.
 
+use std::collections::VecDeque;
 use std::net::SocketAddr;
-use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use hyper::server::conn::http1;
@@ -10,13 +15,17 @@ use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{Notify, Semaphore};
+use tokio::sync::Notify;
 use tokio::time::sleep;
 
-use super::gate::{Visited, show_states};
+use super::gate::{Visited, locked, show_states};
 
-/// Connections that may be open at the same time: a browser opens six for a page at most.
-const CONNECTIONS_AT_MOST: usize = 320;
+/// Connections with the token that may be open at the same time: a browser opens six for a page at most.
+const ADMITTED_AT_MOST: usize = 320;
+/// Connections that have not shown the token.
+const STRANGERS_AT_MOST: usize = 256;
+/// Time for each request of a connection that has not shown the token.
+const SHOWN_WITHIN: Duration = Duration::from_secs(1);
 /// The head of a request must have come after so long, and a connection without a request is closed then.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// The largest head of a request, in bytes.
@@ -31,6 +40,77 @@ pub struct Connection {
     pub local: SocketAddr,
     /// Closes it.
     pub closer: Arc<Notify>,
+    number: u64,
+    requests: Arc<AtomicU64>,
+    places: Arc<Places>,
+}
+
+impl Connection {
+    /// It has shown the token. Without a free place for those that have, it stays among the others.
+    pub fn admit(&self) {
+        self.places.admit(self.number);
+    }
+
+    /// Returns when it has sent no request for its time, and has not shown the token.
+    async fn is_silent(&self) {
+        loop {
+            let requests = self.requests.load(Ordering::Relaxed);
+            sleep(SHOWN_WITHIN).await;
+            if requests == self.requests.load(Ordering::Relaxed) && !self.places.is_admitted(self.number) {
+                return;
+            }
+        }
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        locked(&self.places.0).retain(|entry| entry.number != self.number);
+    }
+}
+
+/// The connections that are open, in the order in which they came.
+#[derive(Debug, Default)]
+struct Places(Mutex<VecDeque<Entry>>);
+
+#[derive(Debug)]
+struct Entry {
+    number: u64,
+    is_admitted: bool,
+    closer: Arc<Notify>,
+}
+
+/// A connection counts as long as this lives.
+struct Place {
+    number: u64,
+    places: Arc<Places>,
+}
+
+impl Places {
+    /// A new connection has not shown the token. One too many of these takes the place of the oldest.
+    fn enter(self: &Arc<Self>, number: u64, closer: Arc<Notify>) -> Place {
+        let mut entries = locked(&self.0);
+        if entries.iter().filter(|entry| !entry.is_admitted).count() >= STRANGERS_AT_MOST
+            && let Some(oldest) = entries.iter().position(|entry| !entry.is_admitted)
+            && let Some(oldest) = entries.remove(oldest)
+        {
+            oldest.closer.notify_one();
+        }
+        entries.push_back(Entry { number, is_admitted: false, closer });
+        Place { number, places: Arc::clone(self) }
+    }
+
+    fn admit(&self, number: u64) {
+        let mut entries = locked(&self.0);
+        let has_room = entries.iter().filter(|entry| entry.is_admitted).count() < ADMITTED_AT_MOST;
+        if let Some(entry) = entries.iter_mut().find(|entry| entry.number == number) {
+            entry.is_admitted |= has_room;
+        }
+    }
+
+    fn is_admitted(&self, number: u64) -> bool {
+        locked(&self.0).iter().any(|entry| entry.number == number && entry.is_admitted)
+    }
 }
 
 /// Serves pages until the panel ends.
@@ -42,18 +122,18 @@ pub async fn serve(panel: &impl Visited, routes: axum::Router, listener: TcpList
 }
 
 async fn accept(routes: axum::Router, listener: TcpListener) {
-    let room = Arc::new(Semaphore::new(CONNECTIONS_AT_MOST));
+    let places = Arc::<Places>::default();
     let routes = TowerToHyperService::new(routes);
-    loop {
+    for number in 0.. {
         let Ok((stream, _)) = listener.accept().await else {
             // Too many files are open, or the connection has gone already.
             sleep(Duration::from_millis(50)).await;
             continue;
         };
-        // Without room the connection is closed at once, and the browser says so.
-        let Ok(place) = Arc::clone(&room).try_acquire_owned() else { continue };
         let Ok(local) = stream.local_addr() else { continue };
-        let connection = Connection { local, closer: Arc::default() };
+        let (closer, requests) = (Arc::<Notify>::default(), Arc::default());
+        let place = places.enter(number, Arc::clone(&closer));
+        let connection = Connection { local, closer, number, requests, places: Arc::clone(&places) };
         let routes = routes.clone();
         tokio::spawn(async move {
             converse(stream, connection, routes).await;
@@ -65,8 +145,9 @@ async fn accept(routes: axum::Router, listener: TcpListener) {
 async fn converse(stream: TcpStream, connection: Connection, routes: TowerToHyperService<axum::Router>) {
     // A command is small and must not wait for more of them; where the option is refused it only comes later.
     let _ = stream.set_nodelay(true);
-    let closer = Arc::clone(&connection.closer);
+    let own = connection.clone();
     let service = service_fn(move |mut request: hyper::Request<hyper::body::Incoming>| {
+        connection.requests.fetch_add(1, Ordering::Relaxed);
         request.extensions_mut().insert(connection.clone());
         routes.call(request)
     });
@@ -78,6 +159,7 @@ async fn converse(stream: TcpStream, connection: Connection, routes: TowerToHype
     tokio::select! {
         // A client that breaks off, or sends what is no request, has been answered as far as that goes.
         _ = conversation => {}
-        () = closer.notified() => {}
+        () = own.closer.notified() => {}
+        () = own.is_silent() => {}
     }
 }

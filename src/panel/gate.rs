@@ -21,7 +21,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::json;
 use tokio::sync::{Notify, watch};
-use tokio::time::{MissedTickBehavior, interval, timeout};
+use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 
 use super::access::{Access, Denied};
 use super::command::{CommandRefusal, ProblemView};
@@ -36,6 +36,8 @@ const EVENTS_KEPT: usize = 300;
 /// The body of a command: its largest size in bytes, and how long it may take to come.
 const BODY_AT_MOST: usize = 8 * 1024;
 const BODY_WITHIN: Duration = Duration::from_secs(3);
+/// How late a wrong token is answered. It is shorter than the time that a connection without the token has.
+const GUESS_TAKES: Duration = Duration::from_millis(500);
 
 /// The header that every request of the page's own has. A browser lets no other site set it.
 const OWN: &str = "x-takt-panel";
@@ -215,7 +217,9 @@ impl Problematic {
     /// Its status, its word for programs, and its words.
     pub fn told(&self) -> (StatusCode, &'static str, String) {
         match self {
-            Self::Denied(denied @ Denied::Token) => (StatusCode::UNAUTHORIZED, "token", denied.to_string()),
+            Self::Denied(denied @ (Denied::NoToken | Denied::WrongToken)) => {
+                (StatusCode::UNAUTHORIZED, "token", denied.to_string())
+            }
             Self::Denied(denied) => (StatusCode::FORBIDDEN, "site", denied.to_string()),
             Self::NoHeader => (StatusCode::FORBIDDEN, "header", format!("the header {OWN} is missing")),
             Self::Page(refusal) => {
@@ -313,18 +317,24 @@ async fn own_site<P: Visited>(
 
 async fn own_page<P: Visited>(
     State(panel): State<Arc<P>>,
+    Extension(connection): Extension<Connection>,
     request: Request,
     next: Next,
 ) -> Result<Response, Problematic> {
     if !request.headers().contains_key(OWN) {
         return Err(Problematic::NoHeader);
     }
-    panel.gate().access.check_token(request.headers())?;
+    let checked = panel.gate().access.check_token(request.headers());
+    if checked == Err(Denied::WrongToken) {
+        sleep(GUESS_TAKES).await;
+    }
+    checked?;
+    connection.admit();
     Ok(next.run(request).await)
 }
 
-/// The secret of a page: 128 random bits.
-fn key() -> std::io::Result<String> {
+/// The secret of a page or of a panel: 128 random bits.
+pub fn key() -> std::io::Result<String> {
     let mut bytes = [0u8; 16];
     std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     Ok(format!("{:032x}", u128::from_ne_bytes(bytes)))

@@ -11,7 +11,7 @@ use axum::Router;
 use super::access::{Access, AccessError};
 use super::bench::{self, Bench, Worker, Workplace};
 use super::connections;
-use super::gate::Visited;
+use super::gate::{self, Visited};
 use super::server::{self, Server};
 use crate::command::{CommandError, RunningController};
 use crate::monitor::BusDecoder;
@@ -28,13 +28,24 @@ pub struct FrameSource {
     pub decoders: Vec<BusDecoder>,
 }
 
+/// The token that every request of a page must carry.
+#[derive(Clone, Debug)]
+pub enum PanelToken {
+    /// A new one, which is part of the address: see [`Panel::url`].
+    New,
+    /// This one, which pages ask for.
+    Given(String),
+    /// None: every user of the computer may command. It listens on loopback alone.
+    Open,
+}
+
 /// How the panel is reached.
 #[derive(Clone, Debug)]
 pub struct PanelOptions {
     /// Where it listens.
     pub address: SocketAddr,
-    /// What every request must carry as its bearer token. Without one it listens on loopback alone.
-    pub token: Option<String>,
+    /// The token.
+    pub token: PanelToken,
     /// Where pages may come from beside the own address: that of a reverse proxy, as `https://robot.example`.
     pub origins: Vec<String>,
 }
@@ -44,7 +55,7 @@ pub struct PanelOptions {
 pub enum PanelError {
     /// It would be open to others without a token.
     #[error(
-        "the panel at {address} would be open to the network: give it a token (--panel-token FILE), or let it listen at 127.0.0.1"
+        "the panel at {address} would be open to the network: with --panel-open it listens on loopback alone, as at 127.0.0.1"
     )]
     NoToken {
         /// Where it was to listen.
@@ -99,6 +110,7 @@ pub fn address(text: &str) -> Result<SocketAddr, String> {
 pub struct Listening {
     listener: TcpListener,
     address: SocketAddr,
+    url: String,
     access: Access,
 }
 
@@ -108,16 +120,21 @@ impl Listening {
     /// # Errors
     /// See [`PanelError`].
     pub fn begin(options: &PanelOptions) -> Result<Self, PanelError> {
-        let access = Access::new(options.token.clone(), &options.origins)?;
         let address = options.address;
-        if options.token.is_none() && !address.ip().to_canonical().is_loopback() {
-            return Err(PanelError::NoToken { address });
-        }
+        let (token, is_in_url) = match &options.token {
+            PanelToken::New => (Some(gate::key().map_err(PanelError::Thread)?), true),
+            PanelToken::Given(token) => (Some(token.clone()), false),
+            PanelToken::Open if address.ip().to_canonical().is_loopback() => (None, false),
+            PanelToken::Open => return Err(PanelError::NoToken { address }),
+        };
+        let access = Access::new(token.clone(), &options.origins)?;
         let failed = |error| PanelError::Listen { address, error };
         let listener = TcpListener::bind(address).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
-        Ok(Self { listener, address, access })
+        // Browsers send no fragment: the token comes into no log.
+        let fragment = token.filter(|_| is_in_url).map_or(String::new(), |token| format!("#token={token}"));
+        Ok(Self { listener, address, url: format!("http://{address}/{fragment}"), access })
     }
 
     /// Shows a controller from now on. `take_lease` takes it over from another process; `frames` are for the monitor.
@@ -132,7 +149,7 @@ impl Listening {
     ) -> Result<Panel, PanelError> {
         let controller = Arc::new(controller);
         let server = Arc::new(Server::new(controller, self.access, take_lease, frames.is_some()));
-        let mut threads = Threads::new(Arc::<Server>::clone(&server), self.address);
+        let mut threads = Threads::new(Arc::<Server>::clone(&server));
         let routes = server::routes(&server);
         let commands = server.commands();
         let start = || {
@@ -148,7 +165,8 @@ impl Listening {
             threads.spawn("takt-panel-motion", move || server.lead_motions())
         };
         start().map_err(PanelError::Thread)?;
-        Ok(Panel { threads, is_taken_over: Box::new(|| false) })
+        let is_taken_over = Box::new(|| false);
+        Ok(Panel { _threads: threads, address: self.address, url: self.url, is_taken_over })
     }
 
     /// Commissions drives on buses without a controller from now on.
@@ -157,7 +175,7 @@ impl Listening {
     /// [`PanelError::Thread`].
     pub fn commission(self, place: Workplace) -> Result<Panel, PanelError> {
         let bench = Arc::new(Bench::new(self.access, place.told()));
-        let mut threads = Threads::new(Arc::<Bench>::clone(&bench), self.address);
+        let mut threads = Threads::new(Arc::<Bench>::clone(&bench));
         let worker = Worker::new(Arc::clone(&bench), place);
         let routes = bench::routes(&bench);
         let start = || {
@@ -165,20 +183,28 @@ impl Listening {
             threads.spawn("takt-bench", move || worker.run())
         };
         start().map_err(PanelError::Thread)?;
-        Ok(Panel { threads, is_taken_over: Box::new(move || bench.is_taken_over()) })
+        let is_taken_over = Box::new(move || bench.is_taken_over());
+        Ok(Panel { _threads: threads, address: self.address, url: self.url, is_taken_over })
     }
 }
 
 /// A panel that is open as long as it lives. When it is dropped, what its pages have set in motion comes to rest.
 pub struct Panel {
-    threads: Threads,
+    _threads: Threads,
+    address: SocketAddr,
+    url: String,
     is_taken_over: Box<dyn Fn() -> bool + Send + Sync>,
 }
 
 impl Panel {
     /// Where it listens.
     pub const fn address(&self) -> SocketAddr {
-        self.threads.address
+        self.address
+    }
+
+    /// What a browser opens. A token that was made for this panel is part of it.
+    pub fn url(&self) -> &str {
+        &self.url
     }
 
     /// Whether it has ended because another process takes the buses of commissioning over.
@@ -190,13 +216,12 @@ impl Panel {
 /// The threads of a panel. They end when this is dropped.
 struct Threads {
     panel: Arc<dyn Visited>,
-    address: SocketAddr,
     running: Vec<JoinHandle<()>>,
 }
 
 impl Threads {
-    fn new(panel: Arc<dyn Visited>, address: SocketAddr) -> Self {
-        Self { panel, address, running: vec![] }
+    fn new(panel: Arc<dyn Visited>) -> Self {
+        Self { panel, running: vec![] }
     }
 
     /// Serves pages on a thread of its own.

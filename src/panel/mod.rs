@@ -44,6 +44,8 @@ pub use access::TOKEN_AT_LEAST;
 #[cfg(feature = "panel")]
 pub use bench::{BenchBus, BenchDrive, BenchLink, Workplace};
 #[cfg(feature = "panel")]
-pub use listening::{FrameSource, Listening, Panel, PanelError, PanelOptions, TakeLease, address};
+pub use listening::{
+    FrameSource, Listening, Panel, PanelError, PanelOptions, PanelToken, TakeLease, address,
+};
 pub use motions::HELD_FOR;
 pub use pages::{PAGES_AT_MOST, PRESENT_FOR};

@@ -25,7 +25,7 @@ impl Bench {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
         let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
         command
-            .args(["panel", "--address", "127.0.0.1:0"])
+            .args(["panel", "--address", "127.0.0.1:0", "--panel-open"])
             .arg(path)
             .stderr(Stdio::piped())
             .stdin(Stdio::null());

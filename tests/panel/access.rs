@@ -2,10 +2,11 @@
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 use takt::SessionOptions;
-use takt::internals::panel::{Listening, PAGES_AT_MOST, PanelError, PanelOptions};
+use takt::internals::panel::{Listening, PAGES_AT_MOST, PanelError, PanelOptions, PanelToken};
 
 use crate::open_page::*;
 
@@ -64,15 +65,16 @@ fn another_site_is_refused_by_its_host_its_origin_and_its_missing_header() {
 
 #[test]
 fn a_panel_that_others_can_reach_needs_a_token_and_takes_nothing_without_it() {
-    let open = PanelOptions { address: "0.0.0.0:0".parse().unwrap(), token: None, origins: vec![] };
+    let open =
+        PanelOptions { address: "0.0.0.0:0".parse().unwrap(), token: PanelToken::Open, origins: vec![] };
     assert!(matches!(Listening::begin(&open), Err(PanelError::NoToken { .. })));
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();
-    let same = PanelOptions { address: taken.local_addr().unwrap(), token: None, origins: vec![] };
+    let same = PanelOptions { address: taken.local_addr().unwrap(), ..options(None) };
     let error = Listening::begin(&same).err().unwrap().to_string();
     assert!(error.contains("another program does"), "{error}");
 
     let token = "0123456789abcdef0123";
-    let everywhere = PanelOptions { token: Some(token.to_owned()), ..open };
+    let everywhere = PanelOptions { token: PanelToken::Given(token.to_owned()), ..open };
     let shown = Shown::with(config("first.toml"), SessionOptions::default(), &everywhere);
     let address = SocketAddr::from(([127, 0, 0, 1], shown.address().port()));
     assert_eq!(get(address, "/", "").0, 200, "the page itself is no secret");
@@ -161,4 +163,56 @@ fn pages_that_read_nothing_hold_up_nobody_and_their_number_is_bounded() {
     assert_eq!(page.newest_state()["pages"].as_u64(), Some(PAGES_AT_MOST as u64));
     // They confirm nothing, and are closed.
     shown.until("room", |_| Page::open(address).is_ok());
+}
+
+const TOKEN: &str = "0123456789abcdef0123";
+
+fn authorized() -> String {
+    format!("Authorization: Bearer {TOKEN}\r\n")
+}
+
+#[test]
+fn connections_without_the_token_keep_no_stop_out_and_are_closed_after_a_second() {
+    let shown = Shown::with(config("first.toml"), SessionOptions::default(), &options(Some(TOKEN)));
+    let address = shown.address();
+    // Half of them say nothing, and half of them begin a request without an end.
+    let mut crowd: Vec<TcpStream> = (0..400)
+        .map(|number| {
+            let mut stream = TcpStream::connect(address).unwrap();
+            if number % 2 == 0 {
+                let _ = stream.write_all(b"GET / HTTP/1.1\r\nHost: x");
+            }
+            stream
+        })
+        .collect();
+    let begun = Instant::now();
+    assert_eq!(post(address, "/api/stop", &authorized(), r#"{"category":2}"#).0, 200);
+    let mut last = crowd.pop().unwrap();
+    last.set_read_timeout(Some(LONG)).unwrap();
+    // It is closed, by whatever word.
+    assert_eq!(last.read(&mut [0]).unwrap_or(0), 0);
+    assert!(begun.elapsed() < Duration::from_secs(9), "{:?}", begun.elapsed());
+}
+
+#[test]
+fn a_wrong_token_is_answered_late_and_the_right_one_at_once_meanwhile() {
+    let shown = Shown::with(config("first.toml"), SessionOptions::default(), &options(Some(TOKEN)));
+    let address = shown.address();
+    let begun = Instant::now();
+    let guess = post(address, "/api/stop", "Authorization: Bearer 0123456789abcdef0124\r\n", "{}");
+    assert_eq!((guess.0, &guess.2["error"]), (401, &json!("token")));
+    assert!(begun.elapsed() > Duration::from_millis(400), "{:?}", begun.elapsed());
+    assert_eq!(post(address, "/api/stop", &authorized(), r#"{"category":2}"#).0, 200);
+}
+
+#[test]
+fn a_new_token_is_part_of_the_address_that_is_shown_and_opens_the_panel() {
+    let new = PanelOptions { token: PanelToken::New, ..options(None) };
+    let shown = Shown::with(config("first.toml"), SessionOptions::default(), &new);
+    let address = shown.address();
+    let token = shown.panel.url().strip_prefix(&format!("http://{address}/#token=")).unwrap();
+    assert_eq!(token.len(), 32);
+    assert_eq!(get(address, "/api/machine", "X-Takt-Panel: 1\r\n").0, 401);
+    let headers = format!("X-Takt-Panel: 1\r\nAuthorization: Bearer {token}\r\n");
+    assert_eq!(get(address, "/api/machine", &headers).0, 200);
 }

@@ -10,7 +10,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use takt::internals::panel::{Listening, Panel, PanelOptions};
+use takt::internals::panel::{Listening, Panel, PanelOptions, PanelToken};
 use takt::{Config, Controller, Phase, SessionOptions};
 
 pub const LONG: Duration = Duration::from_secs(30);
@@ -26,7 +26,8 @@ pub fn config(name: &str) -> Config {
 }
 
 pub fn options(token: Option<&str>) -> PanelOptions {
-    PanelOptions { address: "127.0.0.1:0".parse().unwrap(), token: token.map(str::to_owned), origins: vec![] }
+    let token = token.map_or(PanelToken::Open, |token| PanelToken::Given(token.to_owned()));
+    PanelOptions { address: "127.0.0.1:0".parse().unwrap(), token, origins: vec![] }
 }
 
 /// A controller with its panel. The panel is dropped first.

@@ -37,8 +37,8 @@ function start(...command) {
     let said = "";
     process_.stderr.on("data", (data) => {
       said += data;
-      const found = /http:\/\/[^/]+\//.exec(said);
-      if (found) resolve({ process: process_, address: found[0], said: () => said });
+      const found = /(http:\S+), until/.exec(said);
+      if (found) resolve({ process: process_, address: found[1], said: () => said });
     });
     process_.on("exit", (code) => reject(new Error(`takt has ended with ${code}: ${said}`)));
   });
@@ -60,7 +60,7 @@ class Panel {
     const problems = [];
     page.on("pageerror", (error) => problems.push(String(error)));
     page.on("console", (message) => message.type() === "error" && !/status of 4\d\d|ERR_CONNECTION|ERR_INCOMPLETE|ERR_EMPTY/.test(message.text()) && problems.push(message.text()));
-    page.on("request", (request) => request.url().startsWith(address) || problems.push(`asks elsewhere: ${request.url()}`));
+    page.on("request", (request) => request.url().startsWith(new URL(address).origin) || problems.push(`asks elsewhere: ${request.url()}`));
     await page.goto(address);
     await page.locator("#link.live").waitFor({ timeout: LONG });
     await page.locator(rows).first().waitFor({ timeout: LONG });

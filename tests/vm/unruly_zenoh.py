@@ -89,7 +89,7 @@ class Unruly:
         time.sleep(0.5)
 
     def keep_a_bridge(self, served):
-        words = [os.environ["TAKT_ZENOH"], served, "--connect", ENDPOINT, "--listen", "tcp/127.0.0.1:0", "--domain", "0"]
+        words = [os.environ["TAKT_ZENOH"], served, "--connect", ENDPOINT, "--listen", "tcp/127.0.0.1:0", "--domain", "0", "--command"]
         bridge = subprocess.Popen(words, stderr=subprocess.DEVNULL)
         self.has_moved.wait()
         self.is_over.wait(LIFE_OF_A_BRIDGE_S)

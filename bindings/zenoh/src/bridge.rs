@@ -33,8 +33,8 @@ pub struct Options {
     pub node: String,
     /// The topic of the joint states, from the root.
     pub states: String,
-    /// The topic of the joint trajectories, from the root.
-    pub trajectories: String,
+    /// The topic of the joint trajectories, from the root. `None`: nobody commands the axes by it.
+    pub trajectories: Option<String>,
     /// Joint states a second, at most one a cycle.
     pub rate_hz: f64,
     /// The endpoints that are connected to: `tcp/localhost:7447` is the router of rmw_zenoh.
@@ -95,19 +95,19 @@ pub struct Bridge {
     gid: Gid,
     inbox: Arc<Inbox>,
     // In the graph for as long as they are here. The session closes after what it has declared.
-    _subscriber: Subscriber<()>,
-    _tokens: [LivelinessToken; 3],
+    _subscriber: Option<Subscriber<()>>,
+    _tokens: Vec<LivelinessToken>,
     _session: Session,
 }
 
 impl Bridge {
-    /// Connects to the controller and to the graph. From now on a trajectory without points stops the axes at once, and those with points
-    /// wait for [`Bridge::run`]. `lost` is called for each one that is lost because too many wait.
+    /// Connects to the controller and to the graph. If trajectories are taken, one without points stops the axes at once from now on, and
+    /// those with points wait for [`Bridge::run`]. `lost` is called for each one that is lost because too many wait.
     ///
     /// # Errors
     /// See [`BridgeError`].
     pub fn open(options: Options, lost: impl Fn() + Send + Sync + 'static) -> Result<Self, BridgeError> {
-        for topic in [&options.states, &options.trajectories] {
+        for topic in [&options.states].into_iter().chain(&options.trajectories) {
             if !is_topic(topic) {
                 return Err(BridgeError::Topic { given: topic.clone() });
             }
@@ -128,32 +128,25 @@ impl Bridge {
             is_humble: options.is_humble,
         };
         let states = node.endpoint(1, Kind::Publisher, &options.states, &JOINT_STATE);
-        let trajectories = node.endpoint(2, Kind::Subscription, &options.trajectories, &JOINT_TRAJECTORY);
         let gid = gid(&states);
         let publisher = session
             .declare_publisher(node.topic(&options.states, &JOINT_STATE))
             .wait()
             .map_err(refused("the topic of the joint states"))?;
         let inbox = Arc::new(Inbox::default());
-        let (receiving, stopping) = (Arc::clone(&inbox), controller.clone());
-        let subscriber = session
-            .declare_subscriber(node.topic(&options.trajectories, &JOINT_TRAJECTORY))
-            .callback(move |sample| {
-                let message = sample.payload().to_bytes().into_owned();
-                if JointTrajectory::decode(&message).is_some_and(|trajectory| trajectory.points.is_empty()) {
-                    receiving.put_stop(message);
-                    // It waits for nobody. The thread that carries commands out stops once more, and says why it cannot.
-                    let _ = stopping.stop(StopCategory::Two);
-                } else if !receiving.put(message) {
-                    lost();
-                }
-            })
-            .wait()
-            .map_err(refused("the topic of the trajectories"))?;
+        let subscriber = options.trajectories.as_ref().map(|topic| {
+            let (receiving, stopping) = (Arc::clone(&inbox), controller.clone());
+            subscribe(&session, node.topic(topic, &JOINT_TRAJECTORY), receiving, stopping, lost)
+        });
+        let subscriber = subscriber.transpose()?;
         let token = |key: String| {
             session.liveliness().declare_token(key).wait().map_err(refused("a liveliness token"))
         };
-        let tokens = [token(node.token())?, token(states)?, token(trajectories)?];
+        let trajectories = options.trajectories.as_ref();
+        let trajectories =
+            trajectories.map(|topic| node.endpoint(2, Kind::Subscription, topic, &JOINT_TRAJECTORY));
+        let tokens = [node.token(), states].into_iter().chain(trajectories);
+        let tokens = tokens.map(token).collect::<Result<_, _>>()?;
         Ok(Self {
             controller,
             options,
@@ -288,6 +281,30 @@ impl Bridge {
             },
         }
     }
+}
+
+/// Receives trajectories from now on.
+fn subscribe(
+    session: &Session,
+    topic: String,
+    receiving: Arc<Inbox>,
+    stopping: Client,
+    lost: impl Fn() + Send + Sync + 'static,
+) -> Result<Subscriber<()>, BridgeError> {
+    session
+        .declare_subscriber(topic)
+        .callback(move |sample| {
+            let message = sample.payload().to_bytes().into_owned();
+            if JointTrajectory::decode(&message).is_some_and(|trajectory| trajectory.points.is_empty()) {
+                receiving.put_stop(message);
+                // It waits for nobody. The thread that carries commands out stops once more, and says why it cannot.
+                let _ = stopping.stop(StopCategory::Two);
+            } else if !receiving.put(message) {
+                lost();
+            }
+        })
+        .wait()
+        .map_err(refused("the topic of the trajectories"))
 }
 
 /// A trajectory that waits for its time.

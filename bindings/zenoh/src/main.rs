@@ -3,7 +3,7 @@
 use clap::Parser;
 use takt_zenoh::{Bridge, BridgeError, Options};
 
-/// Publish the joint states of a takt controller, and carry out joint trajectories, as a node of ROS 2 under rmw_zenoh
+/// Publish the joint states of a takt controller, and carry out joint trajectories with --command, as a node of ROS 2 under rmw_zenoh
 #[derive(Parser)]
 #[command(version)]
 struct Arguments {
@@ -18,8 +18,11 @@ struct Arguments {
     /// The topic of the joint states
     #[arg(long, default_value = "/joint_states")]
     states: String,
+    /// Carry out joint trajectories. WARNING: everyone who reaches the endpoints of zenoh commands the axes; there is no password
+    #[arg(long)]
+    command: bool,
     /// The topic of the joint trajectories
-    #[arg(long, default_value = "/joint_trajectory_controller/joint_trajectory")]
+    #[arg(long, requires = "command", default_value = "/joint_trajectory_controller/joint_trajectory")]
     trajectories: String,
     /// Joint states a second
     #[arg(long, value_name = "HZ", default_value_t = 100.0)]
@@ -36,14 +39,14 @@ struct Arguments {
 }
 
 fn main() -> std::process::ExitCode {
-    let Arguments { name, domain, node, states, trajectories, rate, connect, listen, humble } =
+    let Arguments { name, domain, node, states, command, trajectories, rate, connect, listen, humble } =
         Arguments::parse();
     let options = Options {
         controller: name,
         domain,
         node,
         states,
-        trajectories,
+        trajectories: command.then_some(trajectories),
         rate_hz: rate,
         connect,
         listen,
@@ -64,6 +67,14 @@ fn run(options: Options) -> Result<(), BridgeError> {
         (options.controller.clone(), options.states.clone(), options.trajectories.clone());
     let lost = || eprintln!("takt-zenoh: the oldest trajectory was lost: too many wait to be carried out");
     let bridge = Bridge::open(options, lost)?;
-    eprintln!("takt-zenoh: {controller} publishes {states} and takes {trajectories}");
+    match trajectories {
+        None => {
+            eprintln!("takt-zenoh: {controller} publishes {states}, and takes no commands (--command lets it)")
+        }
+        Some(topic) => {
+            eprintln!("takt-zenoh: warning: everyone who reaches the endpoints of zenoh commands the axes");
+            eprintln!("takt-zenoh: {controller} publishes {states} and takes {topic}");
+        }
+    }
     bridge.run(|| false, |words| eprintln!("takt-zenoh: {words}"))
 }

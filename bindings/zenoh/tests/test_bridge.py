@@ -75,7 +75,7 @@ def bridge(arm, peer, tmp_path_factory):
     _, endpoint = peer
     said = tmp_path_factory.mktemp("bridge") / "said.txt"
     listen = "tcp/127.0.0.1:0"
-    words = [TAKT_ZENOH, arm, "--connect", endpoint, "--listen", listen, "--domain", "0"]
+    words = [TAKT_ZENOH, arm, "--connect", endpoint, "--listen", listen, "--domain", "0", "--command"]
     program = start(words, said)
     program.wait_for("publishes /joint_states")
     yield program
@@ -224,5 +224,17 @@ def test_the_commands_of_the_page_move_the_arm(peer, tmp_path):
     session.put(key(publish[4].strip("/"), publish[5]), message)
     wait_until(received, lambda now: abs(now.position[0] - 0.3) < 0.005)
     subscriber.undeclare()
+    end(bridge)
+    end(served)
+
+
+def test_without_command_it_only_publishes(peer, tmp_path):
+    served = start([TAKT, "run", ROOT / "configs/arm6-erob.toml", "--serve", tmp_path / "arm"], tmp_path / "takt.txt")
+    served.wait_for("served by the name")
+    words = [TAKT_ZENOH, tmp_path / "arm", "--connect", peer[1], "--listen", "tcp/127.0.0.1:0", "--domain", "7"]
+    bridge = start(words, tmp_path / "bridge.txt")
+    bridge.wait_for("takes no commands")
+    replies = peer[0].liveliness().get("@ros2_lv/7/**", timeout=10.0)
+    assert sorted(str(reply.ok.key_expr).split("/")[5] for reply in replies) == ["MP", "NN"]
     end(bridge)
     end(served)

@@ -207,7 +207,7 @@ fn offered(
         bar.suspend(|| say!("takt: served by the name {name}, until Ctrl-C"));
     }
     if let Some(panel) = &panel {
-        bar.suspend(|| say!("takt: {}", panel::greeting(panel.address())));
+        bar.suspend(|| say!("takt: {}", panel::greeting(panel)));
     }
     Ok(controller.ended()?)
 }

@@ -10,6 +10,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ),
     ("the request comes from a page of another site, {0}", "请求来自其他站点 {0} 的页面"),
     ("the panel needs its token", "面板需要令牌"),
+    ("this is not the token of the panel", "令牌与本面板不符"),
     ("the header {0} is missing", "缺少请求头 {0}"),
     ("a command is application/json", "指令须为 application/json"),
     ("a command has at most {0} bytes", "指令最多 {0} 字节"),

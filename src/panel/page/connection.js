@@ -4,8 +4,21 @@ const CONFIRM_EVERY_MS = 300;
 const SILENT_AFTER_MS = 3000;
 const AGAIN_AFTER_MS = 1000;
 
+// The token of the address that takt has printed. It leaves the address, so that no history and no bookmark keeps it.
+function tokenOfAddress() {
+  const token = new URLSearchParams(location.hash.slice(1)).get("token");
+  if (token) {
+    sessionStorage.setItem("takt.token", token);
+    history.replaceState(null, "", location.pathname);
+  }
+  return sessionStorage.getItem("takt.token");
+}
+
+// A new address of the same page loads nothing by itself.
+addEventListener("hashchange", () => location.reload());
+
 export class Connection {
-  #token = sessionStorage.getItem("takt.token");
+  #token = tokenOfAddress();
   #key = null;
   #number = 0;
   #confirmedAt = 0;

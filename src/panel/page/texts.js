@@ -102,7 +102,7 @@ export const TEXTS = {
   outside: ["{0} is outside {1} to {2}", "{0} 超出范围 {1} 至 {2}"],
   token: ["Token", "令牌"],
   token_title: ["This panel needs a token", "此面板需要令牌"],
-  token_words: ["It is in the file that takt was started with (--panel-token).", "令牌位于启动 takt 时指定的文件中（--panel-token）。"],
+  token_words: ["It is in the address that takt printed, or in the file that takt was started with (--panel-token).", "令牌在 takt 启动时显示的网址中，或在启动时指定的文件中（--panel-token）。"],
   open: ["Open", "打开"],
   fault_of: ["Fault: {0}", "故障：{0}"],
   drive_error: ["The drive of {0} shows an error", "{0} 的驱动器报告错误"],

@@ -42,7 +42,7 @@ beside_takt() { # PROGRAM...
 }
 over_zenoh() { # PROGRAM...
     local endpoint=tcp/127.0.0.1:7447 bridge status
-    chrt --other 0 "$TAKT_ZENOH" "$served" --connect $endpoint --listen tcp/127.0.0.1:0 --domain 0 2> "$OUT/bridge.txt" & bridge=$!
+    chrt --other 0 "$TAKT_ZENOH" "$served" --connect $endpoint --listen tcp/127.0.0.1:0 --domain 0 --command 2> "$OUT/bridge.txt" & bridge=$!
     "$@" $endpoint; status=$?
     # bash has its background processes ignore SIGINT, and the bridge leaves that as it is.
     kill $bridge; wait $bridge

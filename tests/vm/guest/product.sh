@@ -120,7 +120,7 @@ beside_clients() { # idle|load ALLOWANCE
     try beside "bad ros2_control" "$arm_vcan" "$@" "$UNRULY_ROS2"
     try attended "bad zenoh nodes" "$@" nodes --serve "$OUT/served"
     # Pages and monitors are a load themselves.
-    try attended "watched" "$1" $load_allowance pages_and_monitors --panel 127.0.0.1:8080
+    try attended "watched" "$1" $load_allowance pages_and_monitors --panel 127.0.0.1:8080 --panel-open
 }
 
 # With a front for others, beside those who use it: a function has them come, and returns when they are at work; another one has them go.
