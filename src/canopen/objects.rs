@@ -60,6 +60,14 @@ pub const PROFILE_VELOCITY: Object = Object::new(0x6081, 0, DataType::U32, "prof
 pub const PROFILE_ACCELERATION: Object = Object::new(0x6083, 0, DataType::U32, "profile acceleration");
 /// 6084
 pub const PROFILE_DECELERATION: Object = Object::new(0x6084, 0, DataType::U32, "profile deceleration");
+/// 607F
+pub const MAX_PROFILE_VELOCITY: Object = Object::new(0x607F, 0, DataType::U32, "max profile velocity");
+/// 6086
+pub const MOTION_PROFILE_TYPE: Object = Object::new(0x6086, 0, DataType::I16, "motion profile type");
+/// 60C5
+pub const MAX_ACCELERATION: Object = Object::new(0x60C5, 0, DataType::U32, "max acceleration");
+/// 60C6
+pub const MAX_DECELERATION: Object = Object::new(0x60C6, 0, DataType::U32, "max deceleration");
 /// 6085
 pub const QUICK_STOP_DECELERATION: Object = Object::new(0x6085, 0, DataType::U32, "quick stop deceleration");
 /// 60B0

@@ -190,6 +190,20 @@ impl<'a> AxisSession<'a> {
         self.settled(read)
     }
 
+    /// Reads a number from an object that the drive may lack or refuse, and compares it.
+    pub async fn compare_optional(&self, object: Object, expected: Check) -> StepResult {
+        let object = self.of_axis(object);
+        let read = match self.number(object, Access::Read, expected).await {
+            Ok(received) => compared(object, Access::Read, expected, received),
+            Err(FailureCause::Transfer { error, .. }) if self.may_refuse(error) => {
+                self.note_absent(object.address);
+                Ok(())
+            }
+            Err(cause) => Err(cause),
+        };
+        self.settled(read)
+    }
+
     /// Reads a text from an object that the drive may lack or refuse.
     pub async fn read_text(
         &self,

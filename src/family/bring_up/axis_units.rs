@@ -14,6 +14,27 @@ pub fn counts(axis: &Axis, distance: f64) -> i64 {
     (turns(axis, distance) * axis.counts_per_turn).round().clamp(1.0, u32::MAX.into()) as i64
 }
 
+/// A velocity in the drive's units of velocities (60FF).
+pub fn velocity_units(axis: &Axis, velocity: f64) -> i64 {
+    motion_units(axis, velocity, 1.0)
+}
+
+/// A velocity in the drive's units of profile velocities (6081).
+pub fn profile_velocity_units(axis: &Axis, velocity: f64) -> i64 {
+    motion_units(axis, velocity, axis.drive.profile_velocity_units_per_velocity_unit(axis.counts_per_turn))
+}
+
+/// An acceleration in the drive's units (6083).
+pub fn acceleration_units(axis: &Axis, acceleration: f64) -> i64 {
+    motion_units(axis, acceleration, axis.drive.acceleration_units_per_velocity_unit(axis.counts_per_turn))
+}
+
+/// A velocity or an acceleration in units, of which so many are one unit of velocity (in a second): at least 1.
+fn motion_units(axis: &Axis, value: f64, per_velocity_unit: f64) -> i64 {
+    let per_count = axis.drive.velocity_units_per_turn(axis.counts_per_turn) / axis.counts_per_turn;
+    ((counts(axis, value) as f64 * per_count * per_velocity_unit).round() as i64).max(1)
+}
+
 /// A time in this unit, rounded up.
 pub fn rounded_up(ns: Nanoseconds, unit_ns: Nanoseconds) -> i64 {
     i64::try_from(ns.div_ceil(unit_ns)).unwrap_or(i64::MAX)

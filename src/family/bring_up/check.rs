@@ -26,7 +26,13 @@ pub enum Check {
     /// A statusword of a state without torque.
     NoTorque,
     /// A velocity of at most this many drive units in either direction.
+    Standstill(i64),
+    /// At most this.
     AtMost(i64),
+    /// At least this.
+    AtLeast(i64),
+    /// A bound of at least this, or 0 for none.
+    BoundAbove(i64),
     /// More than zero.
     Positive,
 }
@@ -41,7 +47,10 @@ impl Check {
             Self::Profile(profile) => value & 0xFFFF == i64::from(profile),
             Self::Supports(mode) => value & i64::from(mode.supported_bit()) != 0,
             Self::NoTorque => !DriveState::decode(value as u16).has_torque(),
-            Self::AtMost(limit) => value.abs() <= limit,
+            Self::Standstill(limit) => value.abs() <= limit,
+            Self::AtMost(limit) => value <= limit,
+            Self::AtLeast(limit) => value >= limit,
+            Self::BoundAbove(limit) => value == 0 || value >= limit,
             Self::Positive => value > 0,
         }
     }
@@ -49,8 +58,10 @@ impl Check {
     /// A value that meets the condition, for a dry run without a drive.
     pub(super) const fn example(self) -> i64 {
         match self {
-            Self::Any | Self::NoTorque | Self::AtMost(_) => 0,
-            Self::Equals(value) | Self::Masked { value, .. } => value,
+            Self::Any | Self::NoTorque | Self::Standstill(_) | Self::BoundAbove(_) => 0,
+            Self::Equals(value) | Self::Masked { value, .. } | Self::AtMost(value) | Self::AtLeast(value) => {
+                value
+            }
             Self::Profile(profile) => profile as i64,
             Self::Supports(mode) => mode.supported_bit() as i64,
             Self::Positive => 1,
@@ -68,7 +79,10 @@ impl Check {
                 format!("bit {} ({})", mode.supported_bit().trailing_zeros(), mode.name())
             }
             Self::NoTorque => "a state without torque".into(),
-            Self::AtMost(limit) => format!("standstill (at most {limit})"),
+            Self::Standstill(limit) => format!("standstill (at most {limit})"),
+            Self::AtMost(limit) => format!("at most {limit}"),
+            Self::AtLeast(limit) => format!("at least {limit}"),
+            Self::BoundAbove(limit) => format!("at least {limit}, or 0 for no bound"),
             Self::Positive => "more than zero".into(),
         }
     }
@@ -101,7 +115,10 @@ mod tests {
             Check::Profile(402),
             Check::Supports(OperationMode::CyclicSynchronousPosition),
             Check::NoTorque,
-            Check::AtMost(0),
+            Check::Standstill(0),
+            Check::AtMost(-3),
+            Check::AtLeast(3),
+            Check::BoundAbove(3),
             Check::Positive,
         ] {
             assert!(check.passes(check.example()), "{check:?}");

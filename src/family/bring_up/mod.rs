@@ -21,6 +21,7 @@ pub mod identity;
 pub(crate) mod mapped_objects;
 mod network_state;
 pub mod pdo_mapping;
+pub(crate) mod planner;
 mod process_data;
 mod reported_mapping;
 mod shared_commands;

@@ -11,11 +11,13 @@ use crate::canopen::nmt::{NmtCommand, NmtState};
 use crate::canopen::object::{DataType, Object};
 use crate::canopen::objects::*;
 use crate::config::{PdoMapping, Supervision};
-use crate::family::bring_up::axis_units::{counts, interpolation_time, rounded_up};
+use crate::family::bring_up::axis_units::{
+    acceleration_units, counts, interpolation_time, profile_velocity_units, rounded_up, velocity_units,
+};
 use crate::family::bring_up::configuration_file::{self, write_unless_in_file};
 use crate::family::bring_up::{
     AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat, identity,
-    pdo_mapping,
+    pdo_mapping, planner,
 };
 use crate::family::stops_by_itself_after;
 
@@ -53,6 +55,7 @@ impl Sheet<'_> {
         self.mode().await?;
         self.ratings().await?;
         self.limits().await?;
+        planner::check(c).await?;
         self.target_at_actual_position().await?;
         if c.is_last_of_node() {
             self.heartbeats().await?;
@@ -137,8 +140,8 @@ impl Sheet<'_> {
     async fn stop_motion(&self) -> StepResult {
         let (c, limits) = (self.c, &self.c.axis.limits);
         if self.device.is_writable(QUICK_STOP_DECELERATION.address) {
-            write_unless_in_file(c, QUICK_STOP_DECELERATION, self.acceleration_units(limits.deceleration))
-                .await?;
+            let deceleration = acceleration_units(c.axis, limits.deceleration);
+            write_unless_in_file(c, QUICK_STOP_DECELERATION, deceleration).await?;
         }
         c.write(CONTROLWORD, controlword::QUICK_STOP.into()).await?;
         let stopping_ns = (limits.velocity / limits.deceleration * 1e9) as Nanoseconds;
@@ -147,32 +150,8 @@ impl Sheet<'_> {
             return Ok(());
         }
         let within_ns = c.timing.confirm_timeout_ns.saturating_add(stopping_ns);
-        let standstill = Check::AtMost((self.velocity_units(limits.velocity) / 100).max(1));
+        let standstill = Check::Standstill((velocity_units(c.axis, limits.velocity) / 100).max(1));
         c.wait_for(VELOCITY_ACTUAL_VALUE, standstill, within_ns, |_, _| ()).await
-    }
-
-    /// A velocity in the drive's units.
-    fn velocity_units(&self, velocity: f64) -> i64 {
-        self.motion_units(velocity, 1.0)
-    }
-
-    /// A velocity in the drive's units of profile velocities (6081).
-    fn profile_velocity_units(&self, velocity: f64) -> i64 {
-        let axis = self.c.axis;
-        self.motion_units(velocity, axis.drive.profile_velocity_units_per_velocity_unit(axis.counts_per_turn))
-    }
-
-    /// An acceleration in the drive's units.
-    fn acceleration_units(&self, acceleration: f64) -> i64 {
-        let axis = self.c.axis;
-        self.motion_units(acceleration, axis.drive.acceleration_units_per_velocity_unit(axis.counts_per_turn))
-    }
-
-    /// A velocity or an acceleration in units, of which so many are one unit of velocity (in a second).
-    fn motion_units(&self, value: f64, per_velocity_unit: f64) -> i64 {
-        let axis = self.c.axis;
-        let per_count = axis.drive.velocity_units_per_turn(axis.counts_per_turn) / axis.counts_per_turn;
-        ((counts(axis, value) as f64 * per_count * per_velocity_unit).round() as i64).max(1)
     }
 
     async fn synchronisation(&self) -> StepResult {
@@ -264,14 +243,14 @@ impl Sheet<'_> {
             let error =
                 if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
             self.limit(FOLLOWING_ERROR_WINDOW, counts(axis, error)).await?;
-            self.limit(PROFILE_VELOCITY, self.profile_velocity_units(limits.velocity)).await?;
+            self.limit(PROFILE_VELOCITY, profile_velocity_units(axis, limits.velocity)).await?;
         }
         for (object, acceleration) in [
             (PROFILE_ACCELERATION, limits.acceleration),
             (PROFILE_DECELERATION, limits.deceleration),
             (QUICK_STOP_DECELERATION, limits.deceleration),
         ] {
-            self.limit(object, self.acceleration_units(acceleration)).await?;
+            self.limit(object, acceleration_units(axis, acceleration)).await?;
         }
         Ok(())
     }

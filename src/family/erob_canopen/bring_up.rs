@@ -11,7 +11,9 @@ use crate::config::{Axis, Control, PdoMapping};
 use crate::family::bring_up::axis_units::{counts, interpolation_time, rounded_up};
 use crate::family::bring_up::configuration_file::write_unless_in_file;
 use crate::family::bring_up::{AxisSession, Check, ProcessData, RESTART_STEP, StepResult};
-use crate::family::bring_up::{actual_position, configuration_file, heartbeat, identity, pdo_mapping};
+use crate::family::bring_up::{
+    actual_position, configuration_file, heartbeat, identity, pdo_mapping, planner,
+};
 
 /// Number of RPDOs, and of TPDOs.
 const PDO_COUNT: u8 = 4;
@@ -36,6 +38,7 @@ pub(super) async fn configure(c: &AxisSession<'_>) -> StepResult {
     mode(c).await?;
     ratings(c).await?;
     limits(c).await?;
+    planner::check(c).await?;
     target_at_actual_position(c).await?;
     heartbeats(c).await
 }
@@ -103,7 +106,7 @@ async fn stop_motion(c: &AxisSession<'_>) -> StepResult {
     let stopping_ns = (limits.velocity / limits.deceleration * 1e9) as Nanoseconds;
     let within_ns = c.timing.confirm_timeout_ns.saturating_add(stopping_ns);
     // The brake may engage below a tenth of the highest speed; a hundredth leaves a wide margin.
-    let standstill = Check::AtMost(counts(c.axis, limits.velocity) / 100);
+    let standstill = Check::Standstill(counts(c.axis, limits.velocity) / 100);
     c.wait_for(VELOCITY_ACTUAL_VALUE, standstill, within_ns, |_, _| ()).await
 }
 

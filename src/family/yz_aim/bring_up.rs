@@ -71,7 +71,7 @@ async fn come_to_rest(c: &AxisSession<'_>) -> StepResult {
     if c.facts().state().has_torque() {
         // Halt (controlword bit 8) stops with the drive's own deceleration and keeps the shaft locked.
         c.write(CONTROLWORD, (controlword::ENABLE_OPERATION | controlword::HALT).into()).await?;
-        c.wait_for(VELOCITY_ACTUAL_VALUE, Check::AtMost(STANDSTILL), within_ns, |_, _| ()).await?;
+        c.wait_for(VELOCITY_ACTUAL_VALUE, Check::Standstill(STANDSTILL), within_ns, |_, _| ()).await?;
     }
     c.write(CONTROLWORD, controlword::DISABLE_VOLTAGE.into()).await?;
     // Homing runs without a controlword; only another mode ends it.

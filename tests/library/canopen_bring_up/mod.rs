@@ -3,6 +3,7 @@
 
 mod configuration_file;
 mod failures;
+mod planner;
 mod scripted_drive;
 mod world;
 

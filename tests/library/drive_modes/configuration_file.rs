@@ -10,7 +10,7 @@ use takt::config::Config;
 
 use crate::drive_modes::one_yz_aim::one_yz_aim;
 use crate::drive_modes::wire::id;
-use crate::drive_modes::world::{World, parse};
+use crate::drive_modes::world::{World, load, parse};
 
 /// A YZ-AIM that interpolates and moves a little.
 fn yz_aim() -> Config {
@@ -116,4 +116,17 @@ fn the_file_wins_over_the_settings_of_bring_up_and_what_is_overwritten_is_said()
         to_drive.filter(|frame| frame.payload().starts_with(&[0x23, 0x85, 0x60, 0])).collect();
     assert_eq!(written.len(), 1, "{written:?}");
     assert_eq!(written[0].payload()[4..], 123_456_u32.to_le_bytes());
+}
+
+#[test]
+fn a_file_by_which_a_drive_brakes_less_than_planned_is_refused_with_object_and_value() {
+    for object in ["60C6", "6084"] {
+        let mut config = load("erob-modes/erob-pv.toml");
+        let dictionary = eds::parse("servo.dcf", entry(object, 7, "20000").as_bytes()).unwrap().dictionary;
+        config.axes[0].dcf = Some(DeviceConfiguration::of(Path::new("servo.dcf"), &dictionary, 1));
+        let (_, text) = refusal(config);
+        for part in ["planner of the drive", object, "20000", "at least"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
 }
