@@ -21,7 +21,7 @@ pub enum Fault {
         /// The limit that it breaks.
         limit: f64,
     },
-    /// A set-point asked for more than the velocity limit; in a profile mode, the joint was faster.
+    /// A set-point asked for more than the velocity limit.
     VelocityLimit {
         /// The velocity.
         velocity: f64,
@@ -113,6 +113,28 @@ pub enum Fault {
     DriveLocal {
         /// Object 6041.
         statusword: u16,
+    },
+    /// The joint of an enabled drive is beyond a position limit by more than the following error limit.
+    MeasuredPosition {
+        /// Where it is.
+        position: f64,
+        /// The limit.
+        limit: f64,
+    },
+    /// The joint of an enabled drive is more than a fifth faster than its velocity limit.
+    MeasuredVelocity {
+        /// Its velocity.
+        velocity: f64,
+        /// The highest speed.
+        limit: f64,
+    },
+    /// An enabled drive exerts more than a fifth more torque than the torque limit, and not the torque to which it limits itself
+    /// (object 6072).
+    MeasuredTorque {
+        /// Object 6077 in N·m (N).
+        torque: f64,
+        /// The highest torque.
+        limit: f64,
     },
     /// A drive shows another mode of operation than the one that it was set to.
     ModeChanged {
@@ -264,6 +286,9 @@ impl Fault {
             Self::NotDisabled { .. } => Rule::NotDisabled,
             Self::DriveEnabled { .. } => Rule::DriveEnabled,
             Self::DriveLocal { .. } => Rule::DriveLocal,
+            Self::MeasuredPosition { .. } => Rule::MeasuredPosition,
+            Self::MeasuredVelocity { .. } => Rule::MeasuredVelocity,
+            Self::MeasuredTorque { .. } => Rule::MeasuredTorque,
         }
     }
 
@@ -272,8 +297,13 @@ impl Fault {
     pub fn numbers(&self) -> (f64, f64) {
         match *self {
             Self::NotFinite { position } => (position, 0.0),
-            Self::PositionLimit { position, limit } => (position, limit),
-            Self::VelocityLimit { velocity, limit } => (velocity, limit),
+            Self::PositionLimit { position, limit } | Self::MeasuredPosition { position, limit } => {
+                (position, limit)
+            }
+            Self::VelocityLimit { velocity, limit } | Self::MeasuredVelocity { velocity, limit } => {
+                (velocity, limit)
+            }
+            Self::MeasuredTorque { torque, limit } => (torque, limit),
             Self::AccelerationLimit { acceleration, limit } => (acceleration, limit),
             Self::JerkLimit { jerk, limit } => (jerk, limit),
             Self::StartPose { distance, limit } => (distance, limit),
@@ -366,6 +396,9 @@ impl Fault {
             }
             Rule::DriveEnabled => Self::DriveEnabled { state: drive_state(seen)? },
             Rule::DriveLocal => Self::DriveLocal { statusword: seen as u16 },
+            Rule::MeasuredPosition => Self::MeasuredPosition { position: seen, limit: allowed },
+            Rule::MeasuredVelocity => Self::MeasuredVelocity { velocity: seen, limit: allowed },
+            Rule::MeasuredTorque => Self::MeasuredTorque { torque: seen, limit: allowed },
         })
     }
 }

@@ -54,6 +54,8 @@ pub enum Request<const AXES: usize = MAX_AXES> {
         axis: u8,
         /// Object 6076 in N·m (N for a linear axis).
         torque: f64,
+        /// Object 6072 in thousandths of that: the torque to which the drive limits itself, if it has told.
+        limit_per_mille: Option<u16>,
     },
     /// Exchange this process data with an axis' drive, as the drive has reported it, before anything moves.
     ProcessData(AxisProcessData),

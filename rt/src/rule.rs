@@ -81,11 +81,17 @@ pub enum Rule {
     DriveEnabled = 34,
     /// [`Fault::DriveLocal`].
     DriveLocal = 35,
+    /// [`Fault::MeasuredPosition`].
+    MeasuredPosition = 36,
+    /// [`Fault::MeasuredVelocity`].
+    MeasuredVelocity = 37,
+    /// [`Fault::MeasuredTorque`].
+    MeasuredTorque = 38,
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 36] = [
+    pub const ALL: [Self; 39] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -122,6 +128,9 @@ impl Rule {
         Self::NotDisabled,
         Self::DriveEnabled,
         Self::DriveLocal,
+        Self::MeasuredPosition,
+        Self::MeasuredVelocity,
+        Self::MeasuredTorque,
     ];
 
     /// Its word in configurations and reports.
@@ -163,6 +172,9 @@ impl Rule {
             Self::NotDisabled => "not_disabled",
             Self::DriveEnabled => "drive_enabled",
             Self::DriveLocal => "drive_local",
+            Self::MeasuredPosition => "measured_position",
+            Self::MeasuredVelocity => "measured_velocity",
+            Self::MeasuredTorque => "measured_torque",
         }
     }
 
@@ -193,6 +205,9 @@ impl Rule {
             | Self::NotDisabled
             | Self::DriveEnabled
             | Self::DriveLocal
+            | Self::MeasuredPosition
+            | Self::MeasuredVelocity
+            | Self::MeasuredTorque
             | Self::ModeChanged
             | Self::ModeNotShown
             | Self::EnableTimeout

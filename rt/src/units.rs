@@ -131,6 +131,12 @@ impl Scale {
         self.counts_per_unit.abs()
     }
 
+    /// The way of one count: rad (m), negative where the joint counts backwards.
+    #[inline]
+    pub const fn way_per_count(&self) -> f64 {
+        self.units_per_count
+    }
+
     /// Position (rad or m) to counts, to the nearest; beyond 32 bits the nearest end.
     #[inline]
     pub fn position_to_counts(&self, position: f64) -> i32 {

@@ -58,6 +58,9 @@ pub fn put_entry(entry: &JournalEntry, put: &mut Put) {
     }
 }
 
+/// Stands for the torque limit of a drive that has not told it.
+const UNLIMITED: u64 = u64::MAX;
+
 /// An entry of words.
 pub fn take_entry(take: &mut Take<'_>) -> Result<JournalEntry, Malformed> {
     let cycle = take.word()?;
@@ -121,8 +124,8 @@ fn put_request(envelope: &RequestEnvelope, put: &mut Put) {
         Request::TimeOfDay { at_zero_ns } => {
             put.word(*at_zero_ns);
         }
-        Request::RatedTorque { axis, torque } => {
-            put.word((*axis).into()).number(*torque);
+        Request::RatedTorque { axis, torque, limit_per_mille } => {
+            put.word((*axis).into()).number(*torque).word(limit_per_mille.map_or(UNLIMITED, u64::from));
         }
         Request::ProcessData(data) => put_process_data(data, put),
         Request::Position { axis, counts } => {
@@ -186,7 +189,14 @@ fn take_request(take: &mut Take<'_>) -> Result<RequestEnvelope, Malformed> {
     let request = match one_of(take, RequestKind::ALL, |kind| kind as u64)? {
         RequestKind::Sync => Request::Sync(flag(take)?),
         RequestKind::TimeOfDay => Request::TimeOfDay { at_zero_ns: take.word()? },
-        RequestKind::RatedTorque => Request::RatedTorque { axis: byte(take)?, torque: take.number()? },
+        RequestKind::RatedTorque => Request::RatedTorque {
+            axis: byte(take)?,
+            torque: take.number()?,
+            limit_per_mille: match take.word()? {
+                UNLIMITED => None,
+                limit => Some(u16::try_from(limit).map_err(|_| Malformed)?),
+            },
+        },
         RequestKind::ProcessData => Request::ProcessData(take_process_data(take)?),
         RequestKind::Position => Request::Position { axis: byte(take)?, counts: take.word()? as u32 as i32 },
         RequestKind::Activate => Request::Activate,

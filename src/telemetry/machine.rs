@@ -90,6 +90,14 @@ impl Unit {
         }
     }
 
+    /// `Nm` or `N`.
+    pub(crate) const fn effort_symbol(self) -> &'static str {
+        match self {
+            Self::Radian => "Nm",
+            Self::Metre => "N",
+        }
+    }
+
     /// `mrad` or `mm`.
     pub(crate) const fn milli_symbol(self) -> &'static str {
         match self {

@@ -18,7 +18,7 @@ pub fn request(config: &Config, now_ns: u64, input: &mut Input<'_>) -> Request {
     let categories = [StopCategory::Zero, StopCategory::One, StopCategory::Two];
     match input.byte() % 18 {
         0 => Request::Sync(input.byte() & 1 == 1),
-        1 => Request::RatedTorque { axis: input.byte(), torque: input.number() },
+        1 => Request::RatedTorque { axis: input.byte(), torque: input.number(), limit_per_mille: None },
         2 => Request::Activate,
         3 | 4 => Request::Enable,
         5 => Request::Move(any_move(config, input)),

@@ -4,6 +4,7 @@ use super::plausibility::{Meaning, Plausibility, PlausibilityCheck, TravelBound}
 use super::position_counter::PositionCounter;
 use super::reception::ReportSpan;
 use super::standstill::Standstill;
+use super::velocity_estimate::{CountRate, VelocityEstimate};
 use super::{AT_REST, AxisParameters, Jump};
 use crate::guard::AxisLimits;
 use crate::units::Scale;
@@ -63,6 +64,10 @@ pub(super) struct JointEstimate {
     /// The same as the drive has reported them.
     reported_counts: i32,
     velocity: f64,
+    /// By how much the velocity may be wrong.
+    velocity_uncertainty: f64,
+    /// The velocity by positions, for a drive that reports none.
+    by_positions: VelocityEstimate,
     /// The last report, if the joint cannot have got there.
     jump: Option<Jump>,
     /// Whether it has come to rest since the last stop began.
@@ -87,13 +92,16 @@ impl JointEstimate {
         let by_limits = || facts.position(facts.by_limits(reported));
         let mut has_become_known = false;
         match self.check.judge(facts.position(counted), by_limits, span.longest_s, bound) {
-            Plausibility::Plausible { velocity: by_positions, meaning } => {
+            Plausibility::Plausible(meaning) => {
                 let counts = match meaning {
                     Meaning::Counted => counted,
                     Meaning::ByLimits => facts.by_limits(reported),
                 };
                 self.jump = None;
-                self.velocity = velocity.unwrap_or(by_positions);
+                match velocity {
+                    Some(velocity) => self.velocity = velocity,
+                    None => self.take_velocity(counts, meaning, span.longest_s, facts),
+                }
                 has_become_known = self.accept(reported, counts, facts);
                 self.standstill.note(self.position, span, velocity_limit, count);
             }
@@ -101,6 +109,20 @@ impl JointEstimate {
         }
         self.source = Source::ProcessData;
         has_become_known
+    }
+
+    /// Derives the velocity from the positions.
+    #[inline]
+    fn take_velocity(&mut self, counts: i64, meaning: Meaning, elapsed_s: f64, facts: JointFacts<'_>) {
+        let CountRate { rate, uncertainty } = match meaning {
+            Meaning::Counted => self.by_positions.take(counts, elapsed_s),
+            Meaning::ByLimits => {
+                self.by_positions = VelocityEstimate::begin(counts);
+                CountRate::default()
+            }
+        };
+        let count = facts.scale.way_per_count();
+        (self.velocity, self.velocity_uncertainty) = (rate * count, uncertainty * count.abs());
     }
 
     /// Takes the position that the drive has reported by SDO, unless it reports by process data. Returns whether the position
@@ -163,6 +185,11 @@ impl JointEstimate {
     /// The last report, if the joint cannot have got there.
     pub(super) const fn jump(&self) -> Option<Jump> {
         self.jump
+    }
+
+    /// By how much the velocity may be wrong that is derived from positions: half of a count on either side.
+    pub(super) const fn velocity_uncertainty(&self) -> f64 {
+        self.velocity_uncertainty
     }
 
     /// Whether the joint is reported to be slow, if only for a moment.

@@ -32,6 +32,7 @@ mod exchange;
 mod feedback;
 mod joint;
 mod late_reply;
+mod measured;
 mod mode;
 mod off_cycle;
 mod parameters;
@@ -46,6 +47,7 @@ mod set_points;
 mod standstill;
 mod stream;
 mod torque_loop;
+mod velocity_estimate;
 
 use crate::bit_fields::FieldDrive;
 use crate::control::{ControlLaw, TrackingError};
@@ -61,6 +63,7 @@ use controlword::ControlwordSender;
 use drive_report::DriveReport;
 use joint::JointEstimate;
 use late_reply::{LateReplyDetector, SetPointSkip};
+use measured::Measured;
 use mode::Mode;
 use power::Power;
 use profile_mode::ProfileMode;
@@ -111,6 +114,9 @@ pub struct Axis {
     error_if_unheard: TrackingError,
     profile: ProfileMode,
     joint: JointEstimate,
+    measured: Measured,
+    /// The torque to which the drive limits itself (object 6072): N·m (N); infinite if it has not told.
+    torque_limit_of_drive: f64,
     following: FollowingErrorGuard,
     reception: Reception,
     late_reply: LateReplyDetector,
@@ -151,6 +157,8 @@ impl Axis {
             error_if_unheard: TrackingError::default(),
             profile: ProfileMode::default(),
             joint: JointEstimate::default(),
+            measured: Measured::default(),
+            torque_limit_of_drive: f64::INFINITY,
             following,
             reception: Reception::default(),
             late_reply: LateReplyDetector::default(),
@@ -196,10 +204,13 @@ impl Axis {
         self.following.take_limit_of(&other.following);
     }
 
-    /// Uses the rated torque that the drive has reported (N·m, or N). Nonsense changes nothing.
-    pub fn set_rated_torque(&mut self, torque: f64) -> bool {
+    /// Uses the rated torque that the drive has reported (N·m, or N), and the torque to which it limits itself, in thousandths of that.
+    /// Nonsense changes nothing.
+    pub fn set_rated_torque(&mut self, torque: f64, limit_per_mille: Option<u16>) -> bool {
         match self.parameters.scale.with_rated_torque(torque) {
             Ok(scale) => {
+                self.torque_limit_of_drive = limit_per_mille
+                    .map_or(f64::INFINITY, |limit| scale.torque_from_per_mille(limit.into()).abs());
                 self.parameters.scale = scale;
                 true
             }

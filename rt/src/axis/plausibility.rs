@@ -34,13 +34,8 @@ pub(super) enum Meaning {
 /// The verdict on a report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Plausibility {
-    /// The joint is there.
-    Plausible {
-        /// The velocity that brought it there: rad/s (m/s).
-        velocity: f64,
-        /// Which of the positions that the report may mean it is.
-        meaning: Meaning,
-    },
+    /// The joint is there: at this one of the positions that the report may mean.
+    Plausible(Meaning),
     /// The joint cannot have got there.
     Implausible {
         /// How far that is from its last plausible position: rad (m).
@@ -77,7 +72,7 @@ impl PlausibilityCheck {
         let reach = bound.within(self.accepted_s);
         match self.accepted {
             Some(from) if reach < bound.half_lap && (counted - from).abs() <= reach => {
-                self.accept(counted, Meaning::Counted, Some((from, self.accepted_s)))
+                self.accept(counted, Meaning::Counted)
             }
             accepted => self.judge_anew(accepted, by_limits(), elapsed_s, bound),
         }
@@ -92,24 +87,20 @@ impl PlausibilityCheck {
         elapsed_s: f64,
         bound: TravelBound,
     ) -> Plausibility {
-        let Some(accepted) = accepted else { return self.accept(reported, Meaning::ByLimits, None) };
+        let Some(accepted) = accepted else { return self.accept(reported, Meaning::ByLimits) };
         let is_reached = |from: f64, seconds: f64| (reported - from).abs() <= bound.within(seconds);
         let before = [Some((accepted, self.accepted_s)), self.rejected.map(|from| (from, elapsed_s))];
-        let source = before.into_iter().flatten().find(|(from, seconds)| is_reached(*from, *seconds));
-        if source.is_some() {
-            return self.accept(reported, Meaning::ByLimits, source);
+        if before.into_iter().flatten().any(|(from, seconds)| is_reached(from, seconds)) {
+            return self.accept(reported, Meaning::ByLimits);
         }
         self.rejected = Some(reported);
         let distance = (reported - accepted).abs();
         Plausibility::Implausible { distance, reach: bound.within(self.accepted_s) }
     }
 
-    /// Accepts a position, to which the joint has come from another one in so many seconds.
-    fn accept(&mut self, position: f64, meaning: Meaning, source: Option<(f64, f64)>) -> Plausibility {
+    fn accept(&mut self, position: f64, meaning: Meaning) -> Plausibility {
         *self = Self { accepted: Some(position), accepted_s: 0.0, rejected: None };
-        let source = source.filter(|(_, seconds)| *seconds > 0.0);
-        let velocity = source.map_or(0.0, |(from, seconds)| (position - from) / seconds);
-        Plausibility::Plausible { velocity, meaning }
+        Plausibility::Plausible(meaning)
     }
 }
 
@@ -129,7 +120,7 @@ mod tests {
         let mut check = PlausibilityCheck::default();
         let mut accepted = [false; 8];
         for (is_accepted, report) in accepted.iter_mut().zip(reports) {
-            *is_accepted = matches!(judge(&mut check, *report, 1e-3), Plausibility::Plausible { .. });
+            *is_accepted = matches!(judge(&mut check, *report, 1e-3), Plausibility::Plausible(_));
         }
         accepted
     }
@@ -152,15 +143,11 @@ mod tests {
     fn the_longer_nothing_is_accepted_the_further_the_joint_can_have_moved() {
         let mut check = PlausibilityCheck::default();
         judge(&mut check, 0.0, 1e-3);
-        let counted = Plausibility::Plausible { velocity: 1.0, meaning: Meaning::Counted };
-        assert_eq!(judge(&mut check, 0.1, 0.1), counted);
+        assert_eq!(judge(&mut check, 0.1, 0.1), Plausibility::Plausible(Meaning::Counted));
         let verdict = judge(&mut check, 0.2, 1e-3);
         let Plausibility::Implausible { distance, reach } = verdict else { panic!("{verdict:?}") };
         assert!((distance - 0.1).abs() < 1e-12);
         assert!((reach - (4.0 * 2.0 * 1e-3 + 64.0 * 1e-6)).abs() < 1e-12);
-        // Of two that agree the second tells the velocity.
-        let Plausibility::Plausible { velocity, .. } = judge(&mut check, 0.201, 1e-3) else { panic!() };
-        assert!((velocity - 1.0).abs() < 1e-9);
     }
 
     #[test]
@@ -172,7 +159,7 @@ mod tests {
                 elapsed_s,
                 BOUND,
             ) {
-                Plausibility::Plausible { meaning, .. } => Some(meaning),
+                Plausibility::Plausible(meaning) => Some(meaning),
                 Plausibility::Implausible { .. } => None,
             };
         let mut check = PlausibilityCheck::default();

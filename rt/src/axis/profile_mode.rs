@@ -14,8 +14,6 @@ const REACTION_CYCLES: u32 = 3;
 /// A drive that stands before its target for this many times the time that a following error may last does not get
 /// there: it needs some of it to begin, and to see that it has arrived.
 const STALL_PATIENCE: u32 = 20;
-/// How far the velocity of a profile may overshoot its limit: the drive's own loop makes it.
-const VELOCITY_OVERSHOOT: f64 = 1.2;
 
 /// A target, and when it expires.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -238,17 +236,12 @@ impl Axis {
     }
 
     /// Watches what the drive makes of its target, since no set-point passes the guard: the joint must be able to come
-    /// to rest before a position limit, and keep to its velocity limit.
+    /// to rest before a position limit.
     #[inline]
     pub fn check_profile(&self) -> Result<(), Fault> {
         let limits = &self.parameters.limits;
         if !self.is_profile() || self.feedback_age() > 0 {
             return Ok(());
-        }
-        // The velocity comes from positions in whole counts: on a coarse encoder, one count in a cycle is fast.
-        let one_count = 1.0 / (self.parameters.scale.resolution() * self.reception.cycle_s());
-        if self.velocity().abs() > VELOCITY_OVERSHOOT * limits.velocity + one_count {
-            return Err(Fault::VelocityLimit { velocity: self.velocity(), limit: limits.velocity });
         }
         if self.profile.is_stalled(self.parameters.following_error_cycles) {
             let value = self.shown_set_point().position - self.position();

@@ -437,7 +437,8 @@ impl Expectation {
                 return Some(Fault::NotAcknowledged { cycles, limit });
             }
         }
-        let checked = axis.check_following().and_then(|()| axis.check_profile());
+        let checked =
+            axis.check_following().and_then(|()| axis.check_profile()).and_then(|()| axis.check_measured());
         checked.err()
     }
 }

@@ -68,7 +68,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Request::TimeOfDay { at_zero_ns } => {
                 self.shared.time.as_mut().ok_or(RejectReason::NoTime)?.set(*at_zero_ns);
             }
-            Request::RatedTorque { axis, torque } => self.set_rated_torque(*axis, *torque)?,
+            Request::RatedTorque { axis, torque, limit_per_mille } => {
+                self.set_rated_torque(*axis, *torque, *limit_per_mille)?;
+            }
             Request::ProcessData(data) => self.set_process_data(data)?,
             Request::Position { axis, counts } => self.axis_mut(*axis)?.set_reported_position(*counts),
             Request::Activate
@@ -216,9 +218,9 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     /// What is commanded in per mille of the rated torque must not leap: it changes without power only.
-    fn set_rated_torque(&mut self, axis: u8, torque: f64) -> Handled {
+    fn set_rated_torque(&mut self, axis: u8, torque: f64, limit_per_mille: Option<u16>) -> Handled {
         self.require_phase_of(axis, &[Phase::Passive, Phase::Disabled])?;
-        if self.axis_mut(axis)?.set_rated_torque(torque) {
+        if self.axis_mut(axis)?.set_rated_torque(torque, limit_per_mille) {
             Ok(())
         } else {
             Err(RejectReason::RatedTorque { torque }.of_axis(axis))

@@ -17,6 +17,7 @@ mod false_feedback;
 mod groups;
 mod guarding;
 mod late_feedback;
+mod measured_limits;
 mod measured_work;
 mod mode_changes;
 mod motion_reports;

@@ -151,7 +151,7 @@ fn what_cannot_be_done_is_refused_and_changes_nothing() {
         (profile(9, ProfileTarget::Velocity(0.1)), RejectReason::UnknownAxis { axis: 9, axes: 3 }, None),
         (Request::Enable, RejectReason::Phase, None),
         (Request::Activate, RejectReason::Phase, None),
-        (Request::RatedTorque { axis: 1, torque: 50.0 }, RejectReason::Phase, None),
+        (Request::RatedTorque { axis: 1, torque: 50.0, limit_per_mille: None }, RejectReason::Phase, None),
         (Request::Position { axis: 3, counts: 1 }, RejectReason::UnknownAxis { axis: 3, axes: 3 }, None),
         (Request::TimeOfDay { at_zero_ns: 1 }, RejectReason::NoTime, None),
     ];
@@ -189,7 +189,7 @@ fn a_rated_torque_is_a_positive_one_of_an_axis_that_is_there() {
         (1, f64::INFINITY, Some(RejectReason::RatedTorque { torque: f64::INFINITY })),
         (200, 1.0, Some(RejectReason::UnknownAxis { axis: 200, axes: 3 })),
     ] {
-        rig.request(Request::RatedTorque { axis, torque });
+        rig.request(Request::RatedTorque { axis, torque, limit_per_mille: None });
         let answer = rig.host.snapshot.answers.of(RequestId(rig.host.taken));
         let told = match answer {
             Answer::Rejected(Some(rejection)) => Some(rejection.reason),

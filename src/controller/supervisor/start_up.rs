@@ -19,7 +19,8 @@ impl Supervisor {
                         self.request(data.request(axis));
                     }
                     if let Some(torque) = facts.rated_torque {
-                        self.request(Request::RatedTorque { axis, torque });
+                        let limit_per_mille = facts.max_torque_per_mille;
+                        self.request(Request::RatedTorque { axis, torque, limit_per_mille });
                     }
                 }
                 self.facts = facts;

@@ -131,6 +131,9 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("not_disabled", "驱动器可能仍有转矩"),
     ("drive_enabled", "驱动器被其他设备使能"),
     ("drive_local", "驱动器不再受总线控制"),
+    ("measured_position", "实测位置超出限值"),
+    ("measured_velocity", "实测速度超出限值"),
+    ("measured_torque", "实测转矩超出限值"),
 ];
 
 #[cfg(test)]

@@ -21,7 +21,8 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "the set-point of {0}, {1}, was outside its position limit of {2}",
         "{0} 的设定值 {1} 超出其位置限值 {2}",
     ),
-    ("the velocity of {0}, {1}, was beyond its limit of {2}", "{0} 的速度 {1} 超出其限值 {2}"),
+    ("{0} was at {1}, beyond its position limit of {2}", "{0} 位于 {1}，超出其位置限值 {2}"),
+    ("the drive of {0} exerted {1} (allowed: {2})", "{0} 的驱动器输出 {1}（允许：{2}）"),
     ("the set-point of {0} asked for {1} (allowed: {2})", "{0} 的设定值要求 {1}（允许：{2}）"),
     ("{0} was {1} from its set-point (allowed: {2})", "{0} 偏离设定值 {1}（允许：{2}）"),
     (

@@ -354,6 +354,9 @@ export const TEXTS = {
   rule_not_disabled: ["A drive may still have torque", "驱动器可能仍有转矩"],
   rule_drive_enabled: ["Something else has enabled a drive", "驱动器被其他设备使能"],
   rule_drive_local: ["A drive does not obey the bus any more", "驱动器不再受总线控制"],
+  rule_measured_position: ["A joint was beyond its position limit", "实测位置超出限值"],
+  rule_measured_velocity: ["A joint was too fast", "实测速度超出限值"],
+  rule_measured_torque: ["A drive exerted too much torque", "实测转矩超出限值"],
 
   cure_not_finite: ["find the division or the missing value in the program that sends set-points", "检查发送设定值的程序中是否有除零或缺失值"],
   cure_position_limit: ["command a position within the limits; look at `limits.position`", "给出限值内的位置；检查 limits.position"],
@@ -389,6 +392,9 @@ export const TEXTS = {
   cure_mode_not_shown: ["check that the drive has this mode; most change it only while disabled", "确认驱动器支持该模式；多数仅在去使能时切换"],
   cure_not_disabled: ["keep away from the joint and cut the supply of its drive; clear the fault when the drive reports again that it is disabled", "远离关节并切断其驱动器电源；驱动器重新上报已去使能后清除故障"],
   cure_drive_enabled: ["keep away from the joint; end the other master or the vendor's tool that enables its drive, then clear the fault", "远离关节；结束使能该驱动器的其他主站或厂商工具，然后清除故障"],
+  cure_measured_position: ["keep away from the joint; look for what moves it against its drive, and at the drive's own deceleration and limits", "远离关节；检查是什么在推动它，以及驱动器自身的减速度和限值"],
+  cure_measured_velocity: ["keep away from the joint; look at the load, at the drive's own limits, and at `limits.velocity`", "远离关节；检查负载、驱动器自身的限值以及 limits.velocity"],
+  cure_measured_torque: ["look for an obstacle or a brake that is not released, or look at `limits.torque`; then clear the fault", "检查障碍物或未松开的制动器，或检查 limits.torque；然后清除故障"],
   cure_drive_local: ["keep away from the joint; end the vendor's tool or the local input that controls its drive, then clear the fault", "远离关节；结束控制其驱动器的厂商工具或本地输入，然后清除故障"],
 };
 

@@ -42,10 +42,7 @@ pub fn rejection(rejected: &RequestError, machine: &Machine) -> String {
 fn reason(rejected: &RequestError, machine: &Machine) -> String {
     let axis = rejected.axis.map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
     let unit = rejected.axis.map_or(Unit::Radian, |axis| machine.axis_unit(axis));
-    let (length, force) = match unit {
-        Unit::Radian => ("rad", "Nm"),
-        Unit::Metre => ("m", "N"),
-    };
+    let (length, force) = (unit.symbol(), unit.effort_symbol());
     match rejected.reason {
         RejectReason::Phase => format!("not possible while {}", phase(rejected.phase)),
         RejectReason::StopLatched { rule } if rejected.axis.is_some() => {

@@ -10,7 +10,8 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
     let axis = stop.axis().map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
     let bus =
         stop.origin.bus().map_or_else(|| "a bus".to_owned(), |bus| format!("bus {}", machine.bus_name(bus)));
-    let unit = stop.axis().map_or(Unit::Radian, |axis| machine.axis_unit(axis)).symbol();
+    let unit = stop.axis().map_or(Unit::Radian, |axis| machine.axis_unit(axis));
+    let (unit, effort) = (unit.symbol(), unit.effort_symbol());
     let StopCause::Fault(fault) = stop.cause else { return "a stop was requested".to_owned() };
     // No set-point is sent to a drive that plans its own profile: its measured motion is checked.
     let is_measured = stop.axis().is_some_and(|axis| machine.plans_own_profile(axis));
@@ -18,9 +19,6 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::PositionLimit { position, limit } if is_measured => format!(
             "{axis} would come to rest at {position:.4} {unit}, outside its position limit of {limit:.4} {unit}"
         ),
-        Fault::VelocityLimit { velocity, limit } if is_measured => {
-            format!("{axis} moved at {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
-        }
         Fault::FollowingError { .. } if is_measured => {
             format!("{axis} stood still, and its drive had not reached its target")
         }
@@ -30,11 +28,8 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::PositionLimit { position, limit } => format!(
             "the set-point of {axis}, {position:.4} {unit}, was outside its position limit of {limit:.4} {unit}"
         ),
-        // Asked for by a set-point, or measured where the drive plans its own motion (PP, PV, PT).
         Fault::VelocityLimit { velocity, limit } => {
-            format!(
-                "the velocity of {axis}, {velocity:.3} {unit}/s, was beyond its limit of {limit:.3} {unit}/s"
-            )
+            format!("the set-point of {axis} asked for {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
         }
         Fault::AccelerationLimit { acceleration, limit } => format!(
             "the set-point of {axis} asked for {acceleration:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)"
@@ -90,6 +85,15 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::DriveLocal { statusword } => format!(
             "the drive of {axis} does not obey the bus any more: it has cleared its remote bit (statusword 0x{statusword:04X})"
         ),
+        Fault::MeasuredPosition { position, limit } => {
+            format!("{axis} was at {position:.4} {unit}, beyond its position limit of {limit:.4} {unit}")
+        }
+        Fault::MeasuredVelocity { velocity, limit } => {
+            format!("{axis} moved at {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+        }
+        Fault::MeasuredTorque { torque, limit } => {
+            format!("the drive of {axis} exerted {torque:.2} {effort} (allowed: {limit:.2} {effort})")
+        }
         Fault::ModeChanged { shown, expected } => format!(
             "the drive of {axis} shows {} instead of {}",
             mode(shown.into()),
@@ -252,7 +256,7 @@ mod tests {
                 Origin::Axis(1),
                 2.5,
                 2.0,
-                "the velocity of slide, 2.500 m/s, was beyond its limit of 2.000 m/s",
+                "the set-point of slide asked for 2.500 m/s (allowed: 2.000 m/s)",
             ),
             (
                 Rule::MissedFeedback,
@@ -309,6 +313,27 @@ mod tests {
                 0x0037.into(),
                 0.0,
                 "the drive of shoulder does not obey the bus any more: it has cleared its remote bit (statusword 0x0037)",
+            ),
+            (
+                Rule::MeasuredPosition,
+                Origin::Axis(1),
+                1.25,
+                1.0,
+                "slide was at 1.2500 m, beyond its position limit of 1.0000 m",
+            ),
+            (
+                Rule::MeasuredVelocity,
+                Origin::Axis(1),
+                2.5,
+                2.0,
+                "slide moved at 2.500 m/s (allowed: 2.000 m/s)",
+            ),
+            (
+                Rule::MeasuredTorque,
+                Origin::Axis(1),
+                260.0,
+                200.0,
+                "the drive of slide exerted 260.00 N (allowed: 200.00 N)",
             ),
             (
                 Rule::ModeChanged,
@@ -438,7 +463,6 @@ mod tests {
         let mut machine = machine();
         machine.axes[1].plans_own_profile = true;
         let text = |rule, value, limit| stop_cause(&reason(rule, Origin::Axis(1), value, limit), &machine);
-        assert_eq!(text(Rule::VelocityLimit, 2.5, 2.0), "slide moved at 2.500 m/s (allowed: 2.000 m/s)");
         assert_eq!(
             text(Rule::PositionLimit, 1.25, 1.0),
             "slide would come to rest at 1.2500 m, outside its position limit of 1.0000 m"

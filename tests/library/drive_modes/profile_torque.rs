@@ -63,7 +63,10 @@ fn a_joint_that_gets_too_fast_is_let_go_and_braked() {
     let mut fastest = 0.0_f64;
     let outcome = world.run_to_the_end(|world| fastest = fastest.max(world.observe(0).velocity));
     let Outcome::Stopped(stop) = outcome else { panic!("{outcome:?}") };
-    assert_eq!((stop.rule(), stop.axis(), stop.category), (Rule::VelocityLimit, Some(0), StopCategory::One));
+    assert_eq!(
+        (stop.rule(), stop.axis(), stop.category),
+        (Rule::MeasuredVelocity, Some(0), StopCategory::One)
+    );
     assert!(fastest < 1.3 * limit, "{fastest}");
     assert_eq!(world.stops().len(), 1);
     let seen = world.observe(0);

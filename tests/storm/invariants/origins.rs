@@ -67,6 +67,13 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
         {
             true
         }
+        // Nothing but the load holds a joint back that is given a torque.
+        (Rule::MeasuredVelocity, Origin::Axis(axis))
+            if seen.config.axes.get(usize::from(axis)).map(|axis| axis.control)
+                == Some(ControlLaw::ProfileTorque) =>
+        {
+            true
+        }
         (Rule::ModeNotShown, Origin::Axis(axis)) if is_crowded(axis) => true,
         // A drive that answers whole cycles late is not heard before it is to be enabled.
         (Rule::NotDisabled, Origin::Axis(axis))
@@ -105,6 +112,9 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::NotDisabled
             | Rule::DriveEnabled
             | Rule::DriveLocal
+            | Rule::MeasuredPosition
+            | Rule::MeasuredVelocity
+            | Rule::MeasuredTorque
             | Rule::ModeChanged
             | Rule::ModeNotShown
             | Rule::EnableTimeout
