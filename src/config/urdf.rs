@@ -15,6 +15,10 @@ use super::quantity::Quantity;
 use super::spelling;
 use crate::printable::{excerpt, printable_path};
 
+/// Deepest nesting of elements. A URDF needs five levels, extensions of simulators some more. `urdf-rs` needs time that grows with the
+/// square of the depth.
+const DEEPEST: usize = 100;
+
 /// A robot description.
 pub struct Urdf {
     path: PathBuf,
@@ -211,10 +215,12 @@ impl Urdf {
     /// # Errors
     /// It is no URDF.
     pub fn parse(path: &Path, text: &str) -> Result<Self, UrdfError> {
-        let robot = urdf_rs::read_from_string(text).map_err(|error| UrdfError::NotUrdf {
-            file: printable_path(path),
-            reason: excerpt(&error.to_string()),
-        })?;
+        let not_urdf =
+            |reason: &str| UrdfError::NotUrdf { file: printable_path(path), reason: excerpt(reason) };
+        if is_too_deep(text) {
+            return Err(not_urdf(&format!("its elements are nested more than {DEEPEST} deep")));
+        }
+        let robot = urdf_rs::read_from_string(text).map_err(|error| not_urdf(&error.to_string()))?;
         Ok(Self { path: path.to_owned(), robot })
     }
 
@@ -310,6 +316,42 @@ impl Urdf {
     }
 }
 
+/// Whether elements are nested more than [`DEEPEST`] deep.
+fn is_too_deep(text: &str) -> bool {
+    let (mut rest, mut depth) = (text, 0_usize);
+    while let Some((_, markup)) = rest.split_once('<') {
+        let end = match markup {
+            _ if markup.starts_with("!--") => markup.find("-->"),
+            _ if markup.starts_with("![CDATA[") => markup.find("]]>"),
+            _ => tag_end(markup),
+        };
+        let (inner, behind) = markup.split_at(end.unwrap_or(markup.len()));
+        if inner.starts_with('/') {
+            depth = depth.saturating_sub(1);
+        } else if !inner.starts_with(['!', '?']) && !inner.ends_with('/') {
+            depth += 1;
+        }
+        if depth > DEEPEST {
+            return true;
+        }
+        rest = behind;
+    }
+    false
+}
+
+/// Where a tag ends: at the first `>` that is not within quotes.
+fn tag_end(markup: &str) -> Option<usize> {
+    let mut quote = None;
+    markup.find(|letter| {
+        match quote {
+            None if matches!(letter, '"' | '\'') => quote = Some(letter),
+            Some(open) if open == letter => quote = None,
+            _ => {}
+        }
+        quote.is_none() && letter == '>'
+    })
+}
+
 /// Whether a value is above another one, by more than the rounding of a unit.
 pub fn exceeds(value: f64, most: f64, scale: f64) -> bool {
     value - most > 1e-9 * scale.abs()
@@ -333,5 +375,32 @@ fn position(joint: &Joint, file: String, name: String) -> Result<([f64; 2], Limi
         Ok(([low, high], LimitOrigin::SafetyController))
     } else {
         Err(UrdfError::NoRoom { file, joint: name, low, high, are_soft: true })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reason(text: &str) -> Option<String> {
+        Urdf::parse(Path::new("arm.urdf"), text).err().map(|error| error.to_string())
+    }
+
+    /// The parser needs time that grows with the square of the depth: hours for this one.
+    #[test]
+    fn elements_that_are_nested_deeper_than_any_robot_description_are_refused_before_they_are_parsed() {
+        let reason = reason(&format!("<robot name='r'>{}", "<a>".repeat(1_000_000))).unwrap();
+        assert_eq!(reason, "arm.urdf is no URDF: its elements are nested more than 100 deep");
+    }
+
+    #[test]
+    fn what_is_no_nested_element_counts_as_none() {
+        let flat =
+            "<!-- <a> --><link name='a > b'/><link name=\"c > '\"></link><x><![CDATA[<a>]]></x>".repeat(200);
+        assert!(!is_too_deep(&format!("<?xml version='1.0'?><robot name='r'>{flat}</robot>")));
+        assert_eq!(
+            reason("<?xml version='1.0'?><!-- <a> --><robot name='r'><link name='a > b'/></robot>"),
+            None
+        );
     }
 }

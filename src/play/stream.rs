@@ -1,5 +1,7 @@
 //! The rows of a file as a stream: each handed over when it arrives, stamped with the time that it is meant for.
 
+use std::collections::HashMap;
+
 use takt_rt::{AxisPoint, MAX_AXES, Nanoseconds, PointRole, PositionPoint, Snapshot, StreamPoint};
 
 use super::error::{FileProblem, PlayFileError};
@@ -19,6 +21,8 @@ pub struct FileStream {
     axes: Vec<usize>,
     groups: Vec<PlayedGroup>,
     batches: Vec<Batch>,
+    /// When everything has arrived, and the time of every row has come, in seconds after the start.
+    end_s: f64,
     first: Vec<Option<f64>>,
 }
 
@@ -56,7 +60,7 @@ impl FileStream {
         }
         let axes: Vec<usize> = file.joints.iter().map(|joint| joint.axis).collect();
         let groups = PlayedGroup::of(config, &axes);
-        Ok(Self { axes, groups, batches: batches(&file.rows), first })
+        Ok(Self { axes, groups, batches: batches(&file.rows), end_s: end_s(&file.rows), first })
     }
 
     /// The first position of each axis that the file names: that of the row that is meant for the earliest time.
@@ -65,12 +69,8 @@ impl FileStream {
     }
 
     /// When everything has arrived, and the time of every row has come, in seconds after the start.
-    pub(super) fn end_s(&self) -> f64 {
-        let times = self
-            .batches
-            .iter()
-            .flat_map(|batch| batch.points.iter().map(|(at_s, _)| *at_s).chain([batch.arrive_s]));
-        times.fold(0.0, f64::max)
+    pub(super) const fn end_s(&self) -> f64 {
+        self.end_s
     }
 
     /// How many batches have arrived so long after the start.
@@ -140,25 +140,27 @@ fn check_first(row: &PlayRow, axis: Option<&Axis>, position: f64) -> Result<(), 
     Err(PlayFileError { line: row.line, column: None, problem })
 }
 
+fn end_s(rows: &[PlayRow]) -> f64 {
+    rows.iter().map(|row| row.at_s.max(row.arrive_s)).fold(0.0, f64::max)
+}
+
 /// The rows by arrival; those of a chunk together, in the order of their stamps.
 fn batches(rows: &[PlayRow]) -> Vec<Batch> {
-    let mut batches: Vec<(Option<u64>, Batch)> = Vec::new();
+    let mut batches: Vec<Batch> = Vec::new();
+    let mut places: HashMap<u64, usize> = HashMap::new();
     for row in rows {
-        let point = (row.at_s, row.points.iter().map(point_of).collect());
-        let chunk =
-            row.chunk.and_then(|chunk| batches.iter_mut().rev().find(|(other, _)| *other == Some(chunk)));
-        match chunk {
-            Some((_, batch)) => {
-                batch.arrive_s = row.arrive_s;
-                batch.points.push(point);
-            }
-            None => {
-                let (is_chunk, points) = (row.chunk.is_some(), vec![point]);
-                batches.push((row.chunk, Batch { arrive_s: row.arrive_s, is_chunk, points }));
-            }
+        let place = match row.chunk {
+            Some(chunk) => *places.entry(chunk).or_insert(batches.len()),
+            None => batches.len(),
+        };
+        if place == batches.len() {
+            batches.push(Batch { arrive_s: row.arrive_s, is_chunk: row.chunk.is_some(), points: Vec::new() });
+        }
+        if let Some(batch) = batches.get_mut(place) {
+            batch.arrive_s = row.arrive_s;
+            batch.points.push((row.at_s, row.points.iter().map(point_of).collect()));
         }
     }
-    let mut batches: Vec<Batch> = batches.into_iter().map(|(_, batch)| batch).collect();
     for batch in &mut batches {
         batch.points.sort_by(|one, other| one.0.total_cmp(&other.0));
     }
@@ -190,7 +192,8 @@ mod tests {
         let chunk: Vec<f64> = batches[1].points.iter().map(|(at_s, _)| *at_s).collect();
         assert_eq!((batches[1].is_chunk, chunk), (true, vec![0.4, 0.5]));
         assert!(!batches[0].is_chunk && !batches[2].is_chunk && batches[3].is_chunk);
-        let stream = FileStream { axes: vec![1], groups: vec![], batches, first: vec![] };
+        let end_s = end_s(&rows);
+        let stream = FileStream { axes: vec![1], groups: vec![], batches, end_s, first: vec![] };
         let group = PlayedGroup { number: 0, axes: vec![0, 1] };
         assert_eq!((stream.arrived(0.1), stream.arrived(0.2), stream.end_s()), (1, 3, 0.6));
         let mut snapshot = Snapshot::default();
@@ -200,5 +203,18 @@ mod tests {
         assert_eq!(stamps, [1_400_000_000, 1_500_000_000]);
         assert_eq!(points[0].role, PointRole::Chunk { is_first: true, is_last: false });
         assert_eq!((points[0].axes[0], points[0].axes[1]), (7.0.into(), 0.4.into()));
+    }
+
+    /// Search through all earlier chunks for each row, or through all rows in each cycle, would take days.
+    #[test]
+    fn the_work_for_a_row_and_for_a_cycle_does_not_grow_with_the_rows_of_the_file() {
+        const ROWS: u64 = 1_000_000;
+        let at_s = |number: u64| number as f64 * 1e-3;
+        let row = |number| PlayRow { points: vec![], ..row(at_s(number), at_s(number), Some(number)) };
+        let rows: Vec<PlayRow> = (0..ROWS).map(row).collect();
+        let (batches, end_s) = (batches(&rows), end_s(&rows));
+        assert_eq!(batches.len() as u64, ROWS);
+        let stream = FileStream { axes: vec![], groups: vec![], batches, end_s, first: vec![] };
+        assert_eq!((0..ROWS).filter(|cycle| at_s(*cycle) < stream.end_s()).count() as u64, ROWS - 1);
     }
 }

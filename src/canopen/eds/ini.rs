@@ -37,6 +37,9 @@ pub(super) struct Pair<'t> {
     pub span: Range<usize>,
 }
 
+/// The most lines with a section or a key. They are enough for [`MAX_ENTRIES`](super::objects::MAX_ENTRIES), and bound the memory.
+const MAX_LINES: usize = 500_000;
+
 /// Keys whose value is written to a device or selects the device: two different values are an error.
 const MUST_NOT_DIFFER: [&str; 2] = ["parametervalue", "nodeid"];
 
@@ -45,7 +48,7 @@ impl<'t> Document<'t> {
     pub fn parse(text: &'t str, reporter: &mut Reporter) -> Self {
         let mut document = Self::default();
         let mut current = None;
-        let mut start = 0;
+        let (mut start, mut lines) = (0, 0);
         for line in text.split_inclusive('\n') {
             let trimmed = trimmed(line);
             let at = start + offset(line, trimmed);
@@ -54,6 +57,11 @@ impl<'t> Document<'t> {
             if trimmed.is_empty() || trimmed.starts_with([';', '#']) || trimmed.starts_with("//") {
                 continue;
             }
+            if lines == MAX_LINES {
+                reporter.report(EdsProblemKind::TooMany { items: "lines", most: MAX_LINES }, span);
+                break;
+            }
+            lines += 1;
             if let Some(inner) = trimmed.strip_prefix('[') {
                 current = document.open(inner, span, reporter);
             } else if let Some((key, value)) = trimmed.split_once('=') {
@@ -189,5 +197,27 @@ mod tests {
         let section = document.section("a").unwrap();
         assert_eq!((section.get("x").unwrap().value, section.get("y").unwrap().value), ("1", "3"));
         assert_eq!(reporter.into_problems().len(), 2);
+    }
+
+    /// 65,000 lines would be 16 million entries, which need gigabytes, and 64 MiB of keys as much.
+    #[test]
+    fn a_file_with_more_entries_or_lines_than_one_can_have_is_refused() {
+        let refused = |text: &str| {
+            let findings = crate::canopen::eds::parse("large.eds", text.as_bytes()).unwrap_err();
+            assert!(findings.has_errors());
+            let of_kind = |problem: &&crate::canopen::eds::EdsProblem| {
+                matches!(problem.kind, EdsProblemKind::TooMany { .. })
+            };
+            let problem = findings.problems().iter().find(of_kind).unwrap();
+            (problem.to_string(), findings.position(problem).line)
+        };
+        let arrays: String =
+            (0x2000..0x5000).map(|index| format!("[{index:X}]\nCompactSubObj=254\n")).collect();
+        let (words, line) = refused(&arrays);
+        assert_eq!(words, "the file has more than 65536 entries");
+        assert_eq!(line, 2 * (65_536 / 255) + 1);
+        let keys: String = (0..600_000).map(|number| format!("k{number}=1\n")).collect();
+        let (words, line) = refused(&format!("[2000]\n{keys}"));
+        assert_eq!((words.as_str(), line), ("the file has more than 500000 lines", 500_001));
     }
 }

@@ -18,6 +18,9 @@ use crate::canopen::object::ObjectAddress;
 /// The highest sub-index of a value; 255 describes the structure of the object.
 const HIGHEST_SUBINDEX: u8 = 254;
 
+/// The most entries of a dictionary. Drives have some thousands. A compact array is one section for 254 entries of some kilobytes each.
+pub(super) const MAX_ENTRIES: usize = 65_536;
+
 /// The sections of one object.
 #[derive(Debug, Default)]
 struct Parts<'d, 't> {
@@ -44,11 +47,19 @@ pub(super) fn read(document: &Document<'_>, reporter: &mut Reporter) -> Vec<Dict
         }
     }
     let is_described = |parts: &Parts<'_, '_>| parts.object.is_some() || !parts.sub_objects.is_empty();
-    parts
-        .into_iter()
-        .filter(|(_, parts)| is_described(parts))
-        .map(|(index, parts)| Reader { index, parts, reporter: &mut *reporter }.object())
-        .collect()
+    let (mut objects, mut entries) = (Vec::new(), 0);
+    for (index, parts) in parts.into_iter().filter(|(_, parts)| is_described(parts)) {
+        let first = parts.object.or(parts.sub_objects.values().next().copied());
+        let header = first.map_or(0..0, |section| section.header.clone());
+        let object = Reader { index, parts, reporter: &mut *reporter }.object();
+        entries += object.entries.len();
+        if entries > MAX_ENTRIES {
+            reporter.report(EdsProblemKind::TooMany { items: "entries", most: MAX_ENTRIES }, header);
+            break;
+        }
+        objects.push(object);
+    }
+    objects
 }
 
 /// The list of an object by its index (CiA 306, section 4.6.3).

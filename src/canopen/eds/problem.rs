@@ -53,6 +53,14 @@ pub enum EdsProblemKind {
     /// No section describes an object.
     #[error("no section of this file describes an object")]
     NoObjects,
+    /// More than a file can have. The rest was not read.
+    #[error("the file has more than {most} {items}")]
+    TooMany {
+        /// What there is too much of.
+        items: &'static str,
+        /// The largest number.
+        most: usize,
+    },
     /// A text that is not a number.
     #[error("`{key}` is not a number: {given:?}")]
     NotANumber {
@@ -288,6 +296,7 @@ impl EdsProblemKind {
         match self {
             Self::Unreadable { .. }
             | Self::NoObjects
+            | Self::TooMany { .. }
             | Self::NotANumber { .. }
             | Self::NotBytes { .. }
             | Self::DoesNotFit { .. }
@@ -303,6 +312,7 @@ impl EdsProblemKind {
         match self {
             Self::Unreadable { .. } => "give the path of an EDS or DCF".into(),
             Self::NoObjects => "objects are described in sections like [1000] and [1018sub1]".into(),
+            Self::TooMany { .. } => "the rest was not read; check that this is an EDS or DCF".into(),
             Self::NotANumber { given, .. } if given.contains('$') => {
                 "write the node ID as $NODEID, as in $NODEID+0x200".into()
             }
