@@ -1,5 +1,6 @@
 //! Text that somebody else has chosen (the contents and names of files, arguments), made safe to show on a terminal.
 
+use std::fmt;
 use std::path::Path;
 
 /// The same text without what would move a terminal's cursor, colour what follows, or turn its direction. Every
@@ -17,6 +18,23 @@ pub fn printable(text: &str) -> String {
 /// A path, made safe in the same way.
 pub fn printable_path(path: &Path) -> String {
     printable(&path.display().to_string())
+}
+
+/// A number of a message, with the decimals of its format. One of 1e9 and above has an exponent, and a zero has no sign.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shown(pub f64);
+
+impl fmt::Display for Shown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(value) = *self;
+        let text = match f.precision() {
+            _ if value.abs() >= 1e9 => format!("{value:e}"),
+            Some(decimals) => format!("{value:.decimals$}"),
+            None => value.to_string(),
+        };
+        let is_zero = text.bytes().all(|byte| matches!(byte, b'-' | b'0' | b'.'));
+        f.write_str(if is_zero { text.trim_start_matches('-') } else { &text })
+    }
 }
 
 /// The beginning of a text that may be of any length, for a message.
@@ -50,7 +68,7 @@ const fn replacement(letter: char) -> char {
 
 #[cfg(test)]
 mod tests {
-    use super::{excerpt, printable};
+    use super::{Shown, excerpt, printable};
     use proptest::prelude::*;
 
     #[test]
@@ -58,6 +76,24 @@ mod tests {
         assert_eq!(printable("\u{1B}[2J\u{9B}1m\u{202E}\rä\0"), "?[2J¿1m\u{FFFD}?ä?");
         let plain = "k = \"µs\"\t# \u{2026}\r\nnext 日本\n";
         assert_eq!(printable(plain), plain);
+    }
+
+    #[test]
+    fn no_number_has_hundreds_of_digits_and_no_zero_a_sign() {
+        let shown = [1e308, -1e308, 1e9, 999_999_999.0, -0.000_001, -0.0, -0.01, f64::INFINITY, f64::NAN];
+        let shown = shown.map(|value| format!("{:.4} {}", Shown(value), Shown(value)));
+        let expected = [
+            "1e308 1e308",
+            "-1e308 -1e308",
+            "1e9 1e9",
+            "999999999.0000 999999999",
+            "0.0000 -0.000001",
+            "0.0000 0",
+            "-0.0100 -0.01",
+            "inf inf",
+            "NaN NaN",
+        ];
+        assert_eq!(shown, expected);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use takt_rt::{RequestError, StopReason};
 
 use super::point_check::PointRefusal;
 use super::question::QuestionError;
+use crate::printable::Shown;
 use crate::telemetry::{Machine, words};
 use crate::trajectory::{RateError, TrajectoryError, axis_name};
 
@@ -89,7 +90,7 @@ pub enum CommandError {
         groups: Vec<String>,
     },
     /// The value is outside the limits of the axis, or not a number.
-    #[error("{axis}: {value} is not within its limits, {lowest} to {highest}")]
+    #[error("{axis}: {} is not within its limits, {} to {}", Shown(*value), Shown(*lowest), Shown(*highest))]
     OutsideLimits {
         /// The axis.
         axis: String,

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::printable::Shown;
+
 /// What of a point is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
@@ -214,26 +216,36 @@ impl TrajectoryError {
             }
             Self::NotFinite { quantity, value, .. } => format!("its {quantity} is {value}"),
             Self::Time { time_s, .. } => {
-                format!("its time is {time_s} s; a time is a finite number of seconds from 0 on")
+                format!("its time is {} s; a time is a finite number of seconds from 0 on", Shown(time_s))
             }
             Self::TimeOrder { time_s, previous_s, .. } => {
+                let [time_s, previous_s] = [time_s, previous_s].map(Shown);
                 format!("its time, {time_s} s, is not later than that of the point before, {previous_s} s")
             }
             Self::Start { quantity, given, present, .. } => format!(
                 "the trajectory begins with the {quantity} {given}, and the present one is {present}; give the first point \
-                 a time after 0, or go there first"
+                 a time after 0, or go there first",
+                given = Shown(given),
+                present = Shown(present)
             ),
             Self::Limit { broken, time_s, value, limit, .. } => {
-                format!("{broken} {value:.6} at {time_s:.6} s is beyond the limit of {limit:.6}")
+                format!(
+                    "{broken} {value:.6} at {time_s:.6} s is beyond the limit of {limit:.6}",
+                    value = Shown(value),
+                    time_s = Shown(time_s),
+                    limit = Shown(limit)
+                )
             }
             Self::Unreachable { .. } => {
                 "it cannot be reached from the present motion within the limits".to_owned()
             }
             Self::EndAcceleration { acceleration, .. } => {
-                format!("the last point has the acceleration {acceleration}; it must have none")
+                format!("the last point has the acceleration {}; it must have none", Shown(acceleration))
             }
             Self::NoRoomToStop { rest, limit, .. } => format!(
-                "the last point is passed in motion, and a stop behind it ends at {rest:.6}, beyond the limit of {limit:.6}"
+                "the last point is passed in motion, and a stop behind it ends at {rest:.6}, beyond the limit of {limit:.6}",
+                rest = Shown(rest),
+                limit = Shown(limit)
             ),
         }
     }

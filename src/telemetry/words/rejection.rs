@@ -3,6 +3,7 @@
 use takt_rt::{MappedObject, RejectReason, RequestError, RequestKind};
 
 use super::{mode, phase, rule_key};
+use crate::printable::Shown;
 use crate::telemetry::machine::{Machine, Unit};
 
 /// The name of a request: "the move".
@@ -66,26 +67,38 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         }
         RejectReason::NotFinite { value } => format!("the number given for {axis} is not finite ({value})"),
         RejectReason::PositionLimit { position, limit } => format!(
-            "{axis} cannot go to {position:.4} {length}, beyond its position limit of {limit:.4} {length}"
+            "{axis} cannot go to {position:.4} {length}, beyond its position limit of {limit:.4} {length}",
+            position = Shown(position),
+            limit = Shown(limit)
         ),
         RejectReason::VelocityLimit { velocity, limit } => {
-            format!("{velocity:.3} {length}/s is beyond the velocity limit of {axis}, {limit:.3} {length}/s")
+            format!(
+                "{velocity:.3} {length}/s is beyond the velocity limit of {axis}, {limit:.3} {length}/s",
+                velocity = Shown(velocity),
+                limit = Shown(limit)
+            )
         }
         RejectReason::TorqueLimit { torque, limit } => {
-            format!("{torque:.2} {force} is beyond the torque limit of {axis}, {limit:.2} {force}")
+            format!(
+                "{torque:.2} {force} is beyond the torque limit of {axis}, {limit:.2} {force}",
+                torque = Shown(torque),
+                limit = Shown(limit)
+            )
         }
         RejectReason::NoRoomToStop { rest, limit } => format!(
             "at such a speed {axis} comes to rest only at {rest:.4} {length}, beyond its position limit of \
-             {limit:.4} {length}"
+             {limit:.4} {length}",
+            rest = Shown(rest),
+            limit = Shown(limit)
         ),
         RejectReason::VelocityScale { scale } => {
-            format!("{scale} is not a fraction of the velocity limits, above 0 up to 1")
+            format!("{} is not a fraction of the velocity limits, above 0 up to 1", Shown(scale))
         }
         RejectReason::AccelerationScale { scale } => {
-            format!("{scale} is not a fraction of the acceleration limits, above 0 up to 1")
+            format!("{} is not a fraction of the acceleration limits, above 0 up to 1", Shown(scale))
         }
         RejectReason::MinimumDuration { duration_s } => {
-            format!("{duration_s} s is not a possible shortest duration")
+            format!("{} s is not a possible shortest duration", Shown(duration_s))
         }
         RejectReason::UnknownGroup { group, groups } => {
             format!("there is no group {group}: there are {groups}, counted from 0")
@@ -100,7 +113,7 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         ),
         RejectReason::NoTrajectory => format!("no trajectory within the limits of {axis} leads there"),
         RejectReason::RatedTorque { torque } => {
-            format!("{torque} {force} is not a possible rated torque of {axis}")
+            format!("{} {force} is not a possible rated torque of {axis}", Shown(torque))
         }
         RejectReason::NoProcessData => format!("{axis} would have no PDO in one direction"),
         RejectReason::TooManyObjects => format!("a PDO of {axis} has too many objects"),
@@ -115,7 +128,9 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         RejectReason::UnknownTrajectory => "there is no such trajectory".to_owned(),
         RejectReason::UnknownCallback => "there is no such callback".to_owned(),
         RejectReason::StartMismatch { position, present } => format!(
-            "it begins at {position:.6} {length} while {axis} is at {present:.6} {length}, or at another velocity"
+            "it begins at {position:.6} {length} while {axis} is at {present:.6} {length}, or at another velocity",
+            position = Shown(position),
+            present = Shown(present)
         ),
         RejectReason::TooLate => "the cycle at which it was to begin has passed".to_owned(),
         RejectReason::ModeChanging => "the mode of operation is being changed".to_owned(),
@@ -127,13 +142,20 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         }
         RejectReason::NotDisabled => format!("the drive of {axis} must be disabled for it"),
         RejectReason::NotAtRest { velocity } => {
-            format!("{axis} is not at rest, or has not been for some cycles ({velocity:.4} {length}/s)")
+            format!(
+                "{axis} is not at rest, or has not been for some cycles ({velocity:.4} {length}/s)",
+                velocity = Shown(velocity)
+            )
         }
         RejectReason::OffSetPoint { distance, limit } => format!(
-            "{axis} is {distance:.6} {length} from its set-point (allowed: {limit:.6} {length}), and would be pulled there"
+            "{axis} is {distance:.6} {length} from its set-point (allowed: {limit:.6} {length}), and would be pulled there",
+            distance = Shown(distance),
+            limit = Shown(limit)
         ),
         RejectReason::BeyondCounter { position, limit } => format!(
-            "{axis} is at {position:.4} {length}, where the count of its drive may have wrapped: turn it by hand to its limit of {limit:.4} {length}"
+            "{axis} is at {position:.4} {length}, where the count of its drive may have wrapped: turn it by hand to its limit of {limit:.4} {length}",
+            position = Shown(position),
+            limit = Shown(limit)
         ),
         RejectReason::SuccessorPending => {
             "another trajectory is already to take the place of the present one".to_owned()
@@ -176,6 +198,11 @@ mod tests {
                 RejectReason::PositionLimit { position: 1.25, limit: 0.8 },
                 Some(1),
                 "slide cannot go to 1.2500 m, beyond its position limit of 0.8000 m",
+            ),
+            (
+                RejectReason::PositionLimit { position: -1e308, limit: -0.8 },
+                Some(1),
+                "slide cannot go to -1e308 m, beyond its position limit of -0.8000 m",
             ),
             (
                 RejectReason::StopLatched { rule: Rule::FollowingError },

@@ -3,6 +3,7 @@
 use takt_rt::{Fault, StopCause, StopReason};
 
 use super::{category, mode, phase};
+use crate::printable::Shown;
 use crate::telemetry::machine::{Machine, Unit};
 
 /// The cause of a stop, without phase and category: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
@@ -17,7 +18,9 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
     let is_measured = stop.axis().is_some_and(|axis| machine.plans_own_profile(axis));
     match fault {
         Fault::PositionLimit { position, limit } if is_measured => format!(
-            "{axis} would come to rest at {position:.4} {unit}, outside its position limit of {limit:.4} {unit}"
+            "{axis} would come to rest at {position:.4} {unit}, outside its position limit of {limit:.4} {unit}",
+            position = Shown(position),
+            limit = Shown(limit)
         ),
         Fault::FollowingError { .. } if is_measured => {
             format!("{axis} stood still, and its drive had not reached its target")
@@ -26,25 +29,45 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             format!("the set-point of {axis} was not a finite number ({position})")
         }
         Fault::PositionLimit { position, limit } => format!(
-            "the set-point of {axis}, {position:.4} {unit}, was outside its position limit of {limit:.4} {unit}"
+            "the set-point of {axis}, {position:.4} {unit}, was outside its position limit of {limit:.4} {unit}",
+            position = Shown(position),
+            limit = Shown(limit)
         ),
         Fault::VelocityLimit { velocity, limit } => {
-            format!("the set-point of {axis} asked for {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+            format!(
+                "the set-point of {axis} asked for {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)",
+                velocity = Shown(velocity),
+                limit = Shown(limit)
+            )
         }
         Fault::AccelerationLimit { acceleration, limit } => format!(
-            "the set-point of {axis} asked for {acceleration:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)"
+            "the set-point of {axis} asked for {acceleration:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)",
+            acceleration = Shown(acceleration),
+            limit = Shown(limit)
         ),
         Fault::JerkLimit { jerk, limit } => {
-            format!("the set-point of {axis} asked for {jerk:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)")
+            format!(
+                "the set-point of {axis} asked for {jerk:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)",
+                jerk = Shown(jerk),
+                limit = Shown(limit)
+            )
         }
         Fault::FollowingError { error, limit } => {
-            format!("{axis} was {error:.4} {unit} from its set-point (allowed: {limit:.4} {unit})")
+            format!(
+                "{axis} was {error:.4} {unit} from its set-point (allowed: {limit:.4} {unit})",
+                error = Shown(error),
+                limit = Shown(limit)
+            )
         }
         Fault::StartPose { distance, limit } => format!(
-            "the stream of set-points began {distance:.4} {unit} from where {axis} is (allowed: {limit:.4} {unit})"
+            "the stream of set-points began {distance:.4} {unit} from where {axis} is (allowed: {limit:.4} {unit})",
+            distance = Shown(distance),
+            limit = Shown(limit)
         ),
         Fault::ImplausibleFeedback { distance, reachable } => format!(
-            "{axis} was reported {distance:.4} {unit} from where it was, farther than it can have moved ({reachable:.4} {unit})"
+            "{axis} was reported {distance:.4} {unit} from where it was, farther than it can have moved ({reachable:.4} {unit})",
+            distance = Shown(distance),
+            reachable = Shown(reachable)
         ),
         Fault::StaleCommand { .. } if stop.axis().is_some() => {
             format!("the velocity or torque of {axis} expired and was not renewed")
@@ -86,13 +109,25 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             "the drive of {axis} does not obey the bus any more: it has cleared its remote bit (statusword 0x{statusword:04X})"
         ),
         Fault::MeasuredPosition { position, limit } => {
-            format!("{axis} was at {position:.4} {unit}, beyond its position limit of {limit:.4} {unit}")
+            format!(
+                "{axis} was at {position:.4} {unit}, beyond its position limit of {limit:.4} {unit}",
+                position = Shown(position),
+                limit = Shown(limit)
+            )
         }
         Fault::MeasuredVelocity { velocity, limit } => {
-            format!("{axis} moved at {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)")
+            format!(
+                "{axis} moved at {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)",
+                velocity = Shown(velocity),
+                limit = Shown(limit)
+            )
         }
         Fault::MeasuredTorque { torque, limit } => {
-            format!("the drive of {axis} exerted {torque:.2} {effort} (allowed: {limit:.2} {effort})")
+            format!(
+                "the drive of {axis} exerted {torque:.2} {effort} (allowed: {limit:.2} {effort})",
+                torque = Shown(torque),
+                limit = Shown(limit)
+            )
         }
         Fault::ModeChanged { shown, expected } => format!(
             "the drive of {axis} shows {} instead of {}",
@@ -109,10 +144,18 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             mode((own as i8).into())
         ),
         Fault::StiffnessLimit { stiffness, limit } => {
-            format!("a stiffness of {stiffness:.3} was wanted of {axis} (allowed: 0 to {limit:.3})")
+            format!(
+                "a stiffness of {stiffness:.3} was wanted of {axis} (allowed: 0 to {limit:.3})",
+                stiffness = Shown(stiffness),
+                limit = Shown(limit)
+            )
         }
         Fault::DampingLimit { damping, limit } => {
-            format!("a damping of {damping:.3} was wanted of {axis} (allowed: 0 to {limit:.3})")
+            format!(
+                "a damping of {damping:.3} was wanted of {axis} (allowed: 0 to {limit:.3})",
+                damping = Shown(damping),
+                limit = Shown(limit)
+            )
         }
         Fault::NotAcknowledged { limit, .. } => {
             format!("the drive of {axis} did not acknowledge its target within {}", cycles(limit))
