@@ -32,11 +32,12 @@ pub(crate) use adapter_latency::{adapter_latency_ns, shortest_latency_command};
 #[cfg(target_os = "linux")]
 pub use converter::ConverterError;
 #[cfg(target_os = "linux")]
-pub use interface::{InterfaceError, UnfitMode};
-#[cfg(target_os = "linux")]
 pub(crate) use interface::{
-    ControllerTiming, InterfaceSettings, InterfaceStatus, QUEUE_FRAMES, interface_status, transmit_queue_length,
+    ControllerTiming, InterfaceSettings, InterfaceStatus, QUEUE_FRAMES, interface_status,
+    transmit_queue_length,
 };
+#[cfg(target_os = "linux")]
+pub use interface::{InterfaceError, UnfitMode};
 #[cfg(target_os = "linux")]
 pub use open::OpenError;
 #[cfg(target_os = "linux")]
