@@ -64,7 +64,8 @@ mod tests {
         for refusal in [
             Problematic::Denied(Denied::Host { host: host.clone() }),
             Problematic::Denied(Denied::Origin { origin: host }),
-            Problematic::Denied(Denied::Token),
+            Problematic::Denied(Denied::NoToken),
+            Problematic::Denied(Denied::WrongToken),
             Problematic::NoHeader,
             Problematic::MediaType,
             Problematic::TooLarge,
