@@ -248,7 +248,7 @@ pub fn prepare_interface(
     }
     let interface = open(name)?;
     let is_controller = status.has_controller;
-    let may_configure = may_configure(&fs::read_to_string("/proc/self/status").unwrap_or_default());
+    let may_configure = this_process_may_configure();
     let refused = |action, error: &socketcan::Error| {
         let command = command(&status, settings);
         refusal(name, action, command, error, may_configure)
@@ -400,6 +400,11 @@ fn refusal(
 
 /// CAP_NET_ADMIN, as a bit of the sets of capabilities.
 const NET_ADMIN: u32 = 12;
+
+/// Whether this process may configure interfaces.
+pub(super) fn this_process_may_configure() -> bool {
+    may_configure(&fs::read_to_string("/proc/self/status").unwrap_or_default())
+}
 
 /// Whether a process may configure interfaces, as the kernel's status of it says.
 fn may_configure(status: &str) -> bool {

@@ -39,6 +39,10 @@ pub fn connect(name: &str) -> Result<Client, ConnectError> {
         io::ErrorKind::WouldBlock => ConnectError::NoReply { after: CONNECTED_WITHIN },
         _ => failed(error),
     })?;
+    let user = observer.peer().user;
+    if !names.is_believed(user) {
+        return Err(ConnectError::NotBelieved { name: name.to_owned(), user });
+    }
     let foreign = || ConnectError::Foreign { name: name.to_owned() };
     let (_, file) = observer
         .receive_memory()

@@ -30,6 +30,17 @@ pub enum ConnectError {
         /// The socket.
         path: PathBuf,
     },
+    /// Another user serves by this name, where everybody may.
+    #[error(
+        "user {user} serves by the name {name:?}, in a folder where everybody may make files: it may be another controller than you mean. Serve \
+         it in a folder of its own"
+    )]
+    NotBelieved {
+        /// The name.
+        name: String,
+        /// The user.
+        user: u32,
+    },
     /// Too many processes observe it.
     #[error("too many processes observe the controller")]
     TooManyObservers,

@@ -58,5 +58,5 @@ pub(crate) use layout::{Description, LeaseShown, STOP_WORDS};
 pub(crate) use memory::Memory;
 pub use replies::{Answer, Reply};
 pub(crate) use shown::{ShownWriter, now_ns};
-pub(crate) use socket::{Listener, NameError, Names, SocketError, accept};
+pub(crate) use socket::{Claimed, Listener, NameError, Names, SocketError, accept};
 pub use socket::{PACKET_WORDS, Packets, Received, Role};

@@ -2,11 +2,14 @@
 //!
 //! A packet is a sequence of 64-bit words. The kernel hands it over whole or not at all (`SOCK_SEQPACKET`). To connect to a socket a process
 //! needs write permission for its file: so the permissions of the two files say who observes and who commands.
+//!
+//! The files of a plain name are in a folder where no stranger can make or remove one: see [`Names`].
 
-use std::fs::{self, File, Permissions, TryLockError};
+use std::env;
+use std::fs::{self, DirBuilder, File, Permissions, TryLockError};
 use std::io::{self, IoSlice, IoSliceMut};
 use std::os::fd::{AsFd, AsRawFd, BorrowedFd, OwnedFd, RawFd};
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -17,6 +20,7 @@ use nix::sys::socket::{
     accept4, bind, connect, getsockopt, listen, recv, recvmsg, send, sendmsg, setsockopt, socket, sockopt,
 };
 use nix::sys::time::TimeVal;
+use nix::unistd::geteuid;
 
 use super::layout::{MAGIC, VERSION};
 use super::memory::{Memory, owned};
@@ -56,11 +60,21 @@ impl Role {
     }
 }
 
+/// The folder of services, and of names by which others may observe or command. The systemd unit makes it; root makes it where it is missing.
+const SHARED_FOLDER: &str = "/run/takt";
+
+/// The folder of the names that are for their user alone: `$XDG_RUNTIME_DIR/takt`. `None` outside of a session, as in a service.
+fn own_folder() -> Option<PathBuf> {
+    let runtime = env::var_os("XDG_RUNTIME_DIR").map(PathBuf::from).filter(|runtime| runtime.is_absolute());
+    runtime.map(|runtime| runtime.join("takt"))
+}
+
 /// The files of a name.
 #[derive(Clone, Debug)]
 pub struct Names {
     /// As it was given.
     pub name: String,
+    folder: PathBuf,
     observe: PathBuf,
     command: PathBuf,
     lock: PathBuf,
@@ -81,26 +95,52 @@ pub struct NameError {
 }
 
 impl Names {
-    /// The files of a name: in /dev/shm, or, for a name with a slash, where that path leads.
+    /// The files of the controller that is served by a name: where they are of the own folder and the shared one. Those of a name with a
+    /// slash are where that path leads.
     pub fn new(name: &str) -> Result<Self, NameError> {
+        let own = own_folder().map(|own| Self::in_folder(name, own)).transpose()?;
+        match own.filter(|own| own.observe.exists()) {
+            Some(own) => Ok(own),
+            None => Self::in_folder(name, SHARED_FOLDER.into()),
+        }
+    }
+
+    /// The files to serve a controller by a name with these permissions.
+    pub fn to_serve(name: &str, mode: u32) -> Result<Self, NameError> {
+        let is_own = mode & 0o066 == 0;
+        Self::in_folder(name, own_folder().filter(|_| is_own).unwrap_or_else(|| SHARED_FOLDER.into()))
+    }
+
+    fn in_folder(name: &str, folder: PathBuf) -> Result<Self, NameError> {
         let is_plain = |letter: char| letter.is_ascii_alphanumeric() || matches!(letter, '.' | '-' | '_');
-        let base = match name.contains('/') {
-            true => name.to_owned(),
-            false => format!("/dev/shm/takt-{name}"),
-        };
-        let is_name =
-            !name.is_empty() && !name.ends_with('/') && (name.contains('/') || name.chars().all(is_plain));
-        let is_short = base.len() + ".command.new".len() <= PATH_BYTES;
+        let is_path = name.contains('/');
+        let is_name = !name.is_empty() && !name.ends_with('/') && (is_path || name.chars().all(is_plain));
+        let base = if is_path { PathBuf::from(name) } else { folder.join(name) };
+        let is_short = base.as_os_str().len() + ".command.new".len() <= PATH_BYTES;
         if !is_name || !is_short || name.contains('\0') {
             return Err(NameError { name: name.to_owned() });
         }
-        let file = |end: &str| PathBuf::from(format!("{base}.{end}"));
+        let file = |end: &str| {
+            let mut file = base.as_os_str().to_owned();
+            file.push(end);
+            PathBuf::from(file)
+        };
+        let folder = base.parent().filter(|parent| !parent.as_os_str().is_empty());
         Ok(Self {
             name: name.to_owned(),
-            observe: file("observe"),
-            command: file("command"),
-            lock: file("lock"),
+            folder: folder.unwrap_or(Path::new(".")).to_owned(),
+            observe: file(".observe"),
+            command: file(".command"),
+            lock: file(".lock"),
         })
+    }
+
+    /// Whether a controller of `user` is believed to be the one of this name: if it is of this user or of root, or if its folder is not one
+    /// where everybody may make files.
+    pub fn is_believed(&self, user: u32) -> bool {
+        let folder = fs::metadata(&self.folder);
+        let is_guarded = folder.is_ok_and(|folder| folder.mode() & 0o002 == 0);
+        is_guarded || user == 0 || user == geteuid().as_raw()
     }
 
     /// The socket for observers.
@@ -120,6 +160,14 @@ pub enum SocketError {
     /// Another process has the name.
     #[error("another process serves by this name")]
     InUse,
+    /// Another user has it.
+    #[error("{} belongs to user {user}: choose another name, or remove the file if nobody serves by it", path.display())]
+    OfAnother {
+        /// The file.
+        path: PathBuf,
+        /// The user.
+        user: u32,
+    },
     /// A file cannot be used.
     #[error("{}: {error}", path.display())]
     File {
@@ -134,6 +182,82 @@ fn at(path: &Path) -> impl Fn(io::Error) -> SocketError {
     |error| SocketError::File { path: path.to_owned(), error }
 }
 
+/// A name that no other process can serve by, as long as this lives.
+pub struct Claimed {
+    names: Names,
+    /// Held by a lock as long as this process lives.
+    lock: File,
+}
+
+impl Claimed {
+    /// Claims a name. Afterwards it is known that its sockets can be made.
+    pub fn new(names: Names) -> Result<Self, SocketError> {
+        if !names.name.contains('/') {
+            make_folder(&names.folder).map_err(at(&names.folder))?;
+        }
+        let lock = open_lock(&names.lock)?;
+        match lock.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(SocketError::InUse),
+            Err(TryLockError::Error(error)) => return Err(at(&names.lock)(error)),
+        }
+        for path in [&names.observe, &names.command] {
+            for stale in [path.clone(), new_path(path)] {
+                remove(&stale).map_err(at(&stale))?;
+            }
+        }
+        Ok(Self { names, lock })
+    }
+
+    /// Listens by the name. Of `mode` the read bits say who observes, the write bits who commands.
+    pub fn listen(self, mode: u32) -> Result<Listener, SocketError> {
+        let Self { names, lock } = self;
+        let listening = |path: &Path, classes: u32| listening(path, classes * 0o6).map_err(at(path));
+        // One bit for each class of users, by its read and by its write bit.
+        let observers = listening(&names.observe, (mode >> 2) & 0o111)?;
+        let clients = listening(&names.command, (mode >> 1) & 0o111)?;
+        Ok(Listener { names, observers, clients, _lock: lock })
+    }
+}
+
+/// Makes the folder of plain names where it is missing: `$XDG_RUNTIME_DIR/takt` for its user alone, `/run/takt` for all to look into.
+fn make_folder(folder: &Path) -> io::Result<()> {
+    let mode = if folder == Path::new(SHARED_FOLDER) { 0o755 } else { 0o700 };
+    match DirBuilder::new().mode(mode).create(folder) {
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Opens the file of a lock, which its user alone can open: no other one can hold a lock on it.
+fn open_lock(path: &Path) -> Result<File, SocketError> {
+    let own = geteuid().as_raw();
+    let user = match fs::symlink_metadata(path) {
+        Ok(file) => file.uid(),
+        Err(_) => own,
+    };
+    if user != own {
+        return Err(SocketError::OfAnother { path: path.to_owned(), user });
+    }
+    let mut options = File::options();
+    options.create(true).append(true).mode(0o600).custom_flags(libc::O_NOFOLLOW);
+    options.open(path).map_err(at(path))
+}
+
+fn remove(path: &Path) -> io::Result<()> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Where a socket is made before it has its name.
+fn new_path(path: &Path) -> PathBuf {
+    let mut new = path.as_os_str().to_owned();
+    new.push(".new");
+    PathBuf::from(new)
+}
+
 /// The sockets of a process that serves. Their files are gone when this is dropped.
 pub struct Listener {
     names: Names,
@@ -141,52 +265,28 @@ pub struct Listener {
     pub observers: OwnedFd,
     /// For clients that command.
     pub clients: OwnedFd,
-    /// Held by a lock as long as this process lives.
     _lock: File,
 }
 
 impl Listener {
-    /// Listens by a name. Of `mode` the read bits say who observes, the write bits who commands.
-    pub fn new(names: Names, mode: u32) -> Result<Self, SocketError> {
-        let lock_failed = at(&names.lock);
-        // A file of another user is not created, but opened: Linux refuses the former in a folder that all may write.
-        let lock = File::open(&names.lock).or_else(|error| match error.kind() {
-            io::ErrorKind::NotFound => File::options().create(true).append(true).open(&names.lock),
-            _ => Err(error),
-        });
-        let lock = lock.map_err(&lock_failed)?;
-        match lock.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(SocketError::InUse),
-            Err(TryLockError::Error(error)) => return Err(lock_failed(error)),
-        }
-        drop(lock_failed);
-        let listening = |path: &Path, classes: u32| listening(path, classes * 0o6).map_err(at(path));
-        // One bit for each class of users, by its read and by its write bit.
-        let observers = listening(&names.observe, (mode >> 2) & 0o111)?;
-        let clients = listening(&names.command, (mode >> 1) & 0o111)?;
-        Ok(Self { names, observers, clients, _lock: lock })
-    }
-}
-
-impl Listener {
-    /// The names in /dev/shm that a process serves by at present, in their order.
+    /// The plain names by which controllers are served that this process may observe, in their order.
     #[cfg(feature = "cli")]
     pub fn names_in_use() -> Vec<String> {
-        let entries = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-        let name = |file: &str| Some(file.strip_prefix("takt-")?.strip_suffix(".observe")?.to_owned());
-        let names = entries.filter_map(|entry| name(entry.file_name().to_str()?));
-        let is_served = |name: &String| Names::new(name).is_ok_and(|names| Self::is_in_use(&names));
-        let mut names: Vec<String> = names.filter(is_served).collect();
+        let folders = own_folder().into_iter().chain([PathBuf::from(SHARED_FOLDER)]);
+        let entries = folders.filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();
+        let name =
+            |entry: fs::DirEntry| Some(entry.file_name().to_str()?.strip_suffix(".observe")?.to_owned());
+        let is_served = |name: &String| {
+            Names::new(name).is_ok_and(|names| match Packets::connect(&names.observe) {
+                Ok(observer) => names.is_believed(observer.peer().user),
+                // It is paused, and has a queue.
+                Err(error) => error.kind() == io::ErrorKind::WouldBlock,
+            })
+        };
+        let mut names: Vec<String> = entries.filter_map(name).filter(is_served).collect();
         names.sort();
+        names.dedup();
         names
-    }
-
-    /// Whether another process has a name.
-    #[cfg(feature = "cli")]
-    pub fn is_in_use(names: &Names) -> bool {
-        let lock = File::open(&names.lock);
-        lock.is_ok_and(|lock| matches!(lock.try_lock(), Err(TryLockError::WouldBlock)))
     }
 }
 
@@ -199,15 +299,9 @@ impl Drop for Listener {
     }
 }
 
-/// A socket at this path, in place of one that a process has left there that is no more. It is there with its permissions, and listens.
+/// A socket at this path. It is there with its permissions, and listens.
 fn listening(path: &Path, permissions: u32) -> io::Result<OwnedFd> {
-    let mut new = path.as_os_str().to_owned();
-    new.push(".new");
-    let new = PathBuf::from(new);
-    match fs::remove_file(&new) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        _ => {}
-    }
+    let new = new_path(path);
     let own = new_socket(SockFlag::SOCK_NONBLOCK)?;
     bind(own.as_raw_fd(), &UnixAddr::new(&new)?)?;
     fs::set_permissions(&new, Permissions::from_mode(permissions))?;

@@ -26,7 +26,7 @@ use std::time::Duration;
 use takt_rt::{Nanoseconds, RequestTarget};
 
 use crate::command::RunningController;
-use crate::remote::{Description, Listener, NameError, Names, STOP_WORDS, ShownWriter, SocketError};
+use crate::remote::{Claimed, Description, NameError, Names, STOP_WORDS, ShownWriter, SocketError};
 use connections::Connections;
 use lease::Lease;
 
@@ -102,6 +102,12 @@ impl fmt::Debug for ServeError {
 impl From<NameError> for ServeError {
     fn from(error: NameError) -> Self {
         Self::Name { words: error.to_string() }
+    }
+}
+
+impl From<SocketError> for ServeError {
+    fn from(error: SocketError) -> Self {
+        Self::Failed { words: error.to_string() }
     }
 }
 
@@ -185,45 +191,52 @@ pub fn serve(
     name: &str,
     options: ServeOptions,
 ) -> Result<Server, ServeError> {
-    verify_mode(&options)?;
-    let names = Names::new(name)?;
-    let shown = ShownWriter::new(&description(&controller))?;
-    let memory = shown.memory();
-    let listener = Listener::new(names, options.mode).map_err(|error| match error {
-        SocketError::InUse => ServeError::InUse { name: name.to_owned() },
-        error => ServeError::Failed { words: error.to_string() },
-    })?;
-    let served = Arc::new(Served {
-        controller: Arc::new(controller),
-        lease: Mutex::new(Lease::new(options.lease)),
-        stops: Stops::default(),
-        has_ended: AtomicBool::new(false),
-    });
-    let (wake, waker) = nix::unistd::pipe().map_err(io::Error::from)?;
-    let mut server = Server { served: Arc::clone(&served), waker: Some(waker), threads: vec![] };
-    // The first state is there before a client can connect.
-    let mut publisher = publisher::Publisher::new(Arc::clone(&served), shown);
-    publisher.publish();
-    server.spawn("takt-publish", move || publisher.run())?;
-    server.spawn("takt-connect", move || Connections::new(served, listener, memory, wake).run())?;
-    Ok(server)
+    Claim::new(name, options)?.serve(controller)
 }
 
-/// Whether a controller can be served by a name with these options, before it is there.
-///
-/// # Errors
-/// See [`ServeError`].
-#[cfg(feature = "cli")]
-pub(crate) fn verify(name: &str, options: &ServeOptions) -> Result<(), ServeError> {
-    verify_mode(options)?;
-    if Listener::is_in_use(&Names::new(name)?) {
-        return Err(ServeError::InUse { name: name.to_owned() });
+/// A name that this process will serve by. No other process can, from now on.
+pub(crate) struct Claim {
+    claimed: Claimed,
+    options: ServeOptions,
+}
+
+impl Claim {
+    /// Claims a name, before there is a controller.
+    ///
+    /// # Errors
+    /// See [`ServeError`].
+    pub(crate) fn new(name: &str, options: ServeOptions) -> Result<Self, ServeError> {
+        if options.mode & !0o666 != 0 {
+            return Err(ServeError::Mode { mode: options.mode });
+        }
+        let claimed = Claimed::new(Names::to_serve(name, options.mode)?).map_err(|error| match error {
+            SocketError::InUse => ServeError::InUse { name: name.to_owned() },
+            error => error.into(),
+        })?;
+        Ok(Self { claimed, options })
     }
-    Ok(())
-}
 
-const fn verify_mode(ServeOptions { mode, .. }: &ServeOptions) -> Result<(), ServeError> {
-    if *mode & !0o666 == 0 { Ok(()) } else { Err(ServeError::Mode { mode: *mode }) }
+    /// See [`serve()`].
+    pub(crate) fn serve(self, controller: impl RunningController + 'static) -> Result<Server, ServeError> {
+        let Self { claimed, options } = self;
+        let shown = ShownWriter::new(&description(&controller))?;
+        let memory = shown.memory();
+        let listener = claimed.listen(options.mode)?;
+        let served = Arc::new(Served {
+            controller: Arc::new(controller),
+            lease: Mutex::new(Lease::new(options.lease)),
+            stops: Stops::default(),
+            has_ended: AtomicBool::new(false),
+        });
+        let (wake, waker) = nix::unistd::pipe().map_err(io::Error::from)?;
+        let mut server = Server { served: Arc::clone(&served), waker: Some(waker), threads: vec![] };
+        // The first state is there before a client can connect.
+        let mut publisher = publisher::Publisher::new(Arc::clone(&served), shown);
+        publisher.publish();
+        server.spawn("takt-publish", move || publisher.run())?;
+        server.spawn("takt-connect", move || Connections::new(served, listener, memory, wake).run())?;
+        Ok(server)
+    }
 }
 
 impl Server {

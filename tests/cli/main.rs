@@ -22,6 +22,7 @@ mod monitor;
 #[path = "../panel/open_page.rs"]
 #[expect(dead_code, reason = "the panel of a controller is tested in `tests/panel`")]
 mod open_page;
+mod panel_access;
 mod panel_bench;
 mod plan_command;
 mod play_command;

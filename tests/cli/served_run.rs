@@ -1,5 +1,7 @@
 //! `takt run --serve`: what its clients see when the program is killed or interrupted.
 
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::process::{Child, Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -108,4 +110,34 @@ fn ctrl_c_brings_a_served_arm_to_rest_and_its_clients_are_told() {
     assert_eq!(stopped.reason.category, StopCategory::Two);
     assert_eq!(client.wait_for(Phase::Moving, LONG), Err(WaitError::Ended));
     assert_eq!(takt.0.wait().unwrap().code(), Some(130));
+}
+
+#[test]
+fn a_name_is_in_a_folder_of_its_user_alone_and_is_claimed_before_anything_is_enabled() {
+    let folder = TempDir::new().unwrap();
+    let takt = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
+        command.env("XDG_RUNTIME_DIR", folder.path()).stdin(Stdio::null());
+        command
+    };
+    let serve = |record: &str| {
+        let mut command = takt();
+        command
+            .args(["run", "configs/first.toml", "--serve", "arm", "--record"])
+            .arg(folder.path().join(record));
+        command
+    };
+    let first = serve("first.mcap").stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let _first = Program(first.unwrap());
+    let begun = Instant::now();
+    let listed = || String::from_utf8(takt().args(["top", "--list"]).output().unwrap().stdout).unwrap();
+    while !listed().lines().any(|name| name == "arm") {
+        assert!(begun.elapsed() < LONG);
+        thread::sleep(Duration::from_millis(50));
+    }
+    let names = fs::metadata(folder.path().join("takt")).unwrap();
+    assert_eq!(names.permissions().mode() & 0o777, 0o700);
+    let second = serve("second.mcap").output().unwrap();
+    assert_eq!(second.status.code(), Some(2));
+    assert!(!folder.path().join("second.mcap").exists(), "nothing was begun");
 }

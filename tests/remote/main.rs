@@ -6,6 +6,7 @@ mod crowds;
 mod deaths;
 mod garbage;
 mod lease;
+mod names;
 mod stops;
 
 use std::env;

@@ -69,7 +69,9 @@ fn run(options: Options) -> Result<(), BridgeError> {
     let bridge = Bridge::open(options, lost)?;
     match trajectories {
         None => {
-            eprintln!("takt-zenoh: {controller} publishes {states}, and takes no commands (--command lets it)")
+            eprintln!(
+                "takt-zenoh: {controller} publishes {states}, and takes no commands (--command lets it)"
+            )
         }
         Some(topic) => {
             eprintln!("takt-zenoh: warning: everyone who reaches the endpoints of zenoh commands the axes");

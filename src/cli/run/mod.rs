@@ -17,7 +17,7 @@ use crate::faults::{FaultInjector, Scenario, ScenarioError, ScenarioFault};
 use crate::monitor::BusDecoder;
 use crate::panel::{FrameSource, Listening, PanelError};
 use crate::schedule;
-use crate::serve::{self, ServeError, ServeOptions};
+use crate::serve::{Claim, ServeError, ServeOptions};
 use crate::telemetry::{EachCycle, Machine, Notice, RecordingDestination, RecordingOptions};
 use takt_rt::Snapshot;
 
@@ -96,10 +96,9 @@ fn run_or_refuse(arguments: Arguments) -> Result<Exit, UsageError> {
     schedule::verify(&config).map_err(|refused| refused.to_string())?;
     config.warnings().iter().for_each(|warning| say!("takt: warning: {warning}"));
     let serve_options = ServeOptions::default().with_mode(arguments.serve_mode);
-    let serve = arguments.serve.as_deref().map(|name| (name, serve_options));
-    if let Some((name, options)) = &serve {
-        serve::verify(name, options).map_err(|error| error.to_string())?;
-    }
+    let claim = |name| Claim::new(name, serve_options).map(|claim| (name, claim));
+    // Before any drive is enabled.
+    let serve = arguments.serve.as_deref().map(claim).transpose().map_err(|error| error.to_string())?;
     let listening = arguments.panel.map(|address| arguments.panel_access.listen(address)).transpose()?;
     let fault_injector = arguments.faults.as_deref().map(|path| fault_injector(path, &config)).transpose()?;
     let metrics = arguments.metrics.map(|_| Arc::new(Metrics::new(Machine::of(&config))));
@@ -180,17 +179,15 @@ fn offered(
     options: SessionOptions,
     notify: Box<dyn FnMut(&Notice) + Send>,
     mut watcher: Watcher,
-    (serve, listening): (Option<(&str, ServeOptions)>, Option<Listening>),
+    (serve, listening): (Option<(&str, Claim)>, Option<Listening>),
 ) -> Result<Session, NoSession> {
     let bar = watcher.bar.clone();
     let watch = move |snapshot: &Snapshot, progress| watcher.watch(snapshot, &progress);
     let decoders = (0..config.buses.len()).map(|bus| BusDecoder::of(config, bus)).collect();
     let frames = options.frames.clone().map(|feed| FrameSource { feed, decoders });
     let controller = Controller::start_watched(config.clone(), options, notify, watch)?;
-    let server = serve
-        .as_ref()
-        .map(|(name, options)| serve::serve(controller.handle(), name, options.clone()))
-        .transpose();
+    let (name, claim) = serve.unzip();
+    let server = claim.map(|claim| claim.serve(controller.handle())).transpose();
     let panel = listening.map(|listening| listening.show(controller.handle(), None, frames)).transpose();
     let (_server, panel) = match (server, panel) {
         (Ok(server), Ok(panel)) => (server, panel),
@@ -203,7 +200,7 @@ fn offered(
             return Err(NoSession::Show(error));
         }
     };
-    if let Some((name, _)) = serve {
+    if let Some(name) = name {
         bar.suspend(|| say!("takt: served by the name {name}, until Ctrl-C"));
     }
     if let Some(panel) = &panel {

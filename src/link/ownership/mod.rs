@@ -9,10 +9,11 @@ mod lock;
 
 use std::io;
 
+use nix::unistd::geteuid;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
-use super::interface::InterfaceSettings;
+use super::interface::{self, InterfaceSettings};
 use super::open::OpenError;
 use super::real_interface::RealInterface;
 use super::socketcan::SocketCanOptions;
@@ -31,7 +32,8 @@ pub enum IfOwned {
     #[default]
     Refuse,
     /// That process is asked to stop in control, and its end is awaited. Another master that cannot be asked, on another
-    /// host or of another program, is still refused.
+    /// host or of another program, is still refused. A process with CAP_NET_ADMIN continues without the lock if another
+    /// user than root keeps it, and then listens for a master as ever.
     TakeOver,
 }
 
@@ -108,6 +110,12 @@ pub enum ClaimError {
 }
 
 impl ClaimError {
+    /// Whether a process of a user that is neither root nor this one keeps the lock, whoever asks for it. Anybody in the network namespace
+    /// can bind its name.
+    fn is_of_stranger(&self) -> bool {
+        matches!(self, Self::NotReleased { holder, .. } if holder.user != 0 && holder.user != geteuid().as_raw())
+    }
+
     /// Whether [`IfOwned::TakeOver`] may help.
     pub(crate) const fn can_be_taken_over(&self) -> bool {
         matches!(self, Self::Held { role: Role::Master, .. })
@@ -134,7 +142,15 @@ impl Ownership {
         named.sort_by(|(one, _), (other, _)| one.cmp(other));
         let mut locks = vec![];
         for (name, claim) in &named {
-            locks.push(take(Role::Master, name, &claim.bus, &claim.interface, if_owned)?);
+            match take(Role::Master, name, &claim.bus, &claim.interface, if_owned) {
+                Ok(lock) => locks.push(lock),
+                Err(error) if error.is_of_stranger() && interface::this_process_may_configure() => {
+                    tracing::warn!(
+                        "{error}. It is no owner of the interface (CAP_NET_ADMIN): its lock is ignored"
+                    );
+                }
+                Err(error) => return Err(error),
+            }
         }
         // Only now: until the lock is taken, the interface belongs to another process.
         for (_, claim) in &named {
@@ -290,6 +306,19 @@ mod tests {
         let mut clock = JumpingClock::default();
         assert_eq!(listen(&mut ours, &mut clock), None);
         assert_eq!(clock.now_ns(), 300_000_000);
+    }
+
+    #[test]
+    fn a_lock_that_is_kept_is_of_a_stranger_unless_root_or_this_user_keeps_it() {
+        let kept_by = |user| ClaimError::NotReleased {
+            bus: "arm".to_owned(),
+            interface: "can0".to_owned(),
+            holder: Process { pid: 1, user },
+            error: ReleaseError::Unanswered,
+        };
+        let own = geteuid().as_raw();
+        assert!(!kept_by(0).is_of_stranger() && !kept_by(own).is_of_stranger());
+        assert!(kept_by(own + 1).is_of_stranger());
     }
 
     #[test]
