@@ -104,8 +104,7 @@ mod tests {
     #[test]
     fn a_bus_on_which_nobody_acknowledges_is_named_at_the_start_and_not_when_its_queue_is_full() {
         let mut queues = FullQueues::new(&arm());
-        let mut snapshot = Snapshot::default();
-        snapshot.at_ns = 1_000_000_000;
+        let mut snapshot = Snapshot { at_ns: 1_000_000_000, ..Snapshot::default() };
         snapshot.buses[1].state = BusState::ErrorPassive;
         assert_eq!(queues.poll(&snapshot).count(), 0, "it may have been error-passive before");
         snapshot.at_ns += UNACKNOWLEDGED_NS;
