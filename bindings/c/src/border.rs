@@ -1,4 +1,5 @@
-//! The border between C and Rust: no panic crosses it, and no pointer is used before it was looked at.
+//! The border between C and Rust: no panic crosses it, no cancellation of the thread takes effect behind it, and no pointer is used before it
+//! was looked at.
 
 use std::cell::Cell;
 use std::ffi::{CStr, c_char};
@@ -6,6 +7,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use crate::errors::{self, Failure, takt_result};
+use crate::posix::NotCancelled;
 
 thread_local! {
     static IS_IN_CALLBACK: Cell<bool> = const { Cell::new(false) };
@@ -17,6 +19,7 @@ pub(crate) fn enter(body: impl FnOnce() -> Result<takt_result, Failure>) -> takt
         // The text of an error would be allocated.
         return takt_result::TAKT_ERROR_IN_CALLBACK;
     }
+    let _whole = NotCancelled::new();
     let result = catch_unwind(AssertUnwindSafe(body)).unwrap_or_else(|_| Err(Failure::defect()));
     result.unwrap_or_else(errors::keep)
 }
@@ -28,6 +31,7 @@ pub(crate) fn carry_out(body: impl FnOnce() -> Result<(), Failure>) -> takt_resu
 
 /// The same for what may be called in a callback and in a signal handler: it keeps no error, since its text would be allocated.
 pub(crate) fn enter_without_words(body: impl FnOnce() -> takt_result) -> takt_result {
+    let _whole = NotCancelled::new();
     catch_unwind(AssertUnwindSafe(body)).unwrap_or(takt_result::TAKT_ERROR_DEFECT)
 }
 

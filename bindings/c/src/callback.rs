@@ -10,7 +10,7 @@ use takt::{
 
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{self, Entry, takt_callback, takt_handle, wrong};
+use crate::handles::{self, Entry, Unusable, takt_callback, takt_handle};
 use crate::state::takt_axis_state;
 use crate::stream::takt_target;
 
@@ -258,8 +258,8 @@ fn using(
     act: impl FnOnce(&CallbackHandle, &[usize]) -> Result<(), Failure>,
 ) -> takt_result {
     border::carry_out(|| {
-        let used = handles::using(callback.number).ok_or_else(wrong)?;
-        let Entry::Callback(handle, axes) = &*used else { return Err(wrong()) };
+        let used = handles::using(callback.number)?;
+        let Entry::Callback(handle, axes) = &*used else { return Err(Unusable::Wrong.into()) };
         act(handle, axes)
     })
 }

@@ -81,7 +81,7 @@ unsafe impl Growing for takt_group {
 pub extern "C" fn takt_axis_count(handle: takt_handle) -> usize {
     let mut count = 0;
     border::enter_without_words(|| {
-        count = handle.scope_if_open().map_or(0, |scope| scope.axes.len());
+        count = handle.scope().map_or(0, |scope| scope.axes.len());
         takt_result::TAKT_OK
     });
     count
@@ -92,7 +92,7 @@ pub extern "C" fn takt_axis_count(handle: takt_handle) -> usize {
 pub extern "C" fn takt_period_ns(handle: takt_handle) -> u64 {
     let mut period_ns = 0;
     border::enter_without_words(|| {
-        period_ns = handle.scope_if_open().map_or(0, |scope| scope.controller.period_ns());
+        period_ns = handle.scope().map_or(0, |scope| scope.controller.period_ns());
         takt_result::TAKT_OK
     });
     period_ns
@@ -149,7 +149,7 @@ pub unsafe extern "C" fn takt_describe_axis(
 pub extern "C" fn takt_group_count(handle: takt_handle) -> usize {
     let mut count = 0;
     border::enter_without_words(|| {
-        count = handle.scope_if_open().map_or(0, |scope| groups_of(&scope).len());
+        count = handle.scope().map_or(0, |scope| groups_of(&scope).len());
         takt_result::TAKT_OK
     });
     count

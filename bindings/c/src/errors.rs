@@ -49,7 +49,7 @@ pub enum takt_result {
     /// It has not happened in time. What was waited for goes on. Of a controller of another process also: that has not answered, and may
     /// still carry the command out.
     TAKT_ERROR_TIMEOUT = -14,
-    /// The controller has ended.
+    /// The controller has ended. In a fork of the process that has opened the handle: it is that process's. Nothing has changed.
     TAKT_ERROR_ENDED = -15,
     /// A callback has called a function that may wait or allocate. Nothing has changed. It leaves the last error as it is.
     TAKT_ERROR_IN_CALLBACK = -16,

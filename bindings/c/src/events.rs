@@ -8,7 +8,7 @@ use takt::{Event, EventKind, EventSource};
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::takt_result;
-use crate::handles::{self, Entry, takt_events, takt_handle, wrong};
+use crate::handles::{self, Entry, Unusable, takt_events, takt_handle};
 
 /// Room for the words of an event, with the zero at their end.
 pub const TAKT_WORDS_LENGTH: usize = 512;
@@ -106,8 +106,8 @@ pub unsafe extern "C" fn takt_next_event(
     event: *mut takt_event,
 ) -> takt_result {
     border::carry_out(|| {
-        let used = handles::using(events.number).ok_or_else(wrong)?;
-        let Entry::Events(reader, controller) = &*used else { return Err(wrong()) };
+        let used = handles::using(events.number)?;
+        let Entry::Events(reader, controller) = &*used else { return Err(Unusable::Wrong.into()) };
         let timeout = border::duration(timeout_s, "timeout_s")?;
         border::check_pointer(event, "event")?;
         let mut reader = reader.lock().unwrap_or_else(PoisonError::into_inner);

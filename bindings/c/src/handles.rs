@@ -3,6 +3,8 @@
 //!
 //! To use a handle is a few atomic operations, without a lock: a stop may do so in a signal handler, even in the middle of another call.
 //! An entry is freed by whoever closes its handle, once the last call that uses it has returned.
+//!
+//! A fork has a copy of the table, and none of the threads of the controllers in it. It may use only the handles that it opens itself.
 
 use std::ops::Deref;
 use std::ptr;
@@ -15,6 +17,7 @@ use takt::rt::RequestTarget;
 use takt::{CallbackHandle, Controller, EventSource, Handle, RunningController, VirtualController};
 
 use crate::errors::{Failure, takt_result};
+use crate::posix;
 
 /// A controller, or one group of its axes: whatever is asked by it concerns its axes alone, in their order. `{0}` is the null handle.
 #[derive(Clone, Copy, Debug)]
@@ -114,6 +117,8 @@ const LOOK: Duration = Duration::from_micros(100);
 
 struct Place {
     state: AtomicU64,
+    /// [`posix::forks`] when it was opened.
+    forks: AtomicU64,
     entry: AtomicPtr<Entry>,
 }
 
@@ -123,10 +128,42 @@ const _: fn() = || {
     is_for_every_thread::<Entry>();
 };
 
-static TABLE: [Place; PLACES] =
-    [const { Place { state: AtomicU64::new(0), entry: AtomicPtr::new(ptr::null_mut()) } }; PLACES];
+static TABLE: [Place; PLACES] = [const {
+    Place { state: AtomicU64::new(0), forks: AtomicU64::new(0), entry: AtomicPtr::new(ptr::null_mut()) }
+}; PLACES];
 /// Whoever opens a handle holds it. Nobody else needs it.
 static OPENING: Mutex<()> = Mutex::new(());
+
+/// Why a handle cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Unusable {
+    /// It is null, closed, or of another kind.
+    Wrong,
+    /// It was opened in the process of which this one is a fork.
+    Forked,
+}
+
+impl Unusable {
+    /// Without words, for a signal handler.
+    pub(crate) const fn result(self) -> takt_result {
+        match self {
+            Self::Wrong => takt_result::TAKT_ERROR_HANDLE,
+            Self::Forked => takt_result::TAKT_ERROR_ENDED,
+        }
+    }
+}
+
+impl From<Unusable> for Failure {
+    fn from(why: Unusable) -> Self {
+        let words = match why {
+            Unusable::Wrong => "the handle is null, closed, or of another kind",
+            Unusable::Forked => {
+                "the handle was opened in another process, and this is a fork of it: command the controller from there"
+            }
+        };
+        Self::new(why.result(), words)
+    }
+}
 
 /// An entry in use. It is not freed before this is dropped.
 pub(crate) struct Used {
@@ -153,24 +190,30 @@ impl Drop for Used {
 /// Makes a handle.
 pub(crate) fn open(entry: Entry) -> Result<u64, Failure> {
     let _opening = OPENING.lock().unwrap_or_else(PoisonError::into_inner);
+    posix::count_forks();
     let is_free = |place: &&Place| place.entry.load(Ordering::Acquire).is_null();
     let Some((number, place)) = (1..).zip(&TABLE).find(|(_, place)| is_free(place)) else {
         let words = format!("{PLACES} handles are open, and there is no room for another one; close some");
         return Err(Failure::new(takt_result::TAKT_ERROR_FULL, words));
     };
     place.entry.store(Box::into_raw(Box::new(entry)), Ordering::Release);
+    place.forks.store(posix::forks(), Ordering::Relaxed);
     // Calls with old handles of this place may be counted for a moment.
     let state = place.state.fetch_or(OPEN, Ordering::AcqRel);
     Ok((state >> USES_SHIFT) << USES_SHIFT | number)
 }
 
-/// Uses a handle. `None` for one that is null, closed, or made up.
-pub(crate) fn using(handle: u64) -> Option<Used> {
-    let place = place_of(handle)?;
+/// Uses a handle.
+pub(crate) fn using(handle: u64) -> Result<Used, Unusable> {
+    let place = place_of(handle).ok_or(Unusable::Wrong)?;
     let state = place.state.fetch_add(1, Ordering::Acquire);
     let used = Used { place, entry: place.entry.load(Ordering::Acquire) };
     // Dropping it takes the count back.
-    is_open(state, handle).then_some(used)
+    match is_open(state, handle) {
+        false => Err(Unusable::Wrong),
+        true if place.forks.load(Ordering::Relaxed) != posix::forks() => Err(Unusable::Forked),
+        true => Ok(used),
+    }
 }
 
 /// Closes a handle: from now on nobody can use it. `end` lets the calls return that use it, before they are waited for.
@@ -179,11 +222,14 @@ pub(crate) fn close<T>(
     is_kind: fn(&Entry) -> bool,
     end: impl FnOnce(&Entry) -> T,
 ) -> Result<T, Failure> {
-    let used = using(handle).filter(|used| is_kind(used)).ok_or_else(wrong)?;
+    let used = using(handle)?;
+    if !is_kind(&used) {
+        return Err(Unusable::Wrong.into());
+    }
     let place = used.place;
     let clear = |state: u64| is_open(state, handle).then_some(state & !OPEN);
     // Of several that close it at once, one does.
-    place.state.fetch_update(Ordering::AcqRel, Ordering::Acquire, clear).map_err(|_| wrong())?;
+    place.state.fetch_update(Ordering::AcqRel, Ordering::Acquire, clear).map_err(|_| Unusable::Wrong)?;
     let ended = end(&used);
     let entry = place.entry.load(Ordering::Acquire);
     drop(used);
@@ -210,11 +256,6 @@ fn is_open(state: u64, handle: u64) -> bool {
     state & OPEN != 0 && state >> USES_SHIFT == handle >> USES_SHIFT && handle & OPEN == 0
 }
 
-pub(crate) fn wrong() -> Failure {
-    let words = "the handle is null, closed, or of another kind";
-    Failure::new(takt_result::TAKT_ERROR_HANDLE, words)
-}
-
 /// The axes of a handle, in use.
 pub(crate) struct UsedScope(Used);
 
@@ -230,14 +271,10 @@ impl Deref for UsedScope {
 }
 
 impl takt_handle {
-    /// `None` for a handle that is not one of axes. Without words, for a signal handler.
-    pub(crate) fn scope_if_open(self) -> Option<UsedScope> {
+    /// The axes, if the handle is one of axes.
+    pub(crate) fn scope(self) -> Result<UsedScope, Unusable> {
         let used = using(self.number)?;
-        matches!(*used, Entry::Scope(_)).then(|| UsedScope(used))
-    }
-
-    pub(crate) fn scope(self) -> Result<UsedScope, Failure> {
-        self.scope_if_open().ok_or_else(wrong)
+        if matches!(*used, Entry::Scope(_)) { Ok(UsedScope(used)) } else { Err(Unusable::Wrong) }
     }
 }
 
@@ -256,13 +293,13 @@ mod tests {
     fn a_handle_that_is_closed_stays_closed_when_its_place_is_used_again() {
         let is_any = |_: &Entry| true;
         let first = open(entry()).unwrap();
-        assert!(using(first).is_some());
+        assert!(using(first).is_ok());
         assert!(close(first, is_any, |_| ()).is_ok());
         let second = open(entry()).unwrap();
         assert_ne!(first, second);
-        assert!(using(first).is_none());
+        assert!(using(first).is_err());
         assert!(close(first, is_any, |_| ()).is_err());
-        assert!(using(second).is_some());
+        assert!(using(second).is_ok());
         assert!(close(second, |entry| matches!(entry, Entry::Scope(_)), |_| ()).is_err());
         assert!(close(second, is_any, |_| ()).is_ok());
     }
@@ -270,7 +307,7 @@ mod tests {
     #[test]
     fn a_handle_that_is_made_up_is_none() {
         for made_up in [0, 1, 256, 257, OPEN, OPEN | 1, CALLS, u64::MAX, 77 << USES_SHIFT | 3] {
-            assert!(using(made_up).is_none(), "{made_up:#x}");
+            assert!(using(made_up).is_err(), "{made_up:#x}");
         }
     }
 
@@ -279,7 +316,7 @@ mod tests {
         let handle = open(entry()).unwrap();
         let used = using(handle).unwrap();
         let closing = thread::spawn(move || close(handle, |_| true, |_| ()).is_ok());
-        while using(handle).is_some() {
+        while using(handle).is_ok() {
             thread::yield_now();
         }
         assert!(!closing.is_finished());

@@ -14,6 +14,7 @@ pub mod handles;
 pub mod life;
 pub mod motion;
 pub mod open;
+mod posix;
 pub mod state;
 pub mod stream;
 pub mod trajectory;

@@ -68,7 +68,7 @@ fn end_of(scope: &Scope) -> Result<(), Failure> {
 pub extern "C" fn takt_now_ns(handle: takt_handle) -> u64 {
     let mut now_ns = 0;
     border::enter_without_words(|| {
-        now_ns = handle.scope_if_open().map_or(0, |scope| scope.controller.now_ns());
+        now_ns = handle.scope().map_or(0, |scope| scope.controller.now_ns());
         takt_result::TAKT_OK
     });
     now_ns
@@ -92,7 +92,10 @@ pub extern "C" fn takt_stop(handle: takt_handle, category: i32) -> takt_result {
             2 => StopCategory::Two,
             _ => return takt_result::TAKT_ERROR_ARGUMENT,
         };
-        let Some(scope) = handle.scope_if_open() else { return takt_result::TAKT_ERROR_HANDLE };
+        let scope = match handle.scope() {
+            Ok(scope) => scope,
+            Err(why) => return why.result(),
+        };
         let stopped = scope.controller.request_stop(scope.target, category);
         stopped.map_or_else(|error| errors::result_of(&error), |()| takt_result::TAKT_OK)
     })

@@ -36,7 +36,7 @@ impl Handle {
     }
 
     /// Lets so many cycles pass, and returns the state after them. In real time it waits for them; in virtual time it runs them, as fast
-    /// as this machine can, or fewer up to the end of the run.
+    /// as this machine can.
     ///
     /// # Errors
     /// [`WaitError::Ended`] if the controller has ended before them.
@@ -46,7 +46,12 @@ impl Handle {
         }
         match self.virtual_pace() {
             Some(pace) => {
-                pace.step(cycles, &self.0.life);
+                // Each cycle by itself: the owner can end the run between two of them.
+                for _ in 0..cycles {
+                    if self.0.life.is_ending() || pace.step(1, &self.0.life) == 0 {
+                        return Err(WaitError::Ended);
+                    }
+                }
                 Ok(self.state())
             }
             None if cycles == 0 => Ok(self.state()),

@@ -91,6 +91,21 @@ fn many_threads_and_signals_command_one_controller() {
 }
 
 #[test]
+fn a_fork_is_refused_and_neither_a_cancelled_thread_nor_one_that_lets_time_pass_keeps_a_controller_from_its_end()
+ {
+    let takt = Installed::new();
+    let processes = takt.compile(&program("processes.c"), &[], Library::Shared);
+    assert!(takt.run(&[], &processes, "configs/first.toml").contains("ended as it should"));
+}
+
+#[test]
+fn what_a_callback_in_cpp_throws_is_a_stop() {
+    let takt = Installed::new();
+    let throws = takt.compile(&program("throws.cpp"), &[], Library::Shared);
+    assert!(takt.run(&[], &throws, "configs/first.toml").contains("the exception was a stop"));
+}
+
+#[test]
 fn the_shared_library_has_the_functions_of_the_header_with_their_version_and_nothing_else() {
     let takt = Installed::new();
     let library = takt.prefix.join("lib/libtakt.so");
