@@ -229,8 +229,7 @@ impl Arm {
     #[pyo3(signature = (name, *, mode=0o600, lease=1.0))]
     fn serve(&self, py: Python<'_>, name: &str, mode: u32, lease: f64) -> PyResult<Server> {
         let options = ServeOptions::default().with_mode(mode).with_lease(duration(py, "lease", lease)?);
-        let handle = self.link.own(py, "serves it")?.clone();
-        Server::start(py, handle, name, options)
+        Server::start(py, self.link.clone(), name, options)
     }
 
     /// Lets another process command.

@@ -42,7 +42,7 @@ fn connect(py: Python<'_>, config: &mut Config, bus: &str, interface: &str) -> P
 fn read(source: &Bound<'_, PyAny>) -> PyResult<Result<Config, takt::ConfigError>> {
     let py = source.py();
     if let Ok(keys) = source.cast::<PyDict>() {
-        let text = toml::to_string_pretty(&value(keys, "the configuration")?);
+        let text = toml::to_string_pretty(&value(keys, "the configuration", 0)?);
         let text = text.map_err(|error| PyTypeError::new_err(error.to_string()))?;
         return Ok(py.detach(|| Config::parse("the dictionary, as TOML", &text)));
     }
@@ -61,12 +61,19 @@ fn read(source: &Bound<'_, PyAny>) -> PyResult<Result<Config, takt::ConfigError>
     Ok(py.detach(|| Config::load(&path)))
 }
 
-/// What TOML has for it.
-fn value(of: &Bound<'_, PyAny>, key: &str) -> PyResult<Value> {
+/// Deepest nesting of a configuration; none has half of it.
+const DEEPEST: usize = 16;
+
+/// What TOML has for it, so many levels below the top.
+fn value(of: &Bound<'_, PyAny>, key: &str, depth: usize) -> PyResult<Value> {
+    if depth > DEEPEST {
+        let words = format!("{key}: nested more than {DEEPEST} deep; does it contain itself?");
+        return Err(PyTypeError::new_err(words));
+    }
     if let Ok(table) = of.cast::<PyDict>() {
         let entry = |(name, of): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
             let name: String = name.extract()?;
-            let value = value(&of, &format!("{key}.{name}"))?;
+            let value = value(&of, &format!("{key}.{name}"), depth + 1)?;
             Ok((name, value))
         };
         return Ok(Value::Table(table.iter().map(entry).collect::<PyResult<_>>()?));
@@ -85,7 +92,7 @@ fn value(of: &Bound<'_, PyAny>, key: &str) -> PyResult<Value> {
         return Ok(Value::String(of.extract()?));
     }
     if of.is_instance_of::<PyList>() || of.is_instance_of::<PyTuple>() {
-        let values = of.try_iter()?.map(|of| value(&of?, key)).collect::<PyResult<_>>()?;
+        let values = of.try_iter()?.map(|of| value(&of?, key, depth + 1)).collect::<PyResult<_>>()?;
         return Ok(Value::Array(values));
     }
     // The numbers of numpy.

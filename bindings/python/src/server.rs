@@ -1,29 +1,49 @@
 //! Serving a controller to other processes.
 
+use std::mem;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use takt::{Handle, ServeOptions};
+use takt::ServeOptions;
 
 use crate::error::raise;
+use crate::link::Link;
 
 /// Lets other processes observe and command a controller, until it is closed.
 #[pyclass(module = "takt", frozen)]
 pub struct Server {
     server: Mutex<Option<takt::Server>>,
+    link: Link,
     name: String,
 }
 
 impl Server {
-    pub fn start(py: Python<'_>, handle: Handle, name: &str, options: ServeOptions) -> PyResult<Self> {
+    pub fn start(py: Python<'_>, link: Link, name: &str, options: ServeOptions) -> PyResult<Self> {
+        let handle = link.own(py, "serves it")?.clone();
         let server = py.detach(|| takt::serve(handle, name, options));
         let server = server.map_err(|error| raise(py, "ArgumentError", &error.to_string(), &[]))?;
-        Ok(Self { server: Mutex::new(Some(server)), name: name.to_owned() })
+        Ok(Self { server: Mutex::new(Some(server)), link, name: name.to_owned() })
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<takt::Server>> {
         self.server.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Ends it. A fork has none of its threads, and leaves it alone.
+    fn end(&self) {
+        let server = self.lock().take();
+        if self.link.is_of_this_process() {
+            drop(server);
+        } else {
+            mem::forget(server);
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 
@@ -31,7 +51,7 @@ impl Server {
 impl Server {
     /// Ends it: the calls of the clients say that the controller has ended. The controller goes on.
     fn close(&self, py: Python<'_>) {
-        py.detach(|| drop(self.lock().take()));
+        py.detach(|| self.end());
     }
 
     fn __enter__(slf: Py<Self>) -> Py<Self> {

@@ -49,6 +49,17 @@ def test_what_is_no_configuration_at_all_is_refused():
         takt.simulate({"name": object()})
 
 
+def test_a_configuration_that_contains_itself_is_an_error():
+    table = joint()
+    table["axis"] = [table]
+    with pytest.raises(TypeError, match="contain itself"):
+        takt.simulate(table)
+    array = []
+    array.append(array)
+    with pytest.raises(TypeError, match="contain itself"):
+        takt.simulate({"axis": array})
+
+
 def test_a_bus_is_connected_elsewhere_by_its_name():
     with pytest.raises(takt.ConfigError, match="the buses are: base, wrist"):
         takt.Arm(ARM6, buses={"waist": "can0"})

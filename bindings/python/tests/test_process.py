@@ -146,3 +146,21 @@ def test_a_fork_may_drop_its_copy(arm):
     _, status = os.waitpid(child, 0)
     assert os.waitstatus_to_exitcode(status) == 0
     assert not arm.has_ended
+
+
+def test_a_fork_may_close_its_copy_of_a_server(arm):
+    server = arm.serve(f"fork-{os.getpid()}")
+    child = os.fork()
+    if child == 0:
+        signal.alarm(20)
+        result = 1
+        try:
+            server.close()
+            result = 0
+        finally:
+            os._exit(result)
+    _, status = os.waitpid(child, 0)
+    assert os.waitstatus_to_exitcode(status) == 0
+    with takt.connect(f"fork-{os.getpid()}") as client:
+        assert not client.has_ended
+    server.close()
