@@ -44,8 +44,8 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("the drive of {0} reports a fault without an error code", "{0} 的驱动器报告故障，但没有错误码"),
     ("the drive of {0} reports fault <1>", "{0} 的驱动器报告故障 <1>"),
     (
-        "the drive of {0} left operation enabled by itself (statusword {1})",
-        "{0} 的驱动器自行退出运行使能（状态字 {1}）",
+        "the drive of {0} is no longer in operation enabled (statusword {1})",
+        "{0} 的驱动器已不在运行使能状态（状态字 {1}）",
     ),
     ("the drive of {0} was to be disabled and still shows <1>", "{0} 的驱动器应已去使能，但仍显示<1>"),
     (

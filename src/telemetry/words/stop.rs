@@ -91,7 +91,7 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             format!("the drive of {axis} reports fault {}", drive_error(stop, machine, error_code))
         }
         Fault::DriveDisabled { statusword } => {
-            format!("the drive of {axis} left operation enabled by itself (statusword 0x{statusword:04X})")
+            format!("the drive of {axis} is no longer in operation enabled (statusword 0x{statusword:04X})")
         }
         Fault::NotDisabled { state, silent_cycles: 0 } => {
             format!("the drive of {axis} was to be disabled and still shows {}", state.name())
@@ -327,7 +327,7 @@ mod tests {
                 Origin::Axis(0),
                 0x1250.into(),
                 0.0,
-                "the drive of shoulder left operation enabled by itself (statusword 0x1250)",
+                "the drive of shoulder is no longer in operation enabled (statusword 0x1250)",
             ),
             (
                 Rule::NotDisabled,
