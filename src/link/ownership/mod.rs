@@ -145,9 +145,7 @@ impl Ownership {
             match take(Role::Master, name, &claim.bus, &claim.interface, if_owned) {
                 Ok(lock) => locks.push(lock),
                 Err(error) if error.is_of_stranger() && interface::this_process_may_configure() => {
-                    tracing::warn!(
-                        "{error}. It is no owner of the interface (CAP_NET_ADMIN): its lock is ignored"
-                    );
+                    tracing::warn!("{error}. This process has CAP_NET_ADMIN and continues without the lock");
                 }
                 Err(error) => return Err(error),
             }
