@@ -51,8 +51,7 @@ pub(crate) async fn check(c: &AxisSession<'_>) -> StepResult {
     }
     c.step(
         "planner of the drive",
-        "the drive would not keep the limits of the axis by itself: choose limits that this value allows, or change the value \
-         (in the file named by `dcf`, if it has the object)",
+        "choose limits of the axis that this value allows, or change the value (in the file named by `dcf`, if it has the object)",
     );
     for (object, needed) in &requirements {
         match *needed {
