@@ -6,8 +6,8 @@ use super::check::Check;
 use super::configuration_file::{raise_unless_in_file, write_unless_in_file};
 use crate::canopen::object::Object;
 use crate::canopen::objects::{
-    MAX_DECELERATION, MAX_PROFILE_VELOCITY, MOTION_PROFILE_TYPE, PROFILE_ACCELERATION, PROFILE_DECELERATION,
-    PROFILE_VELOCITY, QUICK_STOP_DECELERATION,
+    MAX_ACCELERATION, MAX_DECELERATION, MAX_PROFILE_VELOCITY, MOTION_PROFILE_TYPE, PROFILE_ACCELERATION,
+    PROFILE_DECELERATION, PROFILE_VELOCITY, QUICK_STOP_DECELERATION,
 };
 use crate::config::{Axis, Control};
 
@@ -53,15 +53,12 @@ pub(crate) async fn check(c: &AxisSession<'_>) -> StepResult {
         "planner of the drive",
         "choose limits of the axis that this value allows, or change the value (in the file named by `dcf`, if it has the object)",
     );
-    for (object, needed) in &requirements {
-        match *needed {
-            Check::BoundAbove(least) if *object == MAX_DECELERATION => {
-                raise_unless_in_file(c, *object, least).await?
-            }
-            Check::Equals(value) => write_unless_in_file(c, *object, value).await?,
-            _ => {}
-        }
+    let limits = &c.axis.limits;
+    for (object, least) in [(MAX_ACCELERATION, limits.acceleration), (MAX_DECELERATION, limits.deceleration)]
+    {
+        raise_unless_in_file(c, object, acceleration_units(c.axis, least)).await?;
     }
+    write_unless_in_file(c, MOTION_PROFILE_TYPE, LINEAR_RAMP).await?;
     for (object, needed) in requirements {
         c.compare_optional(object, needed).await?;
     }

@@ -22,11 +22,12 @@ fn brought_up(config: &Config, objects: &[(u16, u32)]) -> (World, Option<String>
 }
 
 #[test]
-fn a_drive_that_may_not_brake_as_hard_as_planned_is_told_that_it_may() {
+fn a_drive_that_may_not_change_its_speed_as_fast_as_planned_is_told_that_it_may() {
     let config = in_profile_velocity();
-    let (mut world, failure) = brought_up(&config, &[(0x60C6, 200)]);
+    let (mut world, failure) = brought_up(&config, &[(0x60C5, 200), (0x60C6, 200)]);
     assert_eq!(failure, None);
     let drive = world.drive();
+    assert_eq!(drive.number(0x60C5, 0), drive.number(0x6083, 0));
     assert_eq!(drive.number(0x60C6, 0), drive.number(0x6084, 0));
     for kept in [0, u32::MAX] {
         let (mut world, failure) = brought_up(&config, &[(0x60C6, kept)]);
