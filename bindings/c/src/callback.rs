@@ -11,6 +11,7 @@ use takt::{
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
 use crate::handles::{self, Entry, Unusable, takt_callback, takt_handle};
+use crate::posix;
 use crate::state::takt_axis_state;
 use crate::stream::takt_target;
 
@@ -272,11 +273,13 @@ fn using(
 /// Errors: TAKT_ERROR_TIMEOUT, TAKT_ERROR_STOPPED after a call that took too long or returned another number and after every other stop,
 /// TAKT_ERROR_REPLACED, TAKT_ERROR_FORGOTTEN, TAKT_ERROR_ENDED, TAKT_ERROR_ARGUMENT, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
-pub extern "C" fn takt_wait_callback(callback: takt_callback, timeout_s: f64) -> takt_result {
-    using(callback, |handle, axes| {
+pub extern "C-unwind" fn takt_wait_callback(callback: takt_callback, timeout_s: f64) -> takt_result {
+    let result = using(callback, |handle, axes| {
         let timeout = border::duration(timeout_s, "timeout_s")?;
         handle.wait(timeout).map_err(|error| Failure::of_motion(&error, axes))
-    })
+    });
+    posix::cancellation_point();
+    result
 }
 
 /// How the calls of a callback have gone until now.

@@ -9,6 +9,7 @@ use takt::{Event, EventKind, EventSource};
 use crate::border::{self, Growing, put_text};
 use crate::errors::takt_result;
 use crate::handles::{self, Entry, Unusable, takt_events, takt_handle};
+use crate::posix;
 
 /// Room for the words of an event, with the zero at their end.
 pub const TAKT_WORDS_LENGTH: usize = 512;
@@ -100,12 +101,12 @@ pub unsafe extern "C" fn takt_open_events(handle: takt_handle, events: *mut takt
 /// # Safety
 /// `event` is null, or points to a structure of the size that it says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn takt_next_event(
+pub unsafe extern "C-unwind" fn takt_next_event(
     events: takt_events,
     timeout_s: f64,
     event: *mut takt_event,
 ) -> takt_result {
-    border::carry_out(|| {
+    let result = border::carry_out(|| {
         let used = handles::using(events.number)?;
         let Entry::Events(reader, controller) = &*used else { return Err(Unusable::Wrong.into()) };
         let timeout = border::duration(timeout_s, "timeout_s")?;
@@ -115,7 +116,9 @@ pub unsafe extern "C" fn takt_next_event(
         let shown = takt_event::of(&taken, &**reader, controller.machine());
         // SAFETY: the caller promises it.
         unsafe { border::put_growing(event, &shown, "event") }
-    })
+    });
+    posix::cancellation_point();
+    result
 }
 
 /// Closes a place among the events.

@@ -8,6 +8,7 @@ use takt::{CommandError, Outcome, Phase, StopCategory};
 use crate::border;
 use crate::errors::{self, Failure, takt_result};
 use crate::handles::{self, Entry, Owner, Scope, takt_handle};
+use crate::posix;
 use crate::state::{put_state, takt_phase, takt_state};
 
 /// How a stop is made (IEC 60204-1, 9.2.2). It is not safety-rated: for that the drives have STO, in hardware.
@@ -155,12 +156,12 @@ pub(crate) fn command(
 /// # Safety
 /// `state` is null, or points to a structure of the size that it says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn takt_wait_cycle(
+pub unsafe extern "C-unwind" fn takt_wait_cycle(
     handle: takt_handle,
     timeout_s: f64,
     state: *mut takt_state,
 ) -> takt_result {
-    border::carry_out(|| {
+    let result = border::carry_out(|| {
         let scope = handle.scope()?;
         let timeout = border::duration(timeout_s, "timeout_s")?;
         border::check_pointer(state, "state")?;
@@ -174,7 +175,9 @@ pub unsafe extern "C" fn takt_wait_cycle(
         let shown = scope.controller.cycle_after(seen, timeout)?;
         // SAFETY: the caller promises it.
         unsafe { put_state(&scope, &shown, state) }
-    })
+    });
+    posix::cancellation_point();
+    result
 }
 
 /// Waits until every group of the handle is in a phase: a takt_phase. `timeout_s` is from 0 on, or INFINITY.
@@ -183,15 +186,17 @@ pub unsafe extern "C" fn takt_wait_cycle(
 ///
 /// Errors: TAKT_ERROR_TIMEOUT, TAKT_ERROR_ENDED, TAKT_ERROR_ARGUMENT, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
-pub extern "C" fn takt_wait_phase(handle: takt_handle, phase: i32, timeout_s: f64) -> takt_result {
-    border::carry_out(|| {
+pub extern "C-unwind" fn takt_wait_phase(handle: takt_handle, phase: i32, timeout_s: f64) -> takt_result {
+    let result = border::carry_out(|| {
         let scope = handle.scope()?;
         let timeout = border::duration(timeout_s, "timeout_s")?;
         let wanted = Phase::ALL.into_iter().find(|known| *known as i32 == phase);
         let wanted =
             wanted.ok_or_else(|| Failure::argument(format!("phase is {phase}, which is no takt_phase")))?;
         Ok(scope.controller.wait_for_phase(scope.target, wanted, timeout)?)
-    })
+    });
+    posix::cancellation_point();
+    result
 }
 
 /// Lets so many cycles pass, and reads the state after them; `state` may be NULL. In virtual time it runs them, as fast as this machine
@@ -204,12 +209,12 @@ pub extern "C" fn takt_wait_phase(handle: takt_handle, phase: i32, timeout_s: f6
 /// # Safety
 /// `state` is null, or points to a structure of the size that it says.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn takt_advance(
+pub unsafe extern "C-unwind" fn takt_advance(
     handle: takt_handle,
     cycles: u64,
     state: *mut takt_state,
 ) -> takt_result {
-    border::carry_out(|| {
+    let result = border::carry_out(|| {
         let scope = handle.scope()?;
         let shown = scope.controller.advance(cycles)?;
         if state.is_null() {
@@ -217,7 +222,9 @@ pub unsafe extern "C" fn takt_advance(
         }
         // SAFETY: the caller promises it.
         unsafe { put_state(&scope, &shown, state) }
-    })
+    });
+    posix::cancellation_point();
+    result
 }
 
 const _: () = assert!(takt_phase::TAKT_PHASE_DISABLING as i32 == Phase::Disabling as i32);

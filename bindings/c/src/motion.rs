@@ -7,6 +7,7 @@ use takt::{CommandError, MotionId, MoveOptions, OperationMode};
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
 use crate::handles::{Scope, takt_handle};
+use crate::posix;
 
 /// A motion that was begun, for takt_wait(). It needs not be closed. A copy of it is as good.
 #[derive(Clone, Copy, Debug)]
@@ -215,13 +216,15 @@ fn operation_mode(mode: i32) -> Result<OperationMode, Failure> {
 /// Errors: TAKT_ERROR_TIMEOUT (the motion goes on), TAKT_ERROR_STOPPED, TAKT_ERROR_REFUSED, TAKT_ERROR_LIMIT, TAKT_ERROR_MODE,
 /// TAKT_ERROR_REPLACED, TAKT_ERROR_OVERTAKEN, TAKT_ERROR_FORGOTTEN, TAKT_ERROR_ENDED, TAKT_ERROR_ARGUMENT, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
-pub extern "C" fn takt_wait(handle: takt_handle, motion: takt_motion, timeout_s: f64) -> takt_result {
-    border::carry_out(|| {
+pub extern "C-unwind" fn takt_wait(handle: takt_handle, motion: takt_motion, timeout_s: f64) -> takt_result {
+    let result = border::carry_out(|| {
         let scope = handle.scope()?;
         let timeout = border::duration(timeout_s, "timeout_s")?;
         let result = scope.controller.wait(motion.id()?, timeout);
         result.map_err(|error| Failure::of_motion(&error, &scope.axes))
-    })
+    });
+    posix::cancellation_point();
+    result
 }
 
 /// How a motion has ended, without waiting: TAKT_UNDER_WAY, TAKT_OK, or an error of takt_wait(). Any thread, not in a callback; does not

@@ -13,6 +13,17 @@ unsafe extern "C" {
     fn pthread_atfork(prepare: ForkHandler, parent: ForkHandler, child: ForkHandler) -> c_int;
 }
 
+unsafe extern "C-unwind" {
+    fn pthread_testcancel();
+}
+
+/// Ends this thread if it has been cancelled, as the functions of POSIX do that wait. The last thing that a function of the header does: the
+/// frames that are unwound, up to that of the program, have nothing left to drop.
+pub(crate) fn cancellation_point() {
+    // SAFETY: it takes nothing. It unwinds through functions that may be unwound, and have nothing to drop.
+    unsafe { pthread_testcancel() };
+}
+
 /// Value of glibc and of musl.
 const PTHREAD_CANCEL_DISABLE: c_int = 1;
 

@@ -55,10 +55,7 @@ static void forks(const char *path) {
 
 static void *waits(void *of) {
     takt_state state = {.size = sizeof state};
-    for (;;) {
-        takt_wait_cycle(*(takt_handle *)of, 10.0, &state);
-        pthread_testcancel();
-    }
+    for (;;) takt_wait_cycle(*(takt_handle *)of, 10.0, &state);
     return NULL;
 }
 
