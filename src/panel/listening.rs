@@ -109,7 +109,6 @@ pub fn address(text: &str) -> Result<SocketAddr, String> {
 /// A panel that listens, and has no controller yet: browsers that come meanwhile wait.
 pub struct Listening {
     listener: TcpListener,
-    address: SocketAddr,
     url: String,
     access: Access,
 }
@@ -134,7 +133,7 @@ impl Listening {
         let address = listener.local_addr().map_err(failed)?;
         // Browsers send no fragment: the token comes into no log.
         let fragment = token.filter(|_| is_in_url).map_or(String::new(), |token| format!("#token={token}"));
-        Ok(Self { listener, address, url: format!("http://{address}/{fragment}"), access })
+        Ok(Self { listener, url: format!("http://{address}/{fragment}"), access })
     }
 
     /// Shows a controller from now on. `take_lease` takes it over from another process; `frames` are for the monitor.
@@ -166,7 +165,7 @@ impl Listening {
         };
         start().map_err(PanelError::Thread)?;
         let is_taken_over = Box::new(|| false);
-        Ok(Panel { _threads: threads, address: self.address, url: self.url, is_taken_over })
+        Ok(Panel { _threads: threads, url: self.url, is_taken_over })
     }
 
     /// Commissions drives on buses without a controller from now on.
@@ -184,24 +183,18 @@ impl Listening {
         };
         start().map_err(PanelError::Thread)?;
         let is_taken_over = Box::new(move || bench.is_taken_over());
-        Ok(Panel { _threads: threads, address: self.address, url: self.url, is_taken_over })
+        Ok(Panel { _threads: threads, url: self.url, is_taken_over })
     }
 }
 
 /// A panel that is open as long as it lives. When it is dropped, what its pages have set in motion comes to rest.
 pub struct Panel {
     _threads: Threads,
-    address: SocketAddr,
     url: String,
     is_taken_over: Box<dyn Fn() -> bool + Send + Sync>,
 }
 
 impl Panel {
-    /// Where it listens.
-    pub const fn address(&self) -> SocketAddr {
-        self.address
-    }
-
     /// What a browser opens. A token that was made for this panel is part of it.
     pub fn url(&self) -> &str {
         &self.url

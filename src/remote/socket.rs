@@ -156,7 +156,7 @@ impl Names {
 
 /// Why a process cannot listen, or cannot connect.
 #[derive(Debug, thiserror::Error)]
-pub enum SocketError {
+pub(crate) enum SocketError {
     /// Another process has the name.
     #[error("another process serves by this name")]
     InUse,

@@ -291,11 +291,11 @@ fn a_fault_is_told_with_its_words_and_is_cleared_by_the_page() {
 #[test]
 fn pages_are_told_that_the_controller_has_ended() {
     let Shown { panel, controller } = Shown::start("first.toml");
-    let page = Page::open(panel.address()).unwrap();
+    let page = Page::open(address_of(&panel)).unwrap();
     page.next("state");
     controller.finish().unwrap();
     while page.next("state")["has_ended"] != true {}
-    let (status, _, value) = post(panel.address(), "/api/stop", "", r#"{"category":2}"#);
+    let (status, _, value) = post(address_of(&panel), "/api/stop", "", r#"{"category":2}"#);
     assert_eq!((status, &value["error"]), (409, &json!("ended")));
     drop(panel);
     page.kill();

@@ -36,6 +36,12 @@ pub struct Shown {
     pub controller: Controller,
 }
 
+/// Where a panel listens, by the address that it prints.
+pub fn address_of(panel: &Panel) -> SocketAddr {
+    let place = panel.url().strip_prefix("http://").and_then(|rest| rest.split('/').next());
+    place.unwrap().parse().unwrap()
+}
+
 impl Shown {
     pub fn start(name: &str) -> Self {
         Self::with(config(name), SessionOptions::default(), &options(None))
@@ -49,7 +55,7 @@ impl Shown {
     }
 
     pub fn address(&self) -> SocketAddr {
-        self.panel.address()
+        address_of(&self.panel)
     }
 
     pub fn open(&self) -> Page {
