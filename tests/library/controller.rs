@@ -180,13 +180,13 @@ fn the_same_configuration_gives_the_same_run_bit_for_bit() {
 }
 
 #[test]
-fn after_an_hour_of_motion_the_axis_still_reaches_its_targets_exactly() {
+fn after_ten_minutes_of_motion_the_axis_still_reaches_its_targets_exactly() {
     let mut config = load("single-erob.toml");
-    config.program.repeat = 700;
+    config.program.repeat = 120;
     let mut run = start(&config);
     let mut largest_counts = 0.0_f64;
     let mut holding = 0;
-    let outcome = run.run(4_500_000, |run| {
+    let outcome = run.run(800_000, |run| {
         let snapshot = run.snapshot();
         holding = if snapshot.groups[0].phase == Phase::Holding { holding + 1 } else { 0 };
         // The joint has settled a tenth of a second after each move.
@@ -197,7 +197,7 @@ fn after_an_hour_of_motion_the_axis_still_reaches_its_targets_exactly() {
     });
     assert_eq!(outcome, Some(Outcome::Finished));
     let slots = run.snapshot().slot;
-    assert!(slots > 3_600_000, "{slots} ms");
+    assert!(slots > 600_000, "{slots} ms");
     assert!(largest_counts <= 2.0, "{largest_counts}");
 }
 

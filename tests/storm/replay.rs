@@ -7,13 +7,15 @@ use crate::case::Case;
 use crate::client_mode;
 use crate::run::record;
 
-/// Storms of each kind: eight kinds, and a thousand storms with `TAKT_STORM_CASES=125`.
-const CASES: u64 = 60;
+/// Storms of each kind, and more in a long run (`TAKT_STORM_CYCLES`): a thousand of all kinds.
+const CASES: u64 = 20;
+const CASES_OF_A_LONG_RUN: u64 = 100;
 
 /// Plays storms, replays each of them, and compares every record. A second replay begins in some cycle with the state of the first.
 fn replay_all(kind: &str, case: impl Fn(u64) -> Case) {
     let first = crate::number("TAKT_STORM_FIRST").unwrap_or(2_000_000);
-    for seed in first..first + crate::number("TAKT_STORM_CASES").unwrap_or(CASES) {
+    let usual = if crate::number("TAKT_STORM_CYCLES").is_some() { CASES_OF_A_LONG_RUN } else { CASES };
+    for seed in first..first + crate::number("TAKT_STORM_CASES").unwrap_or(usual) {
         let case = case(seed);
         let (journal, records) = record(&case).unwrap_or_else(|wrong| panic!("seed {seed}, {kind}: {wrong}"));
         let mut replay = Replay::new(&case.config, journal).unwrap();

@@ -154,3 +154,8 @@ impl Installed {
 pub fn program(name: &str) -> PathBuf {
     crate_folder().join("tests/programs").join(name)
 }
+
+/// Whether a tool is installed.
+pub fn is_here(command: &str) -> bool {
+    Command::new(command).arg("--version").output().is_ok_and(|output| output.status.success())
+}

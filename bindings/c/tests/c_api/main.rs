@@ -4,4 +4,5 @@ mod header;
 mod latency;
 mod library;
 mod programs;
+mod ros2_control;
 mod served;

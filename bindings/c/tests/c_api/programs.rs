@@ -2,10 +2,12 @@
 //! as they are, and under the sanitizers of gcc and valgrind.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
-use crate::library::{Installed, Library, MEMORY, THREADS, crate_folder, program, repository, succeeds};
+use crate::library::{
+    Installed, Library, MEMORY, THREADS, crate_folder, is_here, program, repository, succeeds,
+};
 
 /// Each program with its configuration, and what it says in the end.
 const EXAMPLES: [(&str, &str, &str); 6] = [
@@ -21,10 +23,6 @@ fn example(name: &str) -> PathBuf {
     crate_folder().join("examples").join(name)
 }
 
-fn is_here(command: &str) -> bool {
-    Command::new(command).arg("--version").output().is_ok_and(|output| output.status.success())
-}
-
 #[test]
 fn the_examples_are_compiled_as_they_are_installed_without_a_warning_and_run() {
     let takt = Installed::new();
@@ -36,6 +34,7 @@ fn the_examples_are_compiled_as_they_are_installed_without_a_warning_and_run() {
 }
 
 #[test]
+#[ignore = "the part memory runs it"]
 fn the_examples_run_under_the_address_sanitizer() {
     let takt = Installed::new();
     for (name, config, words) in EXAMPLES {
@@ -45,6 +44,7 @@ fn the_examples_run_under_the_address_sanitizer() {
 }
 
 #[test]
+#[ignore = "the part memory runs it"]
 fn the_examples_run_under_the_thread_sanitizer() {
     let takt = Installed::new();
     for (name, config, words) in EXAMPLES {
@@ -62,11 +62,8 @@ fn nothing_that_a_program_does_wrong_crashes_it_or_touches_foreign_memory() {
 
 /// The sanitizer sees what the program does; valgrind sees the library as well.
 #[test]
+#[ignore = "the part memory runs it"]
 fn nothing_leaks_and_nothing_is_read_before_it_is_written() {
-    if !is_here("valgrind") {
-        eprintln!("valgrind is not here; tests/run installs it");
-        return;
-    }
     let takt = Installed::new();
     let valgrind = [
         "valgrind",
@@ -137,131 +134,8 @@ fn pkg_config_finds_the_library() {
     assert!(ask("--libs").contains("-ltakt"));
 }
 
-#[test]
-fn a_controller_manager_of_humble_or_of_rolling_leads_the_system_of_ros2_control_through_its_life() {
-    let takt = Installed::new();
-    for of in ["humble", "rolling"] {
-        led_through_its_life(&takt, of);
-    }
-}
-
-fn led_through_its_life(takt: &Installed, of: &str) {
-    let package = crate_folder().join("../ros2_control");
-    let include = |folder: &str| format!("-I{}", package.join(folder).display());
-    let stand_ins = [include("test/stand_in/ros"), include(&format!("test/stand_in/{of}"))];
-    let more = [MEMORY[0], MEMORY[1], &include("include"), &stand_ins[0], &stand_ins[1]];
-    let sources = [package.join("test/drive_system.cpp"), package.join("src/takt_system.cpp")];
-    let compiled = takt.compile_all(&[&sources[0], &sources[1]], &more, Library::Shared);
-    let urdf = package.join("urdf/arm.ros2_control.urdf");
-    let configuration = repository().join("configs/arm6-erob-cst.toml");
-    let said =
-        succeeds(Command::new(compiled).arg(configuration).arg(urdf).current_dir(takt.programs.path()));
-    assert!(said.contains("the system has lived its life"), "{said}");
-}
-
-/// `CMakeLists.txt`, against stand-ins for the packages that it needs of ROS; a program of another package finds what it installs.
-#[test]
-fn the_ament_package_of_ros2_control_is_built_and_installed_by_cmake_and_found_by_others() {
-    if !is_here("cmake") {
-        eprintln!("cmake is not here; tests/run installs it");
-        return;
-    }
-    let takt = Installed::new();
-    let package = crate_folder().join("../ros2_control").canonicalize().unwrap();
-    let folder = takt.programs.path();
-    let prefix = folder.join("install");
-    let stand_ins = package.join("test/stand_in/cmake");
-    let places = format!("{};{};{}", takt.prefix.display(), stand_ins.display(), prefix.display());
-    let build = |source: &Path, name: &str| {
-        let mut configure = Command::new("cmake");
-        configure.args(["-DCMAKE_CXX_FLAGS=-Werror", "-S"]).arg(source).arg("-B").arg(folder.join(name));
-        configure.arg(format!("-DCMAKE_PREFIX_PATH={places}"));
-        succeeds(configure.arg(format!("-DCMAKE_INSTALL_PREFIX={}", prefix.display())));
-        succeeds(Command::new("cmake").arg("--build").arg(folder.join(name)));
-    };
-    build(&package, "package");
-    succeeds(Command::new("cmake").arg("--install").arg(folder.join("package")));
-    let share = prefix.join("share/takt_ros2_control");
-    for file in [
-        "package.xml",
-        "takt_system.xml",
-        "urdf/arm.ros2_control.urdf",
-        "config/arm.yaml",
-        "launch/arm.launch.xml",
-    ] {
-        assert!(share.join(file).is_file(), "{file} is not installed");
-    }
-    build(&package.join("test/uses"), "uses");
-    let mut command = Command::new(folder.join("uses/drive_system"));
-    command
-        .arg(repository().join("configs/arm6-erob-cst.toml"))
-        .arg(share.join("urdf/arm.ros2_control.urdf"));
-    let said = succeeds(command.current_dir(folder));
-    assert!(said.contains("the system has lived its life"), "{said}");
-}
-
-#[test]
-fn what_is_launched_in_ros2_control_has_its_controllers_and_these_their_joints_and_interfaces() {
-    let read = |file: &str| fs::read_to_string(crate_folder().join("../ros2_control").join(file)).unwrap();
-    let (launch, urdf) = (read("bringup/launch/arm.launch.xml"), read("urdf/arm.ros2_control.urdf"));
-    let controllers = read("bringup/config/arm.yaml");
-    let tag = urdf.split("<ros2_control").nth(1).unwrap();
-    let spawned =
-        launch.split("exec=\"spawner\" args=\"").skip(1).map(|rest| rest.split(' ').next().unwrap());
-    let spawned: Vec<&str> = spawned.collect();
-    assert_eq!(spawned.len(), 3, "{launch}");
-    for name in &spawned {
-        let own = controllers.split(&format!("\n{name}:\n  ros__parameters:\n")).nth(1).unwrap();
-        let own = own.split("\n\n").next().unwrap();
-        let list = |key: &str| {
-            let found = own.lines().find_map(|line| line.trim().strip_prefix(key)?.strip_prefix(": "));
-            found.unwrap_or_default().trim_matches(['[', ']']).split(", ").filter(|item| !item.is_empty())
-        };
-        let kind = list("type").next().unwrap();
-        assert!(controllers.contains(&format!("    {name}: {{type: {kind}}}\n")), "{name}");
-        for joint in list("joints") {
-            let joint = tag.split(&format!("<joint name=\"{joint}\">")).nth(1).unwrap();
-            let joint = joint.split("</joint>").next().unwrap();
-            for command in list("command_interfaces").chain(list("interface_name")) {
-                assert!(
-                    joint.contains(&format!("<command_interface name=\"{command}\"/>")),
-                    "{name}: {command}"
-                );
-            }
-            for shown in list("state_interfaces") {
-                assert!(joint.contains(&format!("<state_interface name=\"{shown}\"/>")), "{name}: {shown}");
-            }
-        }
-    }
-    let needed = read("package.xml");
-    let packages = launch.split("pkg=\"").skip(1).map(|rest| rest.split('"').next().unwrap());
-    let kinds = controllers.split("{type: ").skip(1).map(|rest| rest.split('/').next().unwrap());
-    for package in packages.chain(kinds) {
-        assert!(needed.contains(&format!("<exec_depend>{package}</exec_depend>")), "{package}");
-    }
-}
-
-/// What its page has for those who try it without ROS.
-#[test]
-fn the_commands_of_the_page_of_ros2_control_lead_the_system_through_its_life() {
-    if !is_here("pkg-config") {
-        eprintln!("pkg-config is not here; tests/run installs it");
-        return;
-    }
-    let takt = Installed::new();
-    let folder = takt.programs.path();
-    for name in ["bindings", "configs"] {
-        std::os::unix::fs::symlink(repository().join(name), folder.join(name)).unwrap();
-    }
-    // The first of them needs ROS.
-    let commands = blocks_of("bindings/ros2_control/README.md", "sh");
-    assert_eq!(commands.len(), 2, "{commands:?}");
-    let said = succeeds(&mut takt.shell(&commands[1]));
-    assert!(said.contains("the system has lived its life"), "{said}");
-}
-
 /// The blocks of a language in a page.
-fn blocks_of(page: &str, language: &str) -> Vec<String> {
+pub fn blocks_of(page: &str, language: &str) -> Vec<String> {
     let text = fs::read_to_string(repository().join(page)).unwrap();
     let begin = format!("```{language}\n");
     text.split(&begin).skip(1).map(|rest| rest.split("```").next().unwrap().to_owned()).collect()
