@@ -300,6 +300,7 @@ fn run_command(folder: &Path, link: &Path, options: &[&str]) -> Command {
     let patient = "communication_timeout = \"4 s\"\nmissed_feedback_cycles = 100";
     let text = include_str!("../../configs/turntable-modbus.toml").replacen(hasty, patient, 1);
     assert!(text.contains(patient));
+    let text = format!("{text}\n[cycle.missed_slots]\nstop = 100000\n");
     let config = folder.join("turntable.toml");
     fs::write(&config, text).unwrap();
     let mut takt = at_once(env!("CARGO_BIN_EXE_takt"));

@@ -197,7 +197,8 @@ fn the_black_box_of_a_run_that_was_not_recorded_is_replayed_and_shows_other_limi
     };
     let same = replay(&[]);
     assert_eq!(same["identical"], true, "{same:#}");
-    assert!(same["compared"].as_u64().unwrap() >= 300, "{same:#}");
+    // The slots of 300 ms and of the stop, but for those that were missed.
+    assert!(same["compared"].as_u64().unwrap() >= 100, "{same:#}");
     let stricter = replay(&["--set", "axes.joint.limits.jerk=20"]);
-    assert!(stricter["cycles"].as_u64().unwrap() >= 300, "{stricter:#}");
+    assert_eq!(stricter["cycles"], same["cycles"], "{stricter:#}");
 }
