@@ -28,7 +28,7 @@ pub(super) fn read(
         }
         let outcome = source.receive(limit, |arrival| {
             if let Some(frame) = accounting.arrived(&arrival) {
-                let at_ns = clocks.monotonic_at(arrival.real_time_ns);
+                let at_ns = clocks.arrival_ns(arrival.real_time_ns);
                 // There is room: the source was asked for no more than fit.
                 let _ = batch.try_push(Received { frame, at_ns });
             }
