@@ -117,6 +117,9 @@ fn is_beyond(value: f64, limit: f64) -> bool {
     value.is_nan() || value.abs() > limit * (1.0 + TOLERANCE)
 }
 
+/// The shortest time between two changes of the direction, as a share of the whole.
+const SHORTEST_SHARE: f64 = 1e-9;
+
 /// Speeding up and slowing down have limits of their own. Between two changes of the direction the acceleration has its extrema
 /// at the ends and where the jerk changes its sign.
 fn acceleration_violation(
@@ -128,6 +131,10 @@ fn acceleration_violation(
     let extrema = sign_changes(&of.jerk, duration_s);
     let mut from_s = 0.0;
     for to_s in turns.iter().copied().chain([duration_s]) {
+        // Where an axis comes to rest at an end, rounding makes it turn round just before: that is no interval.
+        if to_s - from_s <= SHORTEST_SHARE * duration_s {
+            continue;
+        }
         let direction = value(&of.velocity, 0.5 * (from_s + to_s));
         let inside = extrema.iter().copied().filter(|time_s| (from_s..=to_s).contains(time_s));
         let mut worst: Option<Violation> = None;

@@ -228,6 +228,17 @@ proptest! {
     }
 }
 
+#[test]
+fn a_joint_that_turns_round_at_a_point_slows_down_on_its_way_there_and_speeds_up_behind_it() {
+    // Rounding makes the joint turn round 2e-16 s before the first point. There it slows down, with less than the limit of that.
+    let points = [
+        point(0.4283779411302248, &[0.2670346674300507]),
+        point(0.9150255741123452, &[-0.04568410709475186]),
+        point(1.8627984395373585, &[0.0]),
+    ];
+    assert_eq!(from_rest(&points).unwrap_err().point(), Some(1));
+}
+
 /// The largest use of a limit that samples of a trajectory show, by differences of positions with a small step.
 fn largest_use(trajectory: &Trajectory, axes: usize, limits: &AxisLimits) -> f64 {
     let step_s = 1e-3;
