@@ -30,7 +30,8 @@ use seen::{Reading, Seen};
 const STOPPING_NS: Nanoseconds = 2_000_000_000;
 /// Once in so many readings beside the position, the temperature is read.
 const OTHERS_TO_TEMPERATURE: usize = 32;
-/// A drive that did not reply so often in a row is asked less often, so that the other ones of its line have their turns.
+/// A drive that is away, and did not reply so often in a row, is asked less often, so that the other ones of its line have their turns. One
+/// that has replied lately is not: noise may cost three replies in a row, and the drive itself waits for its master.
 const SILENT_AFTER: u32 = 3;
 /// From one request to a silent drive to the next.
 const SILENT_NS: Nanoseconds = 500_000_000;
@@ -196,8 +197,7 @@ impl Follower {
     /// What follows from the wish, from the age of the target, and from what the drive shows.
     fn go_on(&mut self, now_ns: Nanoseconds, target: &OffCycleTarget) {
         let is_stale = now_ns.saturating_sub(target.at_ns) > STALE_NS;
-        let is_lost =
-            self.silent > 0 && self.answered_ns.is_some_and(|at_ns| now_ns.saturating_sub(at_ns) > LOST_NS);
+        let is_lost = self.silent > 0 && self.answered_ns.is_some() && self.is_away(now_ns);
         let before = self.life;
         if target.wish == OffCycleWish::ClearFaults {
             // It may not be wished any more when there is room for the request.
@@ -344,12 +344,17 @@ impl Follower {
             }
             Err(_) => {
                 self.silent = self.silent.saturating_add(1);
-                if self.silent >= SILENT_AFTER {
+                if self.silent >= SILENT_AFTER && self.is_away(now_ns) {
                     self.ask_from_ns = now_ns.saturating_add(SILENT_NS);
                 }
             }
         }
         None
+    }
+
+    /// Whether the drive has not answered yet, or not for long.
+    fn is_away(&self, now_ns: Nanoseconds) -> bool {
+        self.answered_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) > LOST_NS)
     }
 
     fn note_answer(&mut self, now_ns: Nanoseconds) {
