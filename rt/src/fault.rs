@@ -184,10 +184,19 @@ pub enum Fault {
         /// Cycles that are allowed.
         limit: u32,
     },
+    /// A joint that was to be enabled did not come to rest in time: a drive is not enabled on a joint that moves.
+    NotAtRest {
+        /// How fast it was at the end: rad/s (m/s).
+        velocity: f64,
+        /// The mean velocity below which a joint is at rest.
+        limit: f64,
+    },
     /// No trajectory exists for what was asked.
     NoTrajectory,
-    /// An interface is bus-off or down.
-    BusLost,
+    /// A controller of a bus has left it, because of its own errors (ISO 11898-1).
+    BusOff,
+    /// An interface is down, or has gone.
+    BusDown,
     /// The error counters of an interface are near bus-off.
     BusErrorPassive,
     /// Frames of this controller do not get onto the wire.
@@ -270,8 +279,9 @@ impl Fault {
             Self::DampingLimit { .. } => Rule::DampingLimit,
             Self::NotAcknowledged { .. } => Rule::NotAcknowledged,
             Self::EnableTimeout { .. } => Rule::EnableTimeout,
+            Self::NotAtRest { .. } => Rule::NotAtRest,
             Self::NoTrajectory => Rule::NoTrajectory,
-            Self::BusLost => Rule::BusLost,
+            Self::BusOff | Self::BusDown => Rule::BusLost,
             Self::BusErrorPassive => Rule::BusErrorPassive,
             Self::NotTransmitted { .. } => Rule::NotTransmitted,
             Self::NodeLost { .. } => Rule::NodeLost,
@@ -300,9 +310,9 @@ impl Fault {
             Self::PositionLimit { position, limit } | Self::MeasuredPosition { position, limit } => {
                 (position, limit)
             }
-            Self::VelocityLimit { velocity, limit } | Self::MeasuredVelocity { velocity, limit } => {
-                (velocity, limit)
-            }
+            Self::VelocityLimit { velocity, limit }
+            | Self::MeasuredVelocity { velocity, limit }
+            | Self::NotAtRest { velocity, limit } => (velocity, limit),
             Self::MeasuredTorque { torque, limit } => (torque, limit),
             Self::AccelerationLimit { acceleration, limit } => (acceleration, limit),
             Self::JerkLimit { jerk, limit } => (jerk, limit),
@@ -334,8 +344,9 @@ impl Fault {
                 (id.value().into(), if id.is_extended() { EXTENDED_ID_BITS } else { 0.0 })
             }
             Self::CallbackOverrun { spent_ns, budget_ns } => (spent_ns as f64, budget_ns as f64),
+            Self::BusDown => (1.0, 0.0),
             Self::NoTrajectory
-            | Self::BusLost
+            | Self::BusOff
             | Self::BusErrorPassive
             | Self::UnexpectedBootUp
             | Self::CallbackPanicked => (0.0, 0.0),
@@ -373,8 +384,10 @@ impl Fault {
             Rule::DampingLimit => Self::DampingLimit { damping: seen, limit: allowed },
             Rule::NotAcknowledged => Self::NotAcknowledged { cycles: seen as u32, limit: allowed as u32 },
             Rule::EnableTimeout => Self::EnableTimeout { cycles: seen as u32, limit: allowed as u32 },
+            Rule::NotAtRest => Self::NotAtRest { velocity: seen, limit: allowed },
             Rule::NoTrajectory => Self::NoTrajectory,
-            Rule::BusLost => Self::BusLost,
+            Rule::BusLost if seen > 0.0 => Self::BusDown,
+            Rule::BusLost => Self::BusOff,
             Rule::BusErrorPassive => Self::BusErrorPassive,
             Rule::NotTransmitted => Self::NotTransmitted { cycles: seen as u32, limit: allowed as u32 },
             Rule::NodeLost => Self::NodeLost { cycles: seen as u32, limit: allowed as u32 },

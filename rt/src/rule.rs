@@ -35,7 +35,7 @@ pub enum Rule {
     EnableTimeout = 11,
     /// [`Fault::NoTrajectory`].
     NoTrajectory = 12,
-    /// [`Fault::BusLost`].
+    /// [`Fault::BusOff`] and [`Fault::BusDown`].
     BusLost = 13,
     /// [`Fault::NotTransmitted`].
     NotTransmitted = 14,
@@ -87,11 +87,13 @@ pub enum Rule {
     MeasuredVelocity = 37,
     /// [`Fault::MeasuredTorque`].
     MeasuredTorque = 38,
+    /// [`Fault::NotAtRest`].
+    NotAtRest = 39,
 }
 
 impl Rule {
     /// Every rule, in the order of their numbers.
-    pub const ALL: [Self; 39] = [
+    pub const ALL: [Self; 40] = [
         Self::Requested,
         Self::NotFinite,
         Self::PositionLimit,
@@ -131,6 +133,7 @@ impl Rule {
         Self::MeasuredPosition,
         Self::MeasuredVelocity,
         Self::MeasuredTorque,
+        Self::NotAtRest,
     ];
 
     /// Its word in configurations and reports.
@@ -175,6 +178,7 @@ impl Rule {
             Self::MeasuredPosition => "measured_position",
             Self::MeasuredVelocity => "measured_velocity",
             Self::MeasuredTorque => "measured_torque",
+            Self::NotAtRest => "not_at_rest",
         }
     }
 
@@ -211,6 +215,7 @@ impl Rule {
             | Self::ModeChanged
             | Self::ModeNotShown
             | Self::EnableTimeout
+            | Self::NotAtRest
             | Self::BusLost
             | Self::NotTransmitted
             | Self::NotAcknowledged

@@ -180,7 +180,7 @@ mod tests {
     use crate::cia402::DriveState;
 
     const REQUESTED: StopCause = StopCause::Requested;
-    const FAULT: StopCause = StopCause::Fault(Fault::BusLost);
+    const FAULT: StopCause = StopCause::Fault(Fault::BusOff);
     const UNRELEASED: StopCause =
         StopCause::Fault(Fault::DriveEnabled { state: DriveState::OperationEnabled });
     const CATEGORIES: [StopCategory; 3] = [StopCategory::Zero, StopCategory::One, StopCategory::Two];

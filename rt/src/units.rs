@@ -184,6 +184,11 @@ impl Scale {
         f64::from(units) * self.velocity_per_drive_velocity
     }
 
+    /// One unit of the drive's velocity: rad/s or m/s.
+    pub(crate) fn velocity_resolution(&self) -> f64 {
+        self.velocity_per_drive_velocity.abs()
+    }
+
     /// Torque (N·m or N) to per mille of the rated torque, as far as 16 bits go.
     pub fn torque_to_per_mille(&self, torque: f64) -> i32 {
         nearest(torque * self.per_mille_per_torque).clamp(i16::MIN.into(), i16::MAX.into())

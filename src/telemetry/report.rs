@@ -248,7 +248,7 @@ pub struct StopReport {
     pub slot: u64,
     /// The phase of the group.
     pub phase: &'static str,
-    /// The cure, where a drive has reported an error.
+    /// What to do about a fault.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cure: Option<&'static str>,
 }

@@ -7,6 +7,7 @@ use takt_rt::{
 
 use super::machine::Machine;
 
+mod cures;
 mod rejection;
 mod stop;
 

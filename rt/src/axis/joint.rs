@@ -99,7 +99,10 @@ impl JointEstimate {
                 };
                 self.jump = None;
                 match velocity {
-                    Some(velocity) => self.velocity = velocity,
+                    Some(velocity) => {
+                        (self.velocity, self.velocity_uncertainty) =
+                            (velocity, facts.scale.velocity_resolution());
+                    }
                     None => self.take_velocity(counts, meaning, span.longest_s, facts),
                 }
                 has_become_known = self.accept(reported, counts, facts);
@@ -195,6 +198,11 @@ impl JointEstimate {
     /// Whether the joint is reported to be slow, if only for a moment.
     pub(super) fn is_standing(&self, velocity_limit: f64) -> bool {
         self.velocity.abs() <= AT_REST * velocity_limit
+    }
+
+    /// How fast the joint moves, and how fast it might at rest.
+    pub(super) fn motion(&self, velocity_limit: f64) -> Option<(f64, f64)> {
+        self.standstill.motion(velocity_limit)
     }
 
     /// Whether the joint has been reported in one place for some cycles, since the last stop began.

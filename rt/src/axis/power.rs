@@ -160,14 +160,17 @@ impl Axis {
     }
 
     /// Grants power to the drive if it may be enabled. It has been disabled for so long that nothing older is under way in
-    /// either direction, it shows no fault, its reports come in their own cycle, and its joint is at rest on the set-point.
+    /// either direction, it shows no fault, its reports come in their own cycle, and its joint is at rest. The set-point leaps to the joint:
+    /// somebody may have turned it faster than the set-point follows.
     pub fn prepare_to_enable(&mut self, period_s: f64) {
         if self.shows_rest_without_torque()
             && !self.drive_state().is_faulted()
             && self.is_position_commandable()
             && self.controlwords.is_disabled_for_long()
-            && self.is_on_joint(period_s)
         {
+            if !self.is_on_joint(period_s) && self.power == Power::Enabling {
+                self.start_from_actual();
+            }
             self.power.grant();
         }
     }

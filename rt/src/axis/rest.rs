@@ -3,6 +3,7 @@
 use super::Axis;
 use crate::cia402::DriveState;
 use crate::control::ControlLaw;
+use crate::fault::Fault;
 
 impl Axis {
     /// Begins to come to rest: from now on it counts for how long the joint has stood.
@@ -53,6 +54,12 @@ impl Axis {
     /// Whether the joint has been reported to stand for some cycles.
     pub fn is_at_rest(&self) -> bool {
         self.joint.is_settled()
+    }
+
+    /// Returns the fault of a joint that moves while its drive is to be enabled.
+    pub fn motion_before_power(&self) -> Option<Fault> {
+        let (velocity, limit) = self.joint.motion(self.parameters.limits.velocity)?;
+        Some(Fault::NotAtRest { velocity, limit })
     }
 
     /// Whether the joint is reported to be slow, if only for a moment.

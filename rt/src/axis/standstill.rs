@@ -24,6 +24,8 @@ pub(super) struct Standstill {
     reports: u32,
     /// Whether enough reports in a row came from one place, and none since then from elsewhere.
     is_at_rest: bool,
+    /// Mean speed from end to end of the place that the joint left last: rad/s (m/s).
+    left_at: f64,
 }
 
 impl Standstill {
@@ -35,7 +37,8 @@ impl Standstill {
         let (lowest, highest) = self.place.unwrap_or((position, position));
         let (lowest, highest) = (lowest.min(position), highest.max(position));
         if highest - lowest > farthest.max(1.5 * count) {
-            *self = Self { place: Some((position, position)), reports: 0, is_at_rest: false };
+            let left_at = (highest - lowest) / (f64::from(self.reports + 1) * span.cycle_s);
+            *self = Self { place: Some((position, position)), reports: 0, is_at_rest: false, left_at };
             return;
         }
         let has_counted = self.place.is_some() && span.is_known;
@@ -43,8 +46,14 @@ impl Standstill {
         self.place = Some((lowest, highest));
         if self.reports >= STANDING_REPORTS {
             // From here on anew: a joint may creep out of a place in a long time.
-            *self = Self { place: Some((position, position)), reports: 0, is_at_rest: true };
+            *self = Self { place: Some((position, position)), reports: 0, is_at_rest: true, left_at: 0.0 };
         }
+    }
+
+    /// How fast the joint left the place where it was seen last, and the mean speed up to which it would have stayed there; `None` at rest,
+    /// and before it has left one.
+    pub(super) fn motion(&self, velocity_limit: f64) -> Option<(f64, f64)> {
+        (!self.is_at_rest && self.left_at > 0.0).then_some((self.left_at, PLACE * velocity_limit))
     }
 
     /// Whether the joint has been in one place for as long as is needed.

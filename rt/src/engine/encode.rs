@@ -31,7 +31,7 @@ enum Purpose {
 }
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
-    /// After its deadline, or behind a backlog, nothing leaves except what stops the drives.
+    /// Returns false after the deadline, and behind a backlog except for one SYNC as a trial.
     fn may_leave(&self, bus: usize, deadline: Deadline, purpose: Purpose) -> bool {
         let held_back = match purpose {
             Purpose::Sync => self.shared.backlog.without_sync(),

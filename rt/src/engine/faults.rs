@@ -85,7 +85,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         // One that is enabled already and has not been allowed to be is late, too.
         let late = self.axes.iter().find(|axis| !(axis.is_enabled() && axis.is_power_granted()));
         let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis.number()));
-        self.fail(origin, Fault::EnableTimeout { cycles, limit });
+        let moving = late.filter(|axis| !axis.is_power_granted() && !axis.has_torque());
+        let fault =
+            moving.and_then(Axis::motion_before_power).unwrap_or(Fault::EnableTimeout { cycles, limit });
+        self.fail(origin, fault);
     }
 
     #[inline]
@@ -93,7 +96,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let own = self.group.buses;
         for (bus, health) in buses.iter().enumerate().filter(|(bus, _)| own.contains(*bus)) {
             let fault = match health.state {
-                BusState::BusOff | BusState::Down => Fault::BusLost,
+                BusState::BusOff => Fault::BusOff,
+                BusState::Down => Fault::BusDown,
                 BusState::ErrorPassive => Fault::BusErrorPassive,
                 BusState::ErrorActive => continue,
             };

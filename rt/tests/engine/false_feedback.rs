@@ -115,7 +115,7 @@ fn one_false_position_does_not_reach_the_loops_that_are_closed_here() {
 }
 
 #[test]
-fn a_drive_is_enabled_only_when_its_target_is_where_the_joint_is() {
+fn a_drive_is_enabled_with_its_target_where_the_joint_is() {
     let mut rig = Rig::enabled(3);
     rig.request(Request::Disable);
     rig.run_until(Phase::Disabled, 600);
@@ -125,20 +125,20 @@ fn a_drive_is_enabled_only_when_its_target_is_where_the_joint_is() {
         rig.drive(0).position += counts(0.006);
         rig.run(1);
     }
+    // The target follows, as far as it may in a cycle, and is there when the drive is to be enabled.
+    assert_no_leap(&rig);
     rig.request(Request::Enable);
     let mut cycles = 0;
     while rig.drive(0).state != DriveState::OperationEnabled {
         rig.run(1);
         cycles += 1;
-        assert!(cycles < 500);
+        assert!(cycles < 100);
     }
-    assert!(cycles > 100, "it takes the target {cycles} cycles to get there");
     let (target, position) = (rig.engine.axes()[0].set_point().position, rig.drive(0).position);
     assert_eq!(scale().position_to_counts(target), position);
     rig.run_until(Phase::Holding, 10);
     rig.run(10);
     assert_eq!(rig.drive(0).position, position);
-    assert_no_leap(&rig);
 }
 
 #[test]

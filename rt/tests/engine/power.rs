@@ -1,7 +1,9 @@
 //! The power of drives that do not obey: a disabled group has no drive with torque, or a latched fault says which one has.
 
-use crate::fixture::{IdealDrive, Rig, parameters};
-use takt_rt::{DriveState, Fault, Frame, Id, Phase, Request, Rule, StopCause, StopReason};
+use core::f64::consts::PI;
+
+use crate::fixture::{IdealDrive, Rig, parameters, scale};
+use takt_rt::{DriveState, EngineParameters, Fault, Frame, Id, Phase, Request, Rule, StopCause, StopReason};
 
 /// The stop that a group shows.
 fn latched(rig: &Rig) -> Option<(Rule, Option<u8>)> {
@@ -219,4 +221,53 @@ fn a_drive_that_enables_itself_while_its_group_is_enabled_is_named_when_that_tak
     rig.drive(1).enables_itself = true;
     rig.run(510);
     assert_eq!(rules(&rig)[0], (Rule::EnableTimeout, Some(1)));
+}
+
+/// A joint that is turned by hand, in rad per cycle, while its group is disabled and then to be enabled.
+fn turned_by_hand(parameters: EngineParameters, disabled_cycles: usize, step: impl Fn(usize) -> f64) -> Rig {
+    let mut rig = Rig::of(parameters);
+    rig.host.requests.extend([Request::Sync(true), Request::Activate]);
+    rig.run(5);
+    let mut position = scale().position_from_counts(rig.drive(0).position);
+    let mut turn = |rig: &mut Rig, cycle| {
+        position += step(cycle);
+        rig.drive(0).position = scale().position_to_counts(position);
+        rig.run(1);
+    };
+    (0..disabled_cycles).for_each(|cycle| turn(&mut rig, cycle));
+    rig.request(Request::Enable);
+    for cycle in disabled_cycles..disabled_cycles + 600 {
+        if rig.phase() == Phase::Holding {
+            break;
+        }
+        turn(&mut rig, cycle);
+    }
+    rig
+}
+
+#[test]
+fn a_joint_is_enabled_where_it_has_been_turned_by_hand_however_fast() {
+    let mut slow = parameters(1);
+    slow.axes[0].limits.velocity = 5.0_f64.to_radians();
+    // 90 degrees in 0.2 s, and a jump of the count of turns. Both took longer than a set-point at the limit had until it was enabled.
+    for step in [(200, 0.5 * PI / 200.0), (1, 2.0)] {
+        let rig = turned_by_hand(slow.clone(), 400, |cycle| if cycle < step.0 { step.1 } else { 0.0 });
+        assert_eq!((rig.phase(), rules(&rig)), (Phase::Holding, vec![]));
+        let axis = &rig.host.snapshot.axes()[0];
+        assert!((axis.position_set - axis.position).abs() < 1e-4, "{axis:?}");
+    }
+}
+
+#[test]
+fn a_joint_that_moves_is_not_enabled_and_is_named_as_the_reason() {
+    let swing = |cycle: usize| 2e-5 * if cycle / 100 % 2 == 0 { 1.0 } else { -1.0 };
+    let steps: [&dyn Fn(usize) -> f64; 2] = [&|_| 2e-5, &swing];
+    for step in steps {
+        let rig = turned_by_hand(parameters(1), 100, step);
+        let StopCause::Fault(Fault::NotAtRest { velocity, limit }) = rig.stops()[0].cause else {
+            panic!("{:?}", rig.stops());
+        };
+        assert!((velocity - 0.02).abs() < 0.01 && velocity > limit, "{velocity} {limit}");
+        assert_eq!(rig.host.snapshot.axes()[0].drive_state, DriveState::ReadyToSwitchOn);
+    }
 }

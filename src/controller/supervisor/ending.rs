@@ -80,7 +80,7 @@ impl Supervisor {
 
     pub(super) fn disable(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         if is_every_group_off(snapshot) {
-            self.note_fault_while_disabling(snapshot);
+            self.note_latched_fault(snapshot);
             self.note_unreleased(snapshot);
             self.begin_shut_down(now_ns);
         } else if elapsed_ns > self.stage_timeout_ns {
@@ -90,10 +90,11 @@ impl Supervisor {
         }
     }
 
-    /// A fault during disabling is the outcome of a run that was without faults before.
-    fn note_fault_while_disabling(&mut self, snapshot: &Snapshot) {
-        let fault = fault_stop(snapshot).filter(|stop| stop.phase == Phase::Disabling);
-        if let (Some(stop), Some(Outcome::Finished | Outcome::Interrupted)) = (fault, &self.outcome) {
+    /// A fault that nobody has reset is the outcome of a run that ended well otherwise.
+    fn note_latched_fault(&mut self, snapshot: &Snapshot) {
+        if let (Some(stop), Some(Outcome::Finished | Outcome::Interrupted)) =
+            (fault_stop(snapshot), &self.outcome)
+        {
             self.outcome = Some(Outcome::Stopped(stop));
         }
     }

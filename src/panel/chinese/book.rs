@@ -7,7 +7,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeSet, HashMap};
 use std::sync::OnceLock;
 
-use super::{bench, commands, drive_errors, events, procedures, refusals, rejections, scans, stops};
+use super::{bench, commands, cures, drive_errors, events, procedures, refusals, rejections, scans, stops};
 use crate::family::{self, ChinesePhrase};
 
 /// No sentence of takt is longer, in bytes. What comes from elsewhere may be.
@@ -63,6 +63,7 @@ pub(super) fn phrases() -> Vec<ChinesePhrase> {
     let general = [
         events::PHRASES,
         stops::PHRASES,
+        cures::PHRASES,
         rejections::PHRASES,
         drive_errors::PHRASES,
         commands::PHRASES,

@@ -7,6 +7,7 @@
 mod bench;
 mod book;
 mod commands;
+mod cures;
 mod drive_errors;
 mod events;
 #[cfg(feature = "panel")]

@@ -134,6 +134,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("measured_position", "实测位置超出限值"),
     ("measured_velocity", "实测速度超出限值"),
     ("measured_torque", "实测转矩超出限值"),
+    ("not_at_rest", "关节未静止，无法使能"),
 ];
 
 #[cfg(test)]

@@ -56,18 +56,9 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "the drive of {0} shows <1> although its group is disabled: something else has enabled it",
         "{0} 的驱动器在所属组去使能时显示<1>：它被其他设备使能",
     ),
-    ("keep away from the joint and cut the supply of its drive", "远离关节并切断其驱动器电源"),
-    (
-        "keep away from the joint, and end the other master or the vendor's tool that enables its drive",
-        "远离关节，并结束使能其驱动器的其他主站或厂商工具",
-    ),
     (
         "the drive of {0} does not obey the bus any more: it has cleared its remote bit (statusword {1})",
         "{0} 的驱动器不再受总线控制：它已清除远程位（状态字 {1}）",
-    ),
-    (
-        "keep away from the joint, and end the vendor's tool or the local input that controls its drive",
-        "远离关节，并结束控制其驱动器的厂商工具或本地输入",
     ),
     ("the drive of {0} shows <1> instead of <2>", "{0} 的驱动器显示<1>，而不是<2>"),
     (
@@ -106,7 +97,12 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("the callback took {0} µs (allowed: {1} µs)", "回调函数耗时 {0} µs（允许：{1} µs）"),
     ("the callback panicked", "回调函数崩溃（panic）"),
     ("<0> is error-passive: almost no frame gets through", "<0> 处于被动错误状态：几乎没有帧能通过"),
-    ("<0> is bus-off or its interface is down", "<0> 已关闭（bus-off）或其接口已断开"),
+    ("<0> is bus-off: too many of its frames had errors", "<0> 已关闭（bus-off）：出错的帧过多"),
+    ("the interface of <0> is down, or has gone", "<0> 的接口已断开或已移除"),
+    (
+        "{0} did not come to rest to be enabled: it moved at {1} {2}/s (at rest: below {3} {4}/s)",
+        "{0} 未静止，无法使能：其速度为 {1} {2}/s（静止：低于 {3} {4}/s）",
+    ),
     (
         "the drive of {0} did not reach operation enabled within <1> ({2} s)",
         "{0} 的驱动器未在 <1>（{2} s）内进入运行使能",

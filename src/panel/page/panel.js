@@ -178,7 +178,6 @@ function showFaults() {
   if (key === faultsShown) return;
   faultsShown = key;
   const banner = ({ stop, number, phase }) => {
-    const cure = stop.cure ? told(stop.cure) : textOr(`cure_${stop.rule}`, "");
     const clear = element("button", { type: "button", class: "primary", onclick: () => act("clear_fault", number) }, text("clear_fault"));
     clear.disabled = !commands() || phase === "stopping";
     return element(
@@ -187,7 +186,7 @@ function showFaults() {
       element("h2", {}, text("fault_of", textOr(`rule_${stop.rule}`, stop.rule))),
       element("div", { class: "buttons" }, clear),
       element("p", {}, told(stop.words)),
-      element("p", { class: "cure" }, cure ? text("try_this", cure) : ""),
+      element("p", { class: "cure" }, stop.cure ? text("try_this", told(stop.cure)) : ""),
     );
   };
   find("faults").replaceChildren(...faults.map(banner));

@@ -2,6 +2,7 @@
 
 use takt_rt::{Fault, StopCause, StopReason};
 
+use super::cures::cure;
 use super::{category, mode, phase};
 use crate::printable::Shown;
 use crate::telemetry::machine::{Machine, Unit};
@@ -189,7 +190,13 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         ),
         Fault::CallbackPanicked => "the callback panicked".to_owned(),
         Fault::BusErrorPassive => format!("{bus} is error-passive: almost no frame gets through"),
-        Fault::BusLost => format!("{bus} is bus-off or its interface is down"),
+        Fault::BusOff => format!("{bus} is bus-off: too many of its frames had errors"),
+        Fault::BusDown => format!("the interface of {bus} is down, or has gone"),
+        Fault::NotAtRest { velocity, limit } => format!(
+            "{axis} did not come to rest to be enabled: it moved at {velocity:.4} {unit}/s (at rest: below {limit:.4} {unit}/s)",
+            velocity = Shown(velocity),
+            limit = Shown(limit)
+        ),
         Fault::EnableTimeout { limit, .. } => format!(
             "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
             cycles(limit),
@@ -217,24 +224,19 @@ fn drive_error(stop: &StopReason, machine: &Machine, code: u16) -> String {
     machine.drive_error(stop.axis().unwrap_or(u8::MAX), code)
 }
 
-/// The cure, where a drive has torque that it should not have, or has stopped the group and its error is known.
+/// What to do about the fault of a stop: the cure of the drive's error where it is known. `None` for a stop that was asked for.
 pub(crate) fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
-    match stop.cause.fault()? {
+    let fault = stop.cause.fault()?;
+    let of_drive = match fault {
         Fault::DriveFault { error_code: code } | Fault::EmergencyMessage { code } => {
-            Some(machine.drive_cure(stop.axis()?, *code))
+            stop.axis().map(|axis| machine.drive_cure(axis, *code))
         }
-        Fault::NotDisabled { .. } => Some("keep away from the joint and cut the supply of its drive"),
-        Fault::DriveEnabled { .. } => Some(
-            "keep away from the joint, and end the other master or the vendor's tool that enables its drive",
-        ),
-        Fault::DriveLocal { .. } => Some(
-            "keep away from the joint, and end the vendor's tool or the local input that controls its drive",
-        ),
         _ => None,
-    }
+    };
+    Some(of_drive.unwrap_or_else(|| cure(fault)))
 }
 
-/// The full text of a stop: cause, phase, category, and cure where one is known.
+/// The full text of a stop: cause, phase, category, and the cure of a fault.
 pub fn stop(stop: &StopReason, machine: &Machine) -> String {
     let text =
         format!("{} while {}; {}", stop_cause(stop, machine), phase(stop.phase), category(stop.category));
@@ -393,7 +395,21 @@ mod tests {
                 2000.0,
                 "the drive of axis 9 did not reach operation enabled within 2000 cycles (2.0 s)",
             ),
-            (Rule::BusLost, Origin::Bus(0), 0.0, 0.0, "bus left is bus-off or its interface is down"),
+            (
+                Rule::NotAtRest,
+                Origin::Axis(0),
+                0.02,
+                0.0033,
+                "shoulder did not come to rest to be enabled: it moved at 0.0200 rad/s (at rest: below 0.0033 rad/s)",
+            ),
+            (
+                Rule::BusLost,
+                Origin::Bus(0),
+                0.0,
+                0.0,
+                "bus left is bus-off: too many of its frames had errors",
+            ),
+            (Rule::BusLost, Origin::Bus(0), 1.0, 0.0, "the interface of bus left is down, or has gone"),
             (
                 Rule::NotTransmitted,
                 Origin::Bus(0),

@@ -107,7 +107,8 @@ fn events_are_recorded_as_text_and_as_numbers() {
     let expected = [
         "holding → moving",
         "stop: slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving; \
-         category 1: decelerate, then remove power",
+         category 1: decelerate, then remove power; try: look for an obstacle or a brake that is not released; then clear the fault \
+         and move more slowly",
         "slide: emergency message: error 0x7305 (incremental sensor 1 fault), register 0x21, \
          manufacturer 01 02 03 04 05; try: check the encoder and its cable, then power-cycle the drive",
         "the move was rejected while holding: slide cannot go to 1.2500 m, beyond its position limit of 0.7500 m",

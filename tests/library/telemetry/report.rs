@@ -97,6 +97,7 @@ fn the_report_has_the_keys_of_the_contract_with_the_values_of_the_run() {
         "category": 1, "reason": "slide was 0.2500 m from its set-point (allowed: 0.1250 m)",
         "rule": "following_error", "axis": "slide", "bus": null, "value": 0.25, "limit": 0.125, "slot": 7,
         "phase": "moving",
+        "cure": "look for an obstacle or a brake that is not released; then clear the fault and move more slowly",
     });
     assert_eq!(report["stop"], expected);
 }

@@ -60,7 +60,11 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
         ) => true,
         (Rule::MissedFeedback, Origin::Axis(axis)) if is_crowded(axis) => true,
         // It is spoken to so rarely that its reports miss cycles, and it does not count as at rest.
-        (Rule::MissedFeedback | Rule::EnableTimeout, Origin::Axis(axis)) if is_neglected(axis) => true,
+        (Rule::MissedFeedback | Rule::EnableTimeout | Rule::NotAtRest, Origin::Axis(axis))
+            if is_neglected(axis) =>
+        {
+            true
+        }
         // A joint swings where the machine is too late to close its loop, and goes on with its last torque while that is away.
         (Rule::FollowingError, Origin::Axis(axis))
             if (is_crowded(axis) || has_paused(axis)) && is_loop_closed_here(axis) =>
@@ -118,6 +122,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::ModeChanged
             | Rule::ModeNotShown
             | Rule::EnableTimeout
+            | Rule::NotAtRest
             | Rule::NotAcknowledged
             | Rule::NodeLost
             | Rule::NodeNotOperational
