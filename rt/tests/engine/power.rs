@@ -260,7 +260,7 @@ fn a_joint_is_enabled_where_it_has_been_turned_by_hand_however_fast() {
 
 #[test]
 fn a_joint_that_moves_is_not_enabled_and_is_named_as_the_reason() {
-    let swing = |cycle: usize| 2e-5 * if cycle / 100 % 2 == 0 { 1.0 } else { -1.0 };
+    let swing = |cycle: usize| 2e-5 * if (cycle / 100).is_multiple_of(2) { 1.0 } else { -1.0 };
     let steps: [&dyn Fn(usize) -> f64; 2] = [&|_| 2e-5, &swing];
     for step in steps {
         let rig = turned_by_hand(parameters(1), 100, step);
