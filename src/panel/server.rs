@@ -27,6 +27,7 @@ use super::pages::{Asked, PageNumber, PageRefusal};
 use super::view::{EventView, MachineView, Viewer, time_ms};
 use crate::command::{RunningController, WaitError};
 use crate::telemetry::OnBus;
+use crate::telemetry::missed_slots::MissedSlotsSoFar;
 
 /// Commands that may wait for the controller.
 const COMMANDS_WAITING: usize = 16;
@@ -125,14 +126,16 @@ impl Server {
     /// Keeps the events until the panel or the controller ends.
     pub fn collect_events(&self) {
         let mut source = self.controller.event_source();
-        let mut missed = 0;
+        let (mut missed, mut missed_slots) = (0, MissedSlotsSoFar::default());
         while !self.gate.has_ended() {
             match source.wait(LOOK) {
                 Ok(event) => {
                     let machine = self.controller.machine();
-                    self.gate.tell(None, |number| {
-                        message("event", &EventView::of(number, &event, machine, time_ms()))
-                    });
+                    if let Some(event) = missed_slots.told(event) {
+                        self.gate.tell(None, |number| {
+                            message("event", &EventView::of(number, &event, machine, time_ms()))
+                        });
+                    }
                 }
                 Err(WaitError::NotInTime) => {}
                 Err(WaitError::Ended) => return,

@@ -19,6 +19,7 @@ use super::journal_keeper::JournalKeeper;
 use super::listener::{Listener, Notify};
 use super::loop_timing::ShownTimingWriter;
 use super::machine::Machine;
+use super::missed_slots::MissedSlotsSoFar;
 use super::recording_series::{RecordingOptions, RecordingSeries};
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
@@ -107,6 +108,7 @@ pub struct BlackBoxes {
 pub struct Logger {
     source: LogSide,
     machine: Machine,
+    missed_slots: MissedSlotsSoFar,
     statistics: Statistics,
     recording: Option<RecordingSeries>,
     candump: Option<CandumpLog>,
@@ -148,6 +150,7 @@ impl Logger {
             source,
             statistics: Statistics::new(machine.groups_of_axes()),
             machine,
+            missed_slots: MissedSlotsSoFar::default(),
             recording: None,
             candump: None,
             black_box,
@@ -297,7 +300,9 @@ impl Logger {
         while let Some(event) = self.source.take_event() {
             taken += 1;
             let text = words::event(&event, &self.machine);
-            announce::event(&event, &text, &self.machine);
+            if let Some(told) = self.missed_slots.told(event) {
+                announce::event(&told, &words::event(&told, &self.machine), &self.machine);
+            }
             let written = self.recording.as_mut().map(|recording| recording.event(&event, &text));
             if let Some(Err(error)) = written {
                 self.end_recording(&error);

@@ -27,6 +27,7 @@ mod logger;
 mod loop_timing;
 mod machine;
 mod messages;
+pub(crate) mod missed_slots;
 mod own_errors;
 #[cfg(target_os = "linux")]
 mod realtime;

@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, McapResult};
-use takt_rt::{CycleRecord, CycleTiming, Event, NANOSECONDS_PER_SECOND, Nanoseconds, Phase};
+use takt_rt::{CycleRecord, CycleTiming, Event, EventKind, NANOSECONDS_PER_SECOND, Nanoseconds, Phase};
 
 use super::cdr::CdrEncoder;
 use super::compression;
@@ -20,8 +20,10 @@ use super::destination::Opened;
 use super::history::OnBus;
 use super::machine::{BusDescription, Machine};
 use super::messages::{self, MessageType};
+use super::missed_slots::MissedSlotsSoFar;
 use super::own_errors;
 use super::wall_clock::WallClock;
+use super::words;
 use crate::config::ConfigSources;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
@@ -97,6 +99,7 @@ pub struct Recording {
     last_time: u64,
     /// Whether a group was stopping in the last cycle.
     was_stopping: bool,
+    missed_slots: MissedSlotsSoFar,
 }
 
 /// Counts the bytes that pass.
@@ -208,6 +211,7 @@ impl Recording {
             journal_channel: None,
             last_time: 0,
             was_stopping: false,
+            missed_slots: MissedSlotsSoFar::default(),
         })
     }
 
@@ -215,6 +219,7 @@ impl Recording {
     pub fn continue_after(&mut self, before: &Self) {
         self.last_time = before.last_time;
         self.was_stopping = before.was_stopping;
+        self.missed_slots = before.missed_slots;
         self.next_joint_states_ns = before.next_joint_states_ns;
     }
 
@@ -348,6 +353,12 @@ impl Recording {
     pub fn event(&mut self, event: &Event, text: &str) -> McapResult<()> {
         messages::encode_event(event, text, &mut self.encoder);
         self.write(self.event_channel, event.slot, event.at_ns)?;
+        let Some(told) = self.missed_slots.told(*event) else { return Ok(()) };
+        let so_far = match told.kind {
+            EventKind::MissedSlots { count } => Some(words::missed_slots(count)),
+            _ => None,
+        };
+        let text = so_far.as_deref().unwrap_or(text);
         let group = event.group.and_then(|group| self.group_names.get(usize::from(group)));
         let name = group.unwrap_or(&self.machine_name);
         let time = self.wall_clock.unix_ns(event.at_ns);

@@ -255,11 +255,17 @@ pub(crate) fn latency_table(text: &mut String, emphasis: Emphasis, rows: &[(&str
     }
 }
 
-/// The number of missed slots, out of all slots.
+/// The number of missed slots, out of all slots, and whether that is good.
 pub(crate) fn missed_slots(text: &mut String, emphasis: Emphasis, missed: u64, cycles: u64) {
     let words = format!("{missed} of {}", cycles + missed);
     let words = format!("{:<20}{words:>12}", "missed slots");
-    line(text, &if missed == 0 { words } else { emphasis.bad(&words) });
+    if missed == 0 {
+        line(text, &words);
+        return wrap(text, "timing", 6, &["good: no slot was missed".to_owned()]);
+    }
+    line(text, &emphasis.bad(&words));
+    let cure = "not good: slots were missed; `takt doctor` says what this computer lacks for real time";
+    wrap(text, &emphasis.bad("timing"), 6, &[cure.to_owned()]);
 }
 
 /// The real-time set-up that the operating system granted, and the commands that grant the rest.

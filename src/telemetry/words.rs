@@ -51,6 +51,14 @@ fn mode(number: f64) -> String {
     }
 }
 
+/// How many slots were missed.
+pub(super) fn missed_slots(count: u64) -> String {
+    match count {
+        1 => "1 slot was missed: the thread was late".to_owned(),
+        _ => format!("{count} slots were missed: the thread was late"),
+    }
+}
+
 /// An event as one line, without its time. Where there are several groups, the line begins with the one that it concerns, unless
 /// it concerns an axis that it names.
 pub fn event(event: &Event, machine: &Machine) -> String {
@@ -98,8 +106,7 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
             "missed slots: too many to begin a stream".to_owned()
         }
         EventKind::Timing { level: TimingLevel::Unfit } => "missed slots: too many to go on".to_owned(),
-        EventKind::MissedSlots { count: 1 } => "1 slot was missed: the thread was late".to_owned(),
-        EventKind::MissedSlots { count } => format!("{count} slots were missed: the thread was late"),
+        EventKind::MissedSlots { count } => missed_slots(count),
         EventKind::Rejected(rejected) => rejection(&rejected, machine),
     }
 }

@@ -9,6 +9,7 @@ use super::histogram;
 use super::svg::{axis_panels, load_panel, timing_panel};
 use super::timeline::{self, severity_word};
 use crate::cli::chart::{Chart, Panel, escaped};
+use crate::telemetry::missed_slots::counted_once;
 use crate::telemetry::words::rule_key;
 use crate::telemetry::{
     AxisSummary, LatencyReport, Recorded, RecordedError, RecordedEvent, RecordingReport, Severity,
@@ -109,7 +110,7 @@ fn head(page: &mut String, report: &RecordingReport) {
 fn events(page: &mut String, recorded: &Recorded, curves: &Curves) {
     page.push_str("<section><h2>Events</h2>\n");
     timeline::draw(page, recorded, curves);
-    let all = &recorded.events;
+    let all = &counted_once(&recorded.events);
     let is_serious =
         |event: &&RecordedEvent| event.kind.is_some_and(|kind| Severity::of(&kind) >= Severity::Warning);
     let shown: Vec<&RecordedEvent> = match all.len() {

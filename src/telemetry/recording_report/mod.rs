@@ -8,6 +8,7 @@ use serde::Serialize;
 use takt_rt::{AxisRecord, EventKind, Phase};
 
 use super::machine::SetPointMagnitudes;
+use super::missed_slots::counted_once;
 use super::recorded::{Cause, Recorded, RecordedCycle, RecordedError};
 use super::report::{BusReport, LatencyReport, SetPointParts};
 use super::words;
@@ -209,8 +210,8 @@ impl RecordingReport {
                 cycles: window.iter().filter_map(row).collect(),
             })
         });
-        let events: Vec<ReportedEvent> = recorded
-            .events
+        let told = counted_once(&recorded.events);
+        let events: Vec<ReportedEvent> = told
             .iter()
             .map(|event| ReportedEvent {
                 slot: event.slot,
@@ -219,10 +220,7 @@ impl RecordingReport {
             })
             .collect();
         let is_emergency = |index: &usize| {
-            matches!(
-                recorded.events.get(*index).and_then(|event| event.kind),
-                Some(EventKind::Emergency { .. })
-            )
+            matches!(told.get(*index).and_then(|event| event.kind), Some(EventKind::Emergency { .. }))
         };
         let emergencies =
             (0..events.len()).filter(is_emergency).filter_map(|index| events.get(index).cloned()).collect();
