@@ -20,8 +20,8 @@ pub const KIND: &str = "CANopen node";
 pub const PROTOCOL: &str = "CANopen";
 /// The serial number (CiA 301, 7.5.2.19).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
-/// So long a node may take to answer while it is read. It has answered before.
-const SHORTEST_WAIT_NS: Nanoseconds = 100_000_000;
+/// How long a reply is awaited at least while a node is read. It has answered before, so that this costs nothing but for a lost reply.
+const SHORTEST_WAIT_NS: Nanoseconds = 500_000_000;
 
 /// What a node says of itself, as far as it does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
