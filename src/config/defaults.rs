@@ -30,7 +30,7 @@ pub const HOLD_DMA_LATENCY: bool = true;
 pub const MASTER_NODE: u8 = 127;
 /// `[master] heartbeat` where every drive holds a position by itself.
 pub const MASTER_HEARTBEAT_NS: u64 = 100_000_000;
-/// `[master] heartbeat` where a drive would go on moving without the controller (CSV, CST, PV, PT): the shortest for which
+/// `[master] heartbeat` where a drive would go on moving without the controller (CSV, CST, PP, PV, PT): the shortest for which
 /// five heartbeats outlast a short stall of the controller. It costs a bus of 1 Mbit/s 0.4 % of its time.
 pub const URGENT_HEARTBEAT_NS: u64 = 20_000_000;
 /// `[master] heartbeat_timeout`, in heartbeats: some may be late or lost.
@@ -142,11 +142,15 @@ pub fn master_heartbeat_ns(axes: &[Axis], period_ns: u64) -> u64 {
     }
 }
 
-/// Whether a drive in this mode keeps a speed or a torque when the controller is gone.
+/// Whether a drive in this mode keeps a speed or a torque when the controller is gone, or goes on to its target.
 fn goes_on_alone(control: &Control) -> bool {
     matches!(
         control,
-        Control::Velocity { .. } | Control::Torque { .. } | Control::ProfileVelocity | Control::ProfileTorque
+        Control::Velocity { .. }
+            | Control::Torque { .. }
+            | Control::ProfilePosition
+            | Control::ProfileVelocity
+            | Control::ProfileTorque
     )
 }
 

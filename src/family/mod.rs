@@ -92,6 +92,11 @@ pub trait Family: ConfiguredFamily {
     /// A drive without a configuration; `None` where the family knows nothing of a drive without one.
     fn unconfigured(&self) -> Option<DriveFamily>;
 
+    /// Whether the drives have a statusword (object 6041).
+    fn has_statusword(&self) -> bool {
+        true
+    }
+
     /// The node ID of a drive that is alone on its line, where none is given.
     fn usual_node(&self) -> Option<u8> {
         None

@@ -164,6 +164,15 @@ impl Machine {
         family::error_cure(self.family(axis), code)
     }
 
+    /// The statusword of an axis in words, with a space before it; nothing where its drive has none: takt makes one of what the drive says.
+    pub(crate) fn statusword(&self, axis: Option<u8>, statusword: u16) -> String {
+        let family = axis.and_then(|axis| self.family(axis)).and_then(family::named);
+        match family.is_none_or(|family| family.has_statusword()) {
+            true => format!(" (statusword 0x{statusword:04X})"),
+            false => String::new(),
+        }
+    }
+
     fn family(&self, axis: u8) -> Option<&str> {
         self.axes.get(usize::from(axis)).and_then(|axis| axis.family.as_deref())
     }

@@ -95,6 +95,9 @@ impl RunReport {
             }
         }
         self.group_lines(text, emphasis);
+        if self.is_power_off {
+            wrap(text, "power", 5, &["off: every drive has confirmed that it has no torque".to_owned()]);
+        }
     }
 
     /// Whether each of several groups has stopped, and why.

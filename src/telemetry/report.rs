@@ -35,6 +35,8 @@ pub struct RunReport {
     pub machine: String,
     /// How the run ended.
     pub ended: RunEnd,
+    /// Whether every drive has confirmed in the end that it has no torque.
+    pub is_power_off: bool,
     /// Time from the start of the first cycle to the end of the last one.
     pub duration_s: f64,
     /// Period of the cycle.
@@ -268,6 +270,8 @@ pub struct RunOutcome {
     pub targets: Vec<Option<f64>>,
     /// Why the run ended before its program.
     pub stop: Option<StopReason>,
+    /// Whether every drive has confirmed in the end that it has no torque.
+    pub is_power_off: bool,
 }
 
 /// Ranges in a decade of [`LatencyReport::histogram`].
@@ -290,6 +294,7 @@ impl RunReport {
         Self {
             machine: machine.name.clone(),
             ended: outcome.ended,
+            is_power_off: outcome.is_power_off,
             duration_s: if statistics.cycles == 0 { 0.0 } else { seconds(covered_ns) },
             cycle_ns: machine.cycle_ns,
             cycles: statistics.cycles + log.records_dropped,

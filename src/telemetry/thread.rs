@@ -9,7 +9,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use nix::sys::signal::{SigSet, Signal};
-use takt_rt::linux::set_nice;
+use takt_rt::linux::{Outcome, set_nice};
 
 use super::black_box::Incident;
 use super::logger::{LogSummary, Logger};
@@ -18,8 +18,12 @@ use crate::sleep_alignment;
 /// The pause between two drains of the rings: five records at a cycle of 1 ms.
 const PAUSE: Duration = Duration::from_millis(5);
 
-/// Before ordinary threads, which would let the ring fill up on a busy CPU, and behind all real-time threads.
-const NICE: i8 = -15;
+/// For a logger that is behind: before ordinary threads, which would let the ring fill up on a busy CPU, and behind all real-time threads.
+const HASTY: i8 = -15;
+/// For one that is not. It compresses for some ms at a time, in which a hasty one keeps every ordinary program from a lone CPU.
+const ORDINARY: i8 = 0;
+/// How far it is behind before it is hasty, a sixteenth of what the ring holds at 1 ms.
+const BEHIND: Duration = Duration::from_millis(256);
 
 /// A logger in a thread of its own. Start it before the calling thread becomes real-time: otherwise it inherits the
 /// priority and the CPU.
@@ -43,10 +47,16 @@ impl LoggerThread {
         let (incidents, reported) = mpsc::channel::<Incident>();
         let thread = thread::Builder::new().name("takt-logger".to_owned()).spawn(move || {
             survive_size_limits();
-            // Without the permission, the ring alone bridges the time in which other threads have the CPU.
-            let _ = set_nice(NICE);
+            let behind_cycles = BEHIND.as_nanos() as u64 / period_ns.max(1);
+            let mut is_hasty = false;
             while !end.load(Ordering::Acquire) {
-                logger.drain();
+                let is_behind = logger.drain() as u64 > behind_cycles;
+                // Without the permission, the ring alone bridges the time in which other threads have the CPU.
+                if is_behind != is_hasty
+                    && let Outcome::Granted = set_nice(if is_behind { HASTY } else { ORDINARY })
+                {
+                    is_hasty = is_behind;
+                }
                 reported.try_iter().for_each(|incident| logger.incident(&incident));
                 thread::park_timeout(sleep_alignment::pause(PAUSE, period_ns));
             }

@@ -85,7 +85,8 @@ fn what_happened(event: &Event, machine: &Machine) -> String {
         }
         EventKind::Stream { state: StreamState::Callback } => "a callback leads the axes".to_owned(),
         EventKind::DriveState { axis, state: to, statusword } => {
-            format!("{}: {} (statusword 0x{statusword:04X})", machine.axis_name(axis), to.name())
+            let statusword = machine.statusword(Some(axis), statusword);
+            format!("{}: {}{statusword}", machine.axis_name(axis), to.name())
         }
         EventKind::Mode { axis, mode: new } => {
             format!("{}: changed to {}", machine.axis_name(axis), mode((new as i8).into()))
@@ -160,6 +161,15 @@ mod tests {
             }],
             groups: vec![],
         }
+    }
+
+    #[test]
+    fn a_drive_without_a_statusword_is_said_to_have_none() {
+        let mut damiao = machine();
+        damiao.axes[0].family = Some("bit-fields".to_owned());
+        let kind = EventKind::DriveState { axis: 0, state: DriveState::OperationEnabled, statusword: 0x0007 };
+        let text = event(&Event { slot: 1, at_ns: 2, group: Some(0), kind }, &damiao);
+        assert_eq!(text, "shoulder: operation enabled");
     }
 
     #[test]

@@ -105,7 +105,7 @@ fn not_written(report: &Value) -> Vec<&str> {
 }
 
 fn assert_arrived(report: &Value) {
-    assert_eq!(report["ended"], "finished");
+    assert_eq!((&report["ended"], &report["is_power_off"]), (&"finished".into(), &true.into()));
     for axis in report["axes"].as_array().unwrap() {
         assert!(axis["final_error_counts"].as_f64().unwrap().abs() <= 2.0, "{axis}");
     }

@@ -204,6 +204,7 @@ fn run_with_a_lost_bus(bus: &str, restart: &str, folder: &Path) -> (LogSummary, 
         buses_open_ns: 1_000_000_000,
         targets: vec![],
         stop: Some(stop),
+        is_power_off: false,
     };
     (logger.finish(), outcome)
 }

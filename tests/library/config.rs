@@ -335,10 +335,10 @@ fn the_default_heartbeat_is_faster_where_a_drive_would_go_on_moving() {
         let master = with(&text).master;
         (master.heartbeat_ns.map(|ns| ns / 1_000_000), master.heartbeat_timeout_ns / 1_000_000)
     };
-    for mode in ["csp", "ip", "pp"] {
+    for mode in ["csp", "ip"] {
         assert_eq!(times(mode, ""), (Some(100), 500), "{mode}");
     }
-    for mode in ["csv", "cst", "pv", "pt"] {
+    for mode in ["csv", "cst", "pp", "pv", "pt"] {
         assert_eq!(times(mode, ""), (Some(20), 100), "{mode}");
         assert_eq!(times(mode, "[cycle]\nperiod = \"50 ms\""), (Some(50), 250), "{mode}");
         assert_eq!(times(mode, "[master]\nheartbeat = \"40 ms\""), (Some(40), 200), "{mode}");

@@ -8,7 +8,7 @@ use crate::controller::realtime_thread::StartError;
 use crate::controller::session::{Session, SessionError};
 use crate::family;
 use crate::telemetry::{RealtimeReport, RunEnd, RunOutcome, RunReport};
-use takt_rt::{Fault, StopReason};
+use takt_rt::{Fault, Phase, StopReason};
 
 use crate::cli::exit::Exit;
 use crate::cli::usage_error::UsageError;
@@ -79,6 +79,9 @@ pub(super) fn tell(config: &Config, session: &Session, as_json: bool) -> Exit {
         buses_open_ns: session.open_ns,
         targets: session.targets.clone(),
         stop: stop_of(session),
+        // Drives that have never been active have confirmed nothing.
+        is_power_off: session.unreached.is_empty()
+            && session.snapshot.groups().iter().all(|group| group.phase == Phase::Disabled),
     };
     let report = RunReport::new(&session.log, &outcome);
     let unreached: Vec<&str> = session

@@ -280,6 +280,10 @@ impl Family for BitFieldFamily {
         None
     }
 
+    fn has_statusword(&self) -> bool {
+        false
+    }
+
     fn own_protocols(&self) -> &'static [&'static dyn OwnProtocol] {
         self.found_by.map_or(&[], |found_by| (found_by.protocols)())
     }

@@ -60,6 +60,10 @@ impl Family for ErobCan {
         Some(DriveFamily::of_family(&FACTS))
     }
 
+    fn has_statusword(&self) -> bool {
+        false
+    }
+
     fn maker(&self) -> Option<&'static str> {
         Some(MAKER)
     }

@@ -73,6 +73,10 @@ impl Family for ErobModbus {
         Some(DriveFamily::of_family(&FACTS))
     }
 
+    fn has_statusword(&self) -> bool {
+        false
+    }
+
     fn maker(&self) -> Option<&'static str> {
         Some(erob_can::MAKER)
     }

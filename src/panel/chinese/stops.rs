@@ -47,6 +47,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "the drive of {0} is no longer in operation enabled (statusword {1})",
         "{0} 的驱动器已不在运行使能状态（状态字 {1}）",
     ),
+    ("the drive of {0} is no longer in operation enabled", "{0} 的驱动器已不在运行使能状态"),
     ("the drive of {0} was to be disabled and still shows <1>", "{0} 的驱动器应已去使能，但仍显示<1>"),
     (
         "the drive of {0} has not confirmed that it is disabled: no report for <1>, and <2> before",

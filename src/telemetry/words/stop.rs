@@ -92,7 +92,8 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
             format!("the drive of {axis} reports fault {}", drive_error(stop, machine, error_code))
         }
         Fault::DriveDisabled { statusword } => {
-            format!("the drive of {axis} is no longer in operation enabled (statusword 0x{statusword:04X})")
+            let statusword = machine.statusword(stop.axis(), statusword);
+            format!("the drive of {axis} is no longer in operation enabled{statusword}")
         }
         Fault::NotDisabled { state, silent_cycles: 0 } => {
             format!("the drive of {axis} was to be disabled and still shows {}", state.name())

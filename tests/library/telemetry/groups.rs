@@ -82,6 +82,7 @@ fn run_report(log: &LogSummary) -> RunReport {
             buses_open_ns: 10_000_000,
             targets: vec![],
             stop: Some(STOP),
+            is_power_off: false,
         },
     )
 }
@@ -150,6 +151,7 @@ fn what_was_asked_for_is_no_stop_of_a_group_in_a_run_that_finished() {
         buses_open_ns: 10_000_000,
         targets: vec![],
         stop,
+        is_power_off: false,
     };
     let stop_of = |stop| RunReport::new(&log, &outcome(stop)).groups[0].stop.as_ref().map(|stop| stop.rule);
     assert_eq!((stop_of(None), stop_of(last.groups[0].stop)), (None, Some("requested")));

@@ -22,6 +22,7 @@ fn outcome(last: Snapshot, stop: Option<StopReason>) -> RunOutcome {
         buses_open_ns: 40_000_000,
         targets: vec![],
         stop,
+        is_power_off: true,
     }
 }
 
@@ -132,6 +133,7 @@ fn the_text_has_every_part_of_the_report() {
     let text = RunReport::new(&log, &outcome(last, Some(STOP))).render(Emphasis::None);
     for part in [
         "arm  ✗ category 1 stop after 20 cycles of 1 ms, 0.02 s",
+        "power        off: every drive has confirmed that it has no torque",
         "slide was 0.2500 m from its set-point (allowed: 0.1250 m) while moving (slot 7)",
         "missed slots             3 of 23",
         "slide                1062.500 mm   0.02 s, +1.50 m/s = 708.3 ms late",

@@ -80,6 +80,10 @@ impl Family for LineDevice {
         Some(DriveFamily::of_family(self.facts))
     }
 
+    fn has_statusword(&self) -> bool {
+        false
+    }
+
     /// It is alone on its line.
     fn usual_node(&self) -> Option<u8> {
         Some(1)
