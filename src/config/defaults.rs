@@ -142,7 +142,7 @@ pub fn master_heartbeat_ns(axes: &[Axis], period_ns: u64) -> u64 {
     }
 }
 
-/// Whether a drive in this mode keeps a speed or a torque when the controller is gone, or goes on to its target.
+/// Returns true for a mode in which a drive without its controller keeps a speed or a torque, or moves to its target.
 fn goes_on_alone(control: &Control) -> bool {
     matches!(
         control,

@@ -92,7 +92,7 @@ pub trait Family: ConfiguredFamily {
     /// A drive without a configuration; `None` where the family knows nothing of a drive without one.
     fn unconfigured(&self) -> Option<DriveFamily>;
 
-    /// Whether the drives have a statusword (object 6041).
+    /// Returns true if the drives have a statusword (object 6041).
     fn has_statusword(&self) -> bool {
         true
     }

@@ -264,7 +264,11 @@ pub(crate) fn missed_slots(text: &mut String, emphasis: Emphasis, missed: u64, c
     let words = format!("{:<20}{words:>12}", "missed slots");
     if missed == 0 {
         line(text, &words);
-        return wrap(text, "timing", 6, &["good: no slot was missed".to_owned()]);
+        // Without a cycle there is nothing to judge.
+        if cycles > 0 {
+            wrap(text, "timing", 6, &["good: no slot was missed".to_owned()]);
+        }
+        return;
     }
     line(text, &emphasis.bad(&words));
     let cure = "not good: slots were missed; `takt doctor` says what this computer lacks for real time";

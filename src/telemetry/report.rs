@@ -35,7 +35,7 @@ pub struct RunReport {
     pub machine: String,
     /// How the run ended.
     pub ended: RunEnd,
-    /// Whether every drive has confirmed in the end that it has no torque.
+    /// True if every drive has confirmed in the end that it has no torque.
     pub is_power_off: bool,
     /// Time from the start of the first cycle to the end of the last one.
     pub duration_s: f64,
@@ -250,7 +250,7 @@ pub struct StopReport {
     pub slot: u64,
     /// The phase of the group.
     pub phase: &'static str,
-    /// What to do about a fault.
+    /// The cure of the fault.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cure: Option<&'static str>,
 }
@@ -270,7 +270,7 @@ pub struct RunOutcome {
     pub targets: Vec<Option<f64>>,
     /// Why the run ended before its program.
     pub stop: Option<StopReason>,
-    /// Whether every drive has confirmed in the end that it has no torque.
+    /// True if every drive has confirmed in the end that it has no torque.
     pub is_power_off: bool,
 }
 

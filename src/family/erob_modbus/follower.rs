@@ -352,7 +352,7 @@ impl Follower {
         None
     }
 
-    /// Whether the drive has not answered yet, or not for long.
+    /// Returns true if the drive has not replied yet, or not within [`LOST_NS`].
     fn is_away(&self, now_ns: Nanoseconds) -> bool {
         self.answered_ns.is_none_or(|at_ns| now_ns.saturating_sub(at_ns) > LOST_NS)
     }

@@ -20,7 +20,7 @@ pub const KIND: &str = "CANopen node";
 pub const PROTOCOL: &str = "CANopen";
 /// The serial number (CiA 301, 7.5.2.19).
 const SERIAL_NUMBER: ObjectAddress = ObjectAddress::new(0x1018, 4);
-/// How long a reply is awaited at least while a node is read. It has answered before, so that this costs nothing but for a lost reply.
+/// The shortest reply timeout while a node is read. The node has replied before, so that only a lost reply costs this time.
 const SHORTEST_WAIT_NS: Nanoseconds = 500_000_000;
 
 /// What a node says of itself, as far as it does.
