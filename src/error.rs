@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::command::{CommandError, MotionError, StreamError, WaitError};
+use crate::command::{CommandError, MotionError, RecoveryError, StreamError, WaitError};
 use crate::config::{ConfigError, OverrideError};
 use crate::controller::StartFailure;
 #[cfg(target_os = "linux")]
@@ -75,6 +75,9 @@ pub enum Error {
     /// A wait did not end with what it was for.
     #[error(transparent)]
     Wait(#[from] WaitError),
+    /// A group was not taken out of what had stopped it.
+    #[error(transparent)]
+    Recovery(#[from] RecoveryError),
 }
 
 impl fmt::Debug for Error {
@@ -95,6 +98,7 @@ impl fmt::Debug for Error {
             Self::Motion(error) => error,
             Self::Stream(error) => error,
             Self::Wait(error) => error,
+            Self::Recovery(error) => error,
         };
         inner.fmt(formatter)
     }

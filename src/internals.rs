@@ -5,9 +5,9 @@ use takt_rt::BusPort;
 use crate::channels::{HostSide, LogSide};
 use crate::config::{Config, ConfigSources};
 use crate::controller::port::Port;
-use crate::controller::{AfterBringUp, Supervisor, VirtualRun, assemble};
+use crate::controller::{AfterBringUp, Supervisor, VirtualController, VirtualRun, assemble};
 use crate::error::AssembleError;
-use crate::faults::FaultInjector;
+use crate::faults::{DriveEffect, FaultInjector, InjectError, Injectable};
 use crate::journal::RunJournal;
 use crate::telemetry::Logger;
 
@@ -275,4 +275,25 @@ impl<P: BusPort> RunInside<P> for VirtualRun<P> {
     fn journal(&mut self) -> RunJournal {
         self.journal()
     }
+}
+
+/// Breaks something of a simulated drive, or mends it.
+///
+/// # Errors
+/// See [`InjectError`]; nothing has changed then.
+pub fn inject(
+    controller: &VirtualController,
+    bus: usize,
+    node: u8,
+    effect: DriveEffect,
+    is_present: bool,
+) -> Result<(), InjectError> {
+    let injected = controller.with_ports(|ports| Some(ports.get_mut(bus)?.inject(node, effect, is_present)));
+    injected.flatten().unwrap_or(Err(InjectError::NotSimulated))
+}
+
+/// Stops the drives of real interfaces as the watchdog does. Returns what was done on each bus, in words.
+#[cfg(target_os = "linux")]
+pub fn stop_drives(config: &Config) -> Vec<String> {
+    crate::controller::stop_drives(config)
 }

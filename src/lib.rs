@@ -175,8 +175,8 @@ pub use cli::main as program;
 pub use channels::{Consumer, Producer, ring};
 pub use command::{
     AxisProperties, CommandError, EventSource, LeaseError, LeaseHolder, MotionError, MotionId, MoveOptions,
-    PointRefusal, QuestionError, Refused, RunningController, Stopped, StreamError, TrajectoryProgress,
-    WaitError,
+    PointRefusal, QuestionError, RecoveryError, Refused, RunningController, Stopped, StreamError,
+    TrajectoryProgress, WaitError,
 };
 pub use config::{Config, ConfigError};
 #[cfg(target_os = "linux")]

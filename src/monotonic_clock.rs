@@ -15,6 +15,6 @@ impl takt_rt::Clock for MonotonicClock {
     }
 
     fn wait_until(&mut self, _: u64) -> takt_rt::Wake {
-        takt_rt::Wake { now_ns: 0, timer_latency_ns: 0 }
+        takt_rt::Wake { now_ns: 0, timer_latency_ns: 0, suspended_ns: 0 }
     }
 }

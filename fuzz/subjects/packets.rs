@@ -39,7 +39,7 @@ fn reply(words: &[u64]) {
     assert_eq!(again.words(), encoded);
     // Every refusal has words.
     let text = match answer.reply {
-        Reply::Done | Reply::Motion(_) | Reply::Progress(_) => return,
+        Reply::Done | Reply::Motion(_) | Reply::Progress(_) | Reply::BringUpFailure(_) => return,
         Reply::Refused(error) => error.to_string(),
         Reply::NotTaken(error) => error.to_string(),
     };

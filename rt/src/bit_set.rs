@@ -10,6 +10,14 @@ const _: () = assert!(MAX_BUSES <= u32::BITS as usize, "each bus has a bit");
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct BitSet(u32);
 
+impl FromIterator<usize> for BitSet {
+    fn from_iter<I: IntoIterator<Item = usize>>(numbers: I) -> Self {
+        let mut set = Self::default();
+        numbers.into_iter().for_each(|number| set.insert(number));
+        set
+    }
+}
+
 impl BitSet {
     /// Adds a number.
     pub fn insert(&mut self, number: usize) {

@@ -110,7 +110,7 @@ impl Cycle {
         P: BusPort,
         H: HostInterface<AXES, BUSES>,
     {
-        let (mut timing, sync_deadline) = self.reach_slot(clock);
+        let (mut timing, sync_deadline, suspended_ns) = self.reach_slot(clock);
         timing.sync_ns = clock.now_ns().saturating_sub(timing.slot_start_ns);
         if sync_deadline == Deadline::Met {
             look_again(engine, ports, clock.now_ns(), host);
@@ -127,6 +127,7 @@ impl Cycle {
                 slot_start_ns: timing.slot_start_ns,
                 set_points_due_ns: timing.slot_start_ns + self.plan.latest_set_points_ns,
                 now_ns: began_ns,
+                suspended_ns,
                 buses: &health,
                 behind,
             },
@@ -156,9 +157,9 @@ impl Cycle {
     }
 
     /// Waits for the next slot that can be used; after some that cannot, for the last of them, with a missed deadline. The
-    /// wake-ups that came too late for their slots are among the latency.
-    fn reach_slot(&mut self, clock: &mut impl Clock) -> (CycleTiming, Deadline) {
-        let mut wake_ns = 0;
+    /// wake-ups that came too late for their slots are among the latency. Returns also how long the computer was suspended meanwhile.
+    fn reach_slot(&mut self, clock: &mut impl Clock) -> (CycleTiming, Deadline, Nanoseconds) {
+        let (mut wake_ns, mut suspended_ns) = (0, 0);
         for attempt in 1..=SLOT_ATTEMPTS {
             let now_ns = clock.now_ns();
             let mut slot = self.next_slot;
@@ -168,16 +169,17 @@ impl Cycle {
             let slot_start_ns = self.grid.slot_start_ns(slot);
             let wake = clock.wait_to_send(slot_start_ns);
             wake_ns = wake.timer_latency_ns.max(wake_ns);
+            suspended_ns += wake.suspended_ns;
             self.next_slot = slot.saturating_add(1);
             let timing = CycleTiming { slot, slot_start_ns, wake_ns, ..CycleTiming::default() };
             if wake.now_ns <= self.latest_sync_ns(slot) {
-                return (timing, Deadline::Met);
+                return (timing, Deadline::Met, suspended_ns);
             }
             if attempt == SLOT_ATTEMPTS {
-                return (timing, Deadline::Missed);
+                return (timing, Deadline::Missed, suspended_ns);
             }
         }
-        (CycleTiming::default(), Deadline::Missed)
+        (CycleTiming::default(), Deadline::Missed, suspended_ns)
     }
 
     /// Waits for the send phase of a slot, unless it has begun when the frames are ready. Returns the present.

@@ -242,6 +242,11 @@ pub enum Fault {
         /// As many are too many.
         limit: u32,
     },
+    /// The computer was suspended while drives were under power.
+    Suspended {
+        /// For how long.
+        suspended_ns: Nanoseconds,
+    },
     /// A call of the owner's callback has taken longer than it may.
     CallbackOverrun {
         /// How long it took.
@@ -290,7 +295,7 @@ impl Fault {
             Self::EmergencyMessage { .. } => Rule::EmergencyMessage,
             Self::DuplicateNode { .. } => Rule::DuplicateNode,
             Self::ForeignMaster { .. } => Rule::ForeignMaster,
-            Self::TimingUnfit { .. } => Rule::TimingUnfit,
+            Self::TimingUnfit { .. } | Self::Suspended { .. } => Rule::TimingUnfit,
             Self::CallbackOverrun { .. } => Rule::CallbackOverrun,
             Self::CallbackPanicked => Rule::CallbackPanicked,
             Self::NotDisabled { .. } => Rule::NotDisabled,
@@ -338,6 +343,8 @@ impl Fault {
             | Self::NotTransmitted { cycles, limit }
             | Self::NodeLost { cycles, limit }
             | Self::TimingUnfit { missed: cycles, limit } => (cycles.into(), limit.into()),
+            // Slots are counted, and at least one is allowed.
+            Self::Suspended { suspended_ns } => (suspended_ns as f64, 0.0),
             Self::NodeNotOperational { state } => (state.into(), 0.0),
             Self::DuplicateNode { node } => (node.into(), 0.0),
             Self::ForeignMaster { id } => {
@@ -399,6 +406,7 @@ impl Fault {
                 Self::ForeignMaster { id: Id::extended(seen as u32).ok()? }
             }
             Rule::ForeignMaster => Self::ForeignMaster { id: Id::base(seen as u32).ok()? },
+            Rule::TimingUnfit if allowed == 0.0 => Self::Suspended { suspended_ns: seen as u64 },
             Rule::TimingUnfit => Self::TimingUnfit { missed: seen as u32, limit: allowed as u32 },
             Rule::CallbackOverrun => {
                 Self::CallbackOverrun { spent_ns: seen as u64, budget_ns: allowed as u64 }

@@ -32,6 +32,8 @@ pub struct Wake {
     /// How late the operating system's timer was against the instant it was set to (which lies the guard
     /// time before the deadline when the wait ends in a spin); 0 when there was no sleep.
     pub timer_latency_ns: Nanoseconds,
+    /// How long the computer was suspended since the last wait that tells of it: the clock stood still then. 0 where the clock cannot tell.
+    pub suspended_ns: Nanoseconds,
 }
 
 /// A frame from a bus with the time of its arrival.

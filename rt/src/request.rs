@@ -69,6 +69,10 @@ pub enum Request<const AXES: usize = MAX_AXES> {
     },
     /// Leave [`Phase::Passive`](crate::Phase::Passive): begin to send set-points, with the drives disabled.
     Activate,
+    /// Go back to [`Phase::Passive`](crate::Phase::Passive), from disabled: the host brings the drives up again, and asks for
+    /// [`Request::Activate`] then. What they have reported is forgotten, and they start in the mode of operation of the parameters. A latched
+    /// fault stays. Groups with axes of the same node do it together.
+    BringUp,
     /// Bring every drive to operation enabled; set-points follow the actual positions until it is.
     Enable,
     /// Move to a target, now: a move under way is re-planned from where it is.
@@ -117,6 +121,7 @@ impl<const AXES: usize> Request<AXES> {
             Self::ProcessData(_) => RequestKind::ProcessData,
             Self::Position { .. } => RequestKind::Position,
             Self::Activate => RequestKind::Activate,
+            Self::BringUp => RequestKind::BringUp,
             Self::Enable => RequestKind::Enable,
             Self::Move(_) => RequestKind::Move,
             Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
@@ -254,11 +259,13 @@ pub enum RequestKind {
     RunCallback = 16,
     /// Another mode of operation.
     ChangeMode = 17,
+    /// Another bring-up of the drives.
+    BringUp = 18,
 }
 
 impl RequestKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Sync,
         Self::TimeOfDay,
         Self::RatedTorque,
@@ -277,5 +284,6 @@ impl RequestKind {
         Self::Execute,
         Self::RunCallback,
         Self::ChangeMode,
+        Self::BringUp,
     ];
 }

@@ -9,6 +9,7 @@ use takt_rt::{
     Snapshot,
 };
 
+use super::bring_up_failures::BringUpFailures;
 use super::callbacks::CallbackGiver;
 #[cfg(feature = "internals")]
 use super::callbacks::GivenCallback;
@@ -31,6 +32,7 @@ pub struct HostSide {
     pub(super) streamer: Streamer,
     pub(super) service: Vec<Producer<Frame>>,
     pub(super) questions: Questions,
+    pub(super) bring_up_failures: BringUpFailures,
     pub(super) received: Consumer<(usize, Received)>,
     pub(super) off_cycle_reports: Producer<(u8, OffCycleReport)>,
     pub(super) observer: Observer,
@@ -140,6 +142,11 @@ impl HostSide {
     /// The questions of clients, for any thread.
     pub fn questions(&self) -> Questions {
         self.questions.clone()
+    }
+
+    /// Why drives were not brought up again, for any thread.
+    pub fn bring_up_failures(&self) -> BringUpFailures {
+        self.bring_up_failures.clone()
     }
 
     /// Queues a service frame. It is sent after the set-points of a later cycle.

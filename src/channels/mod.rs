@@ -7,11 +7,14 @@
 //! HostSide ◀── service frames, newest snapshot, last events (any number of observers) ── RtSide
 //! clients  ◀── trajectories that are done with ── RtSide
 //! clients  ── questions to devices that the configuration does not have ──▶ HostSide
+//! clients  ◀── why drives were not brought up again ── HostSide
 //! LogSide  ◀── cycle records, events ── RtSide
 //! ```
 //!
 //! No call on [`RtSide`] allocates, locks or waits, even if another thread is preempted in the middle of a call.
 
+mod abandonment;
+mod bring_up_failures;
 mod callback_panic;
 mod callback_record;
 mod callbacks;
@@ -42,6 +45,8 @@ use client_requests::client_requests;
 use observed_events::observed_events;
 use stream::stream_channels;
 
+pub use abandonment::Abandonment;
+pub use bring_up_failures::BringUpFailures;
 pub(crate) use callback_panic::panic_message;
 pub use callback_record::{CallbackRecord, CallbackTimes};
 pub use callbacks::{
@@ -140,6 +145,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         events: event_in,
         observed: observed_in,
         snapshot: snapshot_in,
+        abandonment: Abandonment::default(),
         journal: None,
     };
     rt.publish(&snapshot_before_first_cycle(sizes));
@@ -153,6 +159,7 @@ pub fn channels(sizes: &ChannelSizes) -> (RtSide, HostSide, LogSide) {
         streamer,
         service: service_in,
         questions: Questions::default(),
+        bring_up_failures: BringUpFailures::default(),
         received: received_out,
         off_cycle_reports: report_in,
         observer: Observer::new(snapshot_out),

@@ -6,6 +6,7 @@ use takt_rt::{
     StreamPoint, StreamSample, TrajectoryId, TrajectorySample,
 };
 
+use super::abandonment::Abandonment;
 use super::callbacks::{CallbackClock, CallbackTaker};
 use super::client_requests::TakenRequests;
 use super::journal::{HostInput, JournalWriter};
@@ -34,6 +35,7 @@ pub struct RtSide {
     pub(super) events: Producer<Event>,
     pub(super) observed: EventWriter,
     pub(super) snapshot: Writer,
+    pub(super) abandonment: Abandonment,
     /// Notes what is taken, for a replay.
     pub(super) journal: Option<JournalWriter>,
 }
@@ -66,6 +68,11 @@ impl RtSide {
         if let Some(stream) = self.streams.get_mut(usize::from(group)) {
             stream.insert(point, slot_start_ns);
         }
+    }
+
+    /// By which the loop is given up.
+    pub fn abandonment(&self) -> Abandonment {
+        self.abandonment.clone()
     }
 
     /// From now on the calls of callbacks are measured so.
@@ -135,6 +142,7 @@ impl HostInterface for RtSide {
         targets: &mut [Option<AxisTarget>; MAX_AXES],
     ) -> CallbackReturn {
         let returned = self.callbacks.call(group, callback, cycle, axes, targets);
+        self.abandonment.wait_if_begun();
         self.note(|| HostInput::Called { returned, targets: *targets });
         returned
     }

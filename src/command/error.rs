@@ -312,6 +312,27 @@ pub enum WaitError {
     Ended,
 }
 
+/// Why a group was not brought up again, or does not hold its position.
+#[derive(Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecoveryError {
+    /// A request was not executed.
+    #[error(transparent)]
+    Command(#[from] CommandError),
+    /// It has not come about in time, or the controller has ended.
+    #[error(transparent)]
+    Wait(#[from] WaitError),
+    /// Drives were not brought up.
+    #[error("{words}")]
+    NotBroughtUp {
+        /// Each drive, the step that failed, and what to do.
+        words: String,
+    },
+    /// A fault has stopped the group while it was enabled.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
 /// `main` prints the error that `?` hands it by `Debug`.
 macro_rules! debug_as_displayed {
     ($($error:ty),*) => {$(
@@ -323,7 +344,7 @@ macro_rules! debug_as_displayed {
     )*};
 }
 
-debug_as_displayed!(Refused, Stopped, CommandError, MotionError, WaitError);
+debug_as_displayed!(Refused, Stopped, CommandError, MotionError, WaitError, RecoveryError);
 
 #[cfg(test)]
 mod tests {

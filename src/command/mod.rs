@@ -11,7 +11,9 @@ mod running_controller;
 
 pub use axis_properties::AxisProperties;
 pub(crate) use error::needed;
-pub use error::{CommandError, LeaseError, MotionError, Refused, Stopped, StreamError, WaitError};
+pub use error::{
+    CommandError, LeaseError, MotionError, RecoveryError, Refused, Stopped, StreamError, WaitError,
+};
 pub use lease_holder::LeaseHolder;
 pub use motion::{MotionId, MoveOptions, TrajectoryProgress};
 pub use point_check::{PointRefusal, check_point};

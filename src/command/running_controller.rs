@@ -4,15 +4,18 @@ use std::time::Duration;
 
 use takt_rt::{
     Answer, AxisPoint, Event, Frame, GroupSnapshot, Nanoseconds, OperationMode, Phase, RequestId,
-    RequestTarget, Snapshot, StopCategory, StreamReport, StreamState,
+    RequestTarget, Rule, Snapshot, StopCategory, StreamReport, StreamState,
 };
 
 use super::axis_properties::AxisProperties;
-use super::error::{CommandError, MotionError, Stopped, StreamError, WaitError};
+use super::error::{CommandError, MotionError, RecoveryError, Stopped, StreamError, WaitError};
 use super::lease_holder::LeaseHolder;
 use super::motion::{MotionId, MoveOptions, TrajectoryProgress};
 use crate::telemetry::{LoopTiming, Machine};
 use crate::trajectory::TrajectoryPoint;
+
+/// Drives that have not reported within this time are brought up again. It covers several reports of the slowest drive.
+const REPORTS_WITHIN: Duration = Duration::from_secs(1);
 
 /// A running controller, in this process ([`Handle`](crate::Handle)) or in another one ([`Client`](crate::Client)): the calls that both
 /// have, for programs and bindings that hold either.
@@ -221,6 +224,18 @@ pub trait RunningController: Send + Sync {
     /// See [`Handle::reset_faults`](crate::Handle::reset_faults).
     fn clear_faults(&self, target: RequestTarget) -> Result<(), CommandError>;
 
+    /// Begins to bring the drives of a target up again, which must be disabled.
+    ///
+    /// # Errors
+    /// [`CommandError::Refused`] unless they are disabled, and as [`Handle::enable`](crate::Handle::enable).
+    fn begin_bring_up(&self, target: RequestTarget) -> Result<(), CommandError>;
+
+    /// Why drives of a target were not brought up again; `None` if they were, or are being brought up.
+    ///
+    /// # Errors
+    /// Of a controller of another process, why it has not said so.
+    fn bring_up_failure(&self, target: RequestTarget) -> Result<Option<String>, CommandError>;
+
     /// How a motion has ended; `None` while it is under way. Does not wait.
     fn result_of(&self, motion: MotionId) -> Option<Result<(), MotionError>>;
 
@@ -289,6 +304,99 @@ pub trait RunningController: Send + Sync {
             report = shown.map_or(report, |group| group.stream);
         });
         report
+    }
+
+    /// Brings the drives of a target up again: after one has lost its power or was reset, or after its interface was down. Returns when they
+    /// report, disabled. A latched fault stays.
+    ///
+    /// # Errors
+    /// See [`RecoveryError`]; the drives are disabled then.
+    fn bring_up(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
+        self.begin_bring_up(target)?;
+        let mut result = None;
+        self.wait_until_seen(at_most, &mut |state| {
+            result = self.bring_up_result(target, state);
+            result.is_some()
+        })?;
+        result.unwrap_or(Ok(()))
+    }
+
+    /// How the bring-up of a target has ended that was begun before a state; `None` while it is under way. Does not wait.
+    fn bring_up_result(&self, target: RequestTarget, state: &Snapshot) -> Option<Result<(), RecoveryError>> {
+        if groups_in(state, target).iter().any(|group| group.phase == Phase::Passive) {
+            return None;
+        }
+        match self.bring_up_failure(target) {
+            Ok(Some(words)) => return Some(Err(RecoveryError::NotBroughtUp { words })),
+            Ok(None) => {}
+            Err(error) => return Some(Err(error.into())),
+        }
+        let is_heard = |axis: &usize| state.axes().get(*axis).is_some_and(|axis| axis.is_heard);
+        self.axes_of(target).iter().all(is_heard).then_some(Ok(()))
+    }
+
+    /// Takes a target out of what has stopped it: waits until it is still, clears the fault, brings drives up that do not report any more,
+    /// and enables. Returns when it holds its position, and at once where it is in operation without a fault. A stop that comes meanwhile
+    /// ends it: the target is not enabled then.
+    ///
+    /// # Errors
+    /// See [`RecoveryError`].
+    fn recover(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
+        let until_ns = self.now_ns().saturating_add(u64::try_from(at_most.as_nanos()).unwrap_or(u64::MAX));
+        let rest = || Duration::from_nanos(until_ns.saturating_sub(self.now_ns()));
+        let is = |state: &Snapshot, phases: &[Phase]| {
+            groups_in(state, target).iter().all(|group| phases.contains(&group.phase))
+        };
+        let (fault, stop) = (self.fault_in(target), self.newest_stop(target));
+        let not_overtaken = || match self.newest_stop(target) == stop {
+            true => Ok(()),
+            false => Err(CommandError::Overtaken),
+        };
+        if fault.is_none() && is(&self.state(), &[Phase::Holding, Phase::Moving, Phase::Streaming]) {
+            return Ok(());
+        }
+        self.wait_until_seen(rest(), &mut |state| is(state, &[Phase::Holding, Phase::Disabled]))?;
+        // A drive that has started anew may report, and is not configured.
+        let has_restarted = fault.is_some_and(|stopped| {
+            matches!(
+                stopped.reason.rule(),
+                Rule::UnexpectedBootUp | Rule::NodeLost | Rule::NodeNotOperational
+            )
+        });
+        not_overtaken()?;
+        self.clear_faults(target)?;
+        if !is(&self.state(), &[Phase::Disabled]) {
+            return self.enabled(target, rest());
+        }
+        let axes = self.axes_of(target);
+        let is_reporting = |state: &Snapshot| {
+            axes.iter().all(|axis| state.axes().get(*axis).is_some_and(|axis| !axis.is_stale()))
+        };
+        // One report may be missing on a bus that works.
+        let reports = self.wait_until_seen(rest().min(REPORTS_WITHIN), &mut |state| is_reporting(state));
+        if has_restarted || reports.is_err() {
+            not_overtaken()?;
+            self.bring_up(target, rest())?;
+        }
+        self.clear_faults(target)?;
+        not_overtaken()?;
+        self.begin_enable(target)?;
+        self.enabled(target, rest())
+    }
+
+    /// Waits until every group of a target holds its position, or a fault keeps one from it.
+    ///
+    /// # Errors
+    /// [`RecoveryError::Stopped`], [`RecoveryError::Wait`].
+    fn enabled(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
+        let mut fault = None;
+        self.wait_until_seen(at_most, &mut |state| {
+            let groups = groups_in(state, target);
+            let stops = groups.iter().filter_map(|group| group.stop).filter(|stop| !stop.is_requested());
+            fault = stops.min_by_key(|stop| stop.slot);
+            fault.is_some() || groups.iter().all(|group| group.phase == Phase::Holding)
+        })?;
+        fault.map_or(Ok(()), |stop| Err(Stopped::new(stop, self.machine()).into()))
     }
 
     /// Waits until every group of a target is in a phase.

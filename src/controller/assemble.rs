@@ -177,7 +177,7 @@ fn groups(config: &Config) -> ArrayVec<GroupParameters, MAX_GROUPS> {
 }
 
 /// Whether a bus has CANopen nodes: it has unless none of its drives has PDOs.
-fn is_canopen(config: &Config, bus: usize) -> bool {
+pub(super) fn is_canopen(config: &Config, bus: usize) -> bool {
     let mut axes = config.axes.iter().filter(|axis| axis.bus == bus).peekable();
     axes.peek().is_none() || axes.any(|axis| family::has_pdos(axis, config))
 }

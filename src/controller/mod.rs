@@ -5,6 +5,8 @@ pub mod assemble;
 #[cfg(target_os = "linux")]
 mod buses;
 mod handle;
+#[cfg(target_os = "linux")]
+mod last_resort;
 mod lines;
 mod off_cycle;
 #[cfg(target_os = "linux")]
@@ -19,6 +21,8 @@ pub mod session;
 mod supervisor;
 mod time_of_day;
 mod virtual_time;
+#[cfg(target_os = "linux")]
+mod watchdog;
 
 pub use crate::channels::{CallbackCommand, CallbackState, CallbackTimes};
 #[cfg(target_os = "linux")]
@@ -27,6 +31,8 @@ pub use handle::{
     CallbackHandle, CallbackOptions, Events, GroupHandle, Handle, StartFailure, StreamHandle,
     VirtualController,
 };
+#[cfg(all(target_os = "linux", feature = "internals"))]
+pub(crate) use last_resort::stop_drives;
 pub use lines::{LinePort, Lines, SharedLine};
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};

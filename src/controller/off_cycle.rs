@@ -20,13 +20,28 @@ struct OfAxis {
     drive: Box<dyn OffCycleDrive>,
 }
 
+impl OfAxis {
+    /// That of an axis; `None` if its drive is not spoken to outside of the cycle.
+    fn of(config: &Config, axis: usize) -> Option<Self> {
+        let own = config.axes.get(axis)?;
+        let drive = family::of(&own.drive).off_cycle(own, config)?;
+        Some(Self { axis, group: config.group_of_axis(axis), bus: own.bus, drive })
+    }
+}
+
 impl OffCycleDrives {
     pub(super) fn new(config: &Config) -> Self {
-        let drives = config.axes.iter().enumerate().filter_map(|(axis, own)| {
-            let drive = family::of(&own.drive).off_cycle(own, config)?;
-            Some(OfAxis { axis, group: config.group_of_axis(axis), bus: own.bus, drive })
-        });
+        let drives = (0..config.axes.len()).filter_map(|axis| OfAxis::of(config, axis));
         Self { drives: drives.collect(), lines: Lines::simulated(config, None) }
+    }
+
+    /// Forgets what the drives of these axes have said: they are brought up again.
+    pub(super) fn begin_again(&mut self, config: &Config, axes: &[usize]) {
+        for own in self.drives.iter_mut().filter(|own| axes.contains(&own.axis)) {
+            if let Some(new) = OfAxis::of(config, own.axis) {
+                *own = new;
+            }
+        }
     }
 
     /// With these lines.
@@ -46,9 +61,18 @@ impl OffCycleDrives {
         }
     }
 
-    /// Goes on with every drive.
-    pub(super) fn poll(&mut self, now_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {
+    /// Goes on with every drive that is not being brought up.
+    pub(super) fn poll(
+        &mut self,
+        now_ns: u64,
+        snapshot: &Snapshot,
+        host: &mut HostSide,
+        is_brought_up: impl Fn(usize) -> bool,
+    ) {
         for OfAxis { axis, group, bus, drive } in &mut self.drives {
+            if is_brought_up(*axis) {
+                continue;
+            }
             let Some(shown) = snapshot.axes.get(*axis) else { continue };
             let phase = snapshot.groups().get(*group).map(|group| group.phase).unwrap_or_default();
             let target = OffCycleTarget::of(shown, phase, snapshot.at_ns);

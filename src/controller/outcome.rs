@@ -1,5 +1,7 @@
 //! The progress of a run, and its outcome.
 
+use std::time::Duration;
+
 use takt_rt::{Phase, RequestError, StopReason};
 
 use crate::family::bring_up::BringUpError;
@@ -69,7 +71,17 @@ pub enum Outcome {
         message: String,
     },
     /// The real-time thread has panicked. That is a defect of takt.
-    ThreadDied,
+    ThreadDied {
+        /// What was done to stop the drives of each bus, in words.
+        told: Vec<String>,
+    },
+    /// The real-time loop has stood still, because a callback has not returned, and was given up.
+    Stalled {
+        /// For how long there was no cycle.
+        after: Duration,
+        /// What was done to stop the drives of each bus, in words.
+        told: Vec<String>,
+    },
     /// The group did not reach the next phase in time.
     Stuck {
         /// The phase in which it remained.
@@ -132,9 +144,17 @@ impl Outcome {
             Self::Stuck { phase } => {
                 format!("the group remained {} for too long", words::phase(*phase))
             }
-            Self::ThreadDied => {
-                "the real-time thread has panicked; this is a defect of takt, please report it".to_owned()
+            Self::ThreadDied { told } => {
+                let told = told.join("; ");
+                format!(
+                    "the real-time thread has panicked, which is a defect of takt, please report it: {told}"
+                )
             }
+            Self::Stalled { after, told } => format!(
+                "the real-time loop has stood still for {:.1} s, as where a callback does not return, and was given up: {}",
+                after.as_secs_f64(),
+                told.join("; ")
+            ),
         }
     }
 }

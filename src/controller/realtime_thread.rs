@@ -1,6 +1,6 @@
 //! The real-time thread, in which the cycle runs.
 
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread::{Builder, JoinHandle};
 
 use nix::sched::{CpuSet, sched_getaffinity};
@@ -8,6 +8,7 @@ use nix::unistd::Pid;
 use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, HostInterface, SlotPlan};
 
+use super::watchdog::LoopWatch;
 use crate::channels::Producer;
 use crate::config::Realtime;
 use crate::journal::{ClockAnswer, JournaledClock};
@@ -70,6 +71,8 @@ pub struct LoopParts<P, H> {
     pub is_realtime_required: bool,
     /// Where the answers of the clock are noted, for a replay.
     pub clock_journal: Option<Producer<ClockAnswer>>,
+    /// By which the thread is watched.
+    pub watch: Arc<LoopWatch>,
 }
 
 /// The running thread.
@@ -149,7 +152,10 @@ fn loop_body<P: BusPort, H: HostInterface>(
     clock.note_epoch(epoch_ns);
     let mut cycle = Cycle::new(Grid::new(epoch_ns, period_ns)?, parts.plan);
     let before = realtime.page_faults();
-    while cycle.run(&mut parts.engine, &mut clock, &mut parts.ports, &mut parts.host) == Flow::Continue {
+    parts.watch.begin();
+    while cycle.run(&mut parts.engine, &mut clock, &mut parts.ports, &mut parts.host) == Flow::Continue
+        && parts.watch.note_cycle()
+    {
         clock.end_cycle();
     }
     clock.end_cycle();

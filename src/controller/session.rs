@@ -11,15 +11,17 @@ use takt_rt::{Clock, Request, SlotPlan, Snapshot, StopCategory};
 use tracing::{info, warn};
 
 use super::assemble::{self, AssembleError};
+use super::last_resort::LastResort;
 use super::lines::Lines;
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::port::Port;
 use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
 use super::supervisor::{AfterBringUp, Supervisor};
 use super::time_of_day::TimeOfDayKeeper;
+use super::watchdog::{LoopWatch, Stalled, Watchdog};
 use crate::channels::{
-    self, CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer, Questions, Streamer,
-    TrajectoryGiver, channels, panic_message,
+    self, BringUpFailures, CallbackGiver, ChannelSizes, ClientRequests, EventReader, HostSide, Observer,
+    Questions, Streamer, TrajectoryGiver, channels, panic_message,
 };
 use crate::config::{Config, ConfigSources};
 
@@ -106,6 +108,9 @@ pub enum SessionError {
     /// The real-time thread could not be started.
     #[error(transparent)]
     Start(#[from] StartError),
+    /// The thread that watches it could not be started.
+    #[error("the watchdog could not be started: {0}")]
+    Watchdog(std::io::Error),
 }
 
 impl fmt::Debug for SessionError {
@@ -149,6 +154,8 @@ pub(super) struct RemoteHandles {
     pub callbacks: CallbackGiver,
     /// Asks devices that are none of the configuration's.
     pub questions: Questions,
+    /// Tells why drives were not brought up again.
+    pub bring_up_failures: BringUpFailures,
     /// The times within a slot.
     pub plan: SlotPlan,
     /// Reads the events.
@@ -177,6 +184,7 @@ impl RemoteHandles {
             trajectories: host.trajectories(),
             callbacks: host.callbacks(),
             questions: host.questions(),
+            bring_up_failures: host.bring_up_failures(),
             plan,
             events: host.events(),
             realtime: begun.report,
@@ -224,6 +232,8 @@ fn lead_as_owner(
         false => (None, None),
     };
     let again = has_black_box.then(|| assemble::rerun_parts(config)).transpose()?;
+    let loop_watch = Arc::new(LoopWatch::new(rt.abandonment()));
+    let last_resort = LastResort::prepare(config);
     let mut supervisor = match &remote {
         Some(remote) => Supervisor::serving(config, remote.after_bring_up),
         None => Supervisor::new(config, options.duration_ns),
@@ -263,10 +273,20 @@ fn lead_as_owner(
         spin_guard_ns: config.realtime.spin_guard_ns,
         is_realtime_required: options.is_realtime_required,
         clock_journal: clock_answers,
+        watch: Arc::clone(&loop_watch),
     };
+    let watchdog =
+        match Watchdog::start(loop_watch, last_resort, config.cycle.period_ns, config.realtime.priority) {
+            Ok(watchdog) => watchdog,
+            Err(error) => {
+                logger.finish();
+                return Err(SessionError::Watchdog(error));
+            }
+        };
     let running = match realtime_thread::start(realtime_thread::thread_config(&config.realtime), parts) {
         Ok(running) => running,
         Err(error) => {
+            watchdog.end();
             logger.finish();
             return Err(error.into());
         }
@@ -286,7 +306,7 @@ fn lead_as_owner(
     let mut time_request = None;
     let (mut panicked, mut is_watched) = (None, true);
     let mut taken_over_by = None;
-    while !running.is_finished() {
+    while !running.is_finished() && watchdog.stalled().is_none() {
         supervisor.poll(clock.now_ns(), &mut host);
         host.free_callbacks();
         let now_ns = clock.now_ns();
@@ -322,21 +342,34 @@ fn lead_as_owner(
         }
         sleep_alignment::sleep(PAUSE, config.cycle.period_ns);
     }
-    let ended = running.join();
+    let stalled = watchdog.stalled().cloned();
+    let last_resort = watchdog.end();
+    // A loop that stands still is left alone.
+    let ended = if stalled.is_none() { running.join() } else { None };
     supervisor.close_lines();
     // The ports are closed with the thread. What is left to be done here does not concern the buses.
     drop(ownership);
-    if ended.is_none() {
-        logger.incident(Incident::ThreadDied);
+    let broken = match (stalled, &ended) {
+        (Some(Stalled { after, told }), _) => {
+            logger.incident(Incident::Stalled);
+            Some(Outcome::Stalled { after, told })
+        }
+        (None, None) => {
+            logger.incident(Incident::ThreadDied);
+            let told = last_resort.map(|last_resort| last_resort.stop_drives()).unwrap_or_default();
+            Some(Outcome::ThreadDied { told })
+        }
+        (None, Some(_)) => None,
+    };
+    if broken.is_some() {
+        supervisor.abandon();
     }
-    let outcome =
-        match (supervisor.outcome().cloned().unwrap_or(Outcome::ThreadDied), panicked, taken_over_by) {
-            (Outcome::Interrupted | Outcome::Finished, Some(message), _) => {
-                Outcome::CallbackPanicked { message }
-            }
-            (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
-            (outcome, ..) => outcome,
-        };
+    let outcome = broken.or_else(|| supervisor.outcome().cloned());
+    let outcome = match (outcome.unwrap_or(Outcome::ThreadDied { told: vec![] }), panicked, taken_over_by) {
+        (Outcome::Interrupted | Outcome::Finished, Some(message), _) => Outcome::CallbackPanicked { message },
+        (Outcome::Interrupted, None, Some(process)) => Outcome::TakenOver { process },
+        (outcome, ..) => outcome,
+    };
     let words = outcome.words(&Machine::of(config));
     info!(target: "takt::run", outcome = words.as_str(), "the run has ended: {words}");
     let is_done = matches!(

@@ -38,6 +38,8 @@ pub struct VirtualClock {
     /// What passes before the next look at the clock, and right after it.
     before_look_ns: u64,
     after_look_ns: u64,
+    /// How long the computer was suspended before the next wake-up.
+    suspended_ns: u64,
 }
 
 impl VirtualClock {
@@ -59,6 +61,11 @@ impl VirtualClock {
     /// The next cycle takes this long to compute.
     pub fn compute_for(&mut self, ns: u64) {
         self.computing_ns = ns;
+    }
+
+    /// The computer has been suspended for so long: this clock stood still.
+    pub fn suspend(&mut self, ns: u64) {
+        self.suspended_ns = ns;
     }
 }
 
@@ -87,7 +94,7 @@ impl VirtualClock {
     fn wake(&mut self, deadline_ns: u64) -> Wake {
         let timer_latency_ns = self.lateness_ns + std::mem::take(&mut self.stall_ns);
         self.now_ns = self.now_ns.max(deadline_ns) + timer_latency_ns;
-        Wake { now_ns: self.now_ns, timer_latency_ns }
+        Wake { now_ns: self.now_ns, timer_latency_ns, suspended_ns: std::mem::take(&mut self.suspended_ns) }
     }
 }
 

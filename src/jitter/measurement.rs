@@ -1,5 +1,6 @@
 //! Runs the loop without any motion and measures its timing.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use takt_rt::{BusHealth, Request, SlotPlan};
@@ -156,6 +157,7 @@ pub fn measure(
         },
         is_realtime_required: false,
         clock_journal: None,
+        watch: Arc::default(),
     };
     // The ring of requests is empty: there is room for this request, and later for the one to shut down.
     let _ = host.request(Request::Sync(has_bus));

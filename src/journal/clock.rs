@@ -147,7 +147,7 @@ impl ReplayClock {
                 return wake;
             }
         }
-        Wake { now_ns: self.now_ns, timer_latency_ns: 0 }
+        Wake { now_ns: self.now_ns, ..Wake::default() }
     }
 }
 

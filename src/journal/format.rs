@@ -176,6 +176,7 @@ impl Encoder {
         self.tag(tag);
         self.time(wake.now_ns);
         self.number(wake.timer_latency_ns);
+        self.number(wake.suspended_ns);
     }
 
     fn words(&mut self, tag: u8, words: &Put) {
@@ -318,11 +319,11 @@ impl Decoder<'_> {
     }
 
     fn wake(&mut self) -> Result<Wake, Malformed> {
-        let (now_ns, timer_latency_ns) = (self.time()?, self.number()?);
+        let (now_ns, timer_latency_ns, suspended_ns) = (self.time()?, self.number()?, self.number()?);
         if timer_latency_ns > now_ns {
             return Err(Malformed);
         }
-        Ok(Wake { now_ns, timer_latency_ns })
+        Ok(Wake { now_ns, timer_latency_ns, suspended_ns })
     }
 
     fn checkpoint(&mut self) -> Result<Checkpoint, Malformed> {
@@ -439,7 +440,7 @@ mod tests {
 
     #[test]
     fn everything_comes_out_as_it_went_in_also_over_several_blocks() {
-        let wake = Wake { now_ns: 5_000_000_100, timer_latency_ns: 100 };
+        let wake = Wake { now_ns: 5_000_000_100, timer_latency_ns: 100, suspended_ns: 7 };
         let clock = [
             ClockAnswer::Now(5_000_000_000),
             ClockAnswer::WokeToSend(wake),

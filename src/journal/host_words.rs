@@ -175,6 +175,7 @@ fn put_request(envelope: &RequestEnvelope, put: &mut Put) {
             put.word(*category as u64);
         }
         Request::Activate
+        | Request::BringUp
         | Request::Enable
         | Request::Stream
         | Request::Disable
@@ -200,6 +201,7 @@ fn take_request(take: &mut Take<'_>) -> Result<RequestEnvelope, Malformed> {
         RequestKind::ProcessData => Request::ProcessData(take_process_data(take)?),
         RequestKind::Position => Request::Position { axis: byte(take)?, counts: take.word()? as u32 as i32 },
         RequestKind::Activate => Request::Activate,
+        RequestKind::BringUp => Request::BringUp,
         RequestKind::Enable => Request::Enable,
         RequestKind::Move => Request::Move(Move {
             target: axes_of(take)?,

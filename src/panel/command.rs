@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use takt_rt::{OperationMode, RequestTarget};
 
 use super::chinese::Words;
-use crate::command::{CommandError, MotionError, MotionId, MoveOptions, RunningController};
+use crate::command::{CommandError, MotionError, MotionId, MoveOptions, RecoveryError, RunningController};
 use crate::telemetry::Machine;
 
 /// How long a command waits to learn that its motion was refused. A cycle takes a few milliseconds at most.
@@ -28,6 +28,11 @@ pub enum Command {
     },
     /// Clears latched faults.
     ClearFaults {
+        /// The group; all axes without it.
+        group: Option<u8>,
+    },
+    /// Brings the drives up again.
+    BringUp {
         /// The group; all axes without it.
         group: Option<u8>,
     },
@@ -144,6 +149,9 @@ pub enum CommandRefusal {
     /// The motion that it began has ended at once.
     #[error(transparent)]
     Motion(#[from] MotionError),
+    /// Drives were not brought up again.
+    #[error(transparent)]
+    BringUp(#[from] RecoveryError),
     /// There is no such group.
     #[error("there is no group {group}: there are {groups}, counted from 0")]
     NoSuchGroup {

@@ -51,6 +51,8 @@ pub struct Motions {
 #[derive(Default)]
 struct Kept {
     motions: Vec<Motion>,
+    /// The bring-ups that are under way, whose failure their pages are told.
+    bring_ups: Vec<(PageNumber, RequestTarget)>,
     has_ended: bool,
 }
 
@@ -143,6 +145,7 @@ impl Motions {
             Command::Enable { group } => Ok(controller.begin_enable(target_of(group, machine)?)?),
             Command::Disable { group } => self.disable(target_of(group, machine)?),
             Command::ClearFaults { group } => Ok(controller.clear_faults(target_of(group, machine)?)?),
+            Command::BringUp { group } => self.bring_up(page, target_of(group, machine)?),
             Command::Move { axis, to, relative, velocity, acceleration } => {
                 let target = target_of_axis(axis, machine)?;
                 let from = controller.state().axes().get(axis).map_or(0.0, |axis| axis.position_set);
@@ -232,6 +235,13 @@ impl Motions {
         Ok(self.controller.begin_disable(target)?)
     }
 
+    fn bring_up(&self, page: PageNumber, target: RequestTarget) -> Result<(), CommandRefusal> {
+        self.controller.begin_bring_up(target)?;
+        locked(&self.kept).bring_ups.push((page, target));
+        self.changed.notify_all();
+        Ok(())
+    }
+
     /// Keeps a motion that has just begun, in place of the one before; unless a stop has come meanwhile.
     fn keep(&self, motion: Motion, stops: u64) -> Result<(), CommandRefusal> {
         let mut kept = locked(&self.kept);
@@ -317,7 +327,7 @@ impl Motions {
     pub fn run(&self, may_move: impl Fn(PageNumber) -> bool, tell: impl Fn(Problem)) {
         loop {
             let mut kept = locked(&self.kept);
-            while kept.motions.is_empty() && !kept.has_ended {
+            while kept.motions.is_empty() && kept.bring_ups.is_empty() && !kept.has_ended {
                 kept = self.changed.wait(kept).unwrap_or_else(PoisonError::into_inner);
             }
             if kept.has_ended || self.controller.has_ended() {
@@ -346,6 +356,17 @@ impl Motions {
             self.is_kept(motion, step, tell)
         });
         self.list_moving(&kept);
+        if kept.bring_ups.is_empty() {
+            return;
+        }
+        let state = self.controller.state();
+        kept.bring_ups.retain(|(page, target)| {
+            let result = self.controller.bring_up_result(*target, &state);
+            if let Some(Err(error)) = &result {
+                tell(Problem { page: *page, refusal: error.clone().into() });
+            }
+            result.is_none()
+        });
     }
 
     fn is_kept(&self, motion: &Motion, step: Step, tell: &impl Fn(Problem)) -> bool {

@@ -216,7 +216,9 @@ impl Client {
         match self.ask(command)? {
             Reply::Done | Reply::Motion(_) => Ok(()),
             Reply::Refused(error) => Err(error),
-            Reply::NotTaken(_) | Reply::Progress(_) => Err(CommandError::Unanswered),
+            Reply::NotTaken(_) | Reply::Progress(_) | Reply::BringUpFailure(_) => {
+                Err(CommandError::Unanswered)
+            }
         }
     }
 
@@ -224,7 +226,18 @@ impl Client {
         match self.ask(Command::Progress(motion))? {
             Reply::Progress(progress) => Ok(progress),
             Reply::Refused(error) => Err(error),
-            Reply::Done | Reply::Motion(_) | Reply::NotTaken(_) => Err(CommandError::Unanswered),
+            _ => Err(CommandError::Unanswered),
+        }
+    }
+
+    pub(super) fn asked_for_bring_up_failure(
+        &self,
+        target: RequestTarget,
+    ) -> Result<Option<String>, CommandError> {
+        match self.ask(Command::BringUpFailure(target))? {
+            Reply::BringUpFailure(words) => Ok(words),
+            Reply::Refused(error) => Err(error),
+            _ => Err(CommandError::Unanswered),
         }
     }
 
@@ -239,7 +252,7 @@ impl Client {
                 Ok(motion)
             }
             Reply::Refused(error) => Err(error),
-            Reply::Done | Reply::NotTaken(_) | Reply::Progress(_) => Err(CommandError::Unanswered),
+            _ => Err(CommandError::Unanswered),
         }
     }
 
@@ -247,7 +260,7 @@ impl Client {
         match self.ask(command)? {
             Reply::NotTaken(error) => Err(error),
             Reply::Refused(CommandError::Lease(error)) => Err(error.into()),
-            Reply::Refused(_) | Reply::Progress(_) => Err(StreamError::Ended),
+            Reply::Refused(_) | Reply::Progress(_) | Reply::BringUpFailure(_) => Err(StreamError::Ended),
             Reply::Done | Reply::Motion(_) => Ok(()),
         }
     }

@@ -7,7 +7,9 @@ use takt_rt::{Frame, OperationMode, RequestTarget, StopCategory};
 use super::client::Client;
 use super::commands::Command;
 use super::stream::ClientStream;
-use crate::command::{CommandError, MotionId, MoveOptions, RunningController, TrajectoryProgress};
+use crate::command::{
+    CommandError, MotionId, MoveOptions, RecoveryError, RunningController, TrajectoryProgress,
+};
 use crate::trajectory::TrajectoryPoint;
 
 impl Client {
@@ -187,6 +189,22 @@ impl Client {
     /// As [`Client::move_to`].
     pub fn reset_faults(&self) -> Result<(), CommandError> {
         self.clear_faults(RequestTarget::All)
+    }
+
+    /// See [`Handle::bring_up`](crate::Handle::bring_up).
+    ///
+    /// # Errors
+    /// As there, and as [`Client::move_to`].
+    pub fn bring_up(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::bring_up(self, RequestTarget::All, at_most)
+    }
+
+    /// See [`Handle::recover`](crate::Handle::recover).
+    ///
+    /// # Errors
+    /// As there, and as [`Client::move_to`].
+    pub fn recover(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::recover(self, RequestTarget::All, at_most)
     }
 
     /// Requests a stop of this category, and returns at once. It needs no lease, and is not queued behind any command of this or another

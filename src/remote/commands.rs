@@ -86,6 +86,10 @@ pub enum Command {
     Disable(RequestTarget),
     /// To clear latched faults.
     ResetFaults(RequestTarget),
+    /// To bring drives up again.
+    BringUp(RequestTarget),
+    /// To say why drives were not brought up again.
+    BringUpFailure(RequestTarget),
     /// To follow points.
     BeginStream(RequestTarget),
     /// A point of a stream.
@@ -173,6 +177,8 @@ const RESUME: u64 = 19;
 const MOVE_BY: u64 = 20;
 const PROGRESS: u64 = 21;
 const QUESTION: u64 = 22;
+const BRING_UP: u64 = 23;
+const BRING_UP_FAILURE: u64 = 24;
 
 /// The words of a point of a trajectory beside its values: its time and three counts.
 const POINT_HEAD: usize = 4;
@@ -247,6 +253,8 @@ impl Command {
             Self::Enable(target)
             | Self::Disable(target)
             | Self::ResetFaults(target)
+            | Self::BringUp(target)
+            | Self::BringUpFailure(target)
             | Self::BeginStream(target)
             | Self::Points { target, .. }
             | Self::Execute { target, .. }
@@ -268,6 +276,7 @@ impl Command {
                 | Self::Disable(_)
                 | Self::Points { .. }
                 | Self::Progress(_)
+                | Self::BringUpFailure(_)
                 | Self::Question { .. }
         )
     }
@@ -306,6 +315,12 @@ impl Command {
             }
             Self::ResetFaults(target) => {
                 put.word(RESET_FAULTS).target(*target);
+            }
+            Self::BringUp(target) => {
+                put.word(BRING_UP).target(*target);
+            }
+            Self::BringUpFailure(target) => {
+                put.word(BRING_UP_FAILURE).target(*target);
             }
             Self::BeginStream(target) => {
                 put.word(BEGIN_STREAM).target(*target);
@@ -374,6 +389,8 @@ impl Command {
             ENABLE => Self::Enable(take.target()?),
             DISABLE => Self::Disable(take.target()?),
             RESET_FAULTS => Self::ResetFaults(take.target()?),
+            BRING_UP => Self::BringUp(take.target()?),
+            BRING_UP_FAILURE => Self::BringUpFailure(take.target()?),
             BEGIN_STREAM => Self::BeginStream(take.target()?),
             POINT => Self::Point { target: take.target()?, at_ns: take.word()?, axes: take_entries(take)? },
             CHUNK => {

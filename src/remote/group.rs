@@ -6,7 +6,9 @@ use takt_rt::{GroupSnapshot, OperationMode, Phase, RequestTarget, StopCategory};
 
 use super::client::Client;
 use super::stream::ClientStream;
-use crate::command::{CommandError, MotionId, MoveOptions, RunningController, Stopped, WaitError, groups_in};
+use crate::command::{
+    CommandError, MotionId, MoveOptions, RecoveryError, RunningController, Stopped, WaitError, groups_in,
+};
 use crate::trajectory::TrajectoryPoint;
 
 /// Commands and observes one group of a controller of another process. It has the calls of a [`GroupHandle`](crate::GroupHandle), with the
@@ -136,6 +138,22 @@ impl ClientGroup {
     /// As [`Client::move_to`].
     pub fn reset_faults(&self) -> Result<(), CommandError> {
         self.client.clear_faults(self.target)
+    }
+
+    /// See [`GroupHandle::bring_up`](crate::GroupHandle::bring_up).
+    ///
+    /// # Errors
+    /// As there, and as [`Client::move_to`].
+    pub fn bring_up(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::bring_up(&self.client, self.target, at_most)
+    }
+
+    /// See [`GroupHandle::recover`](crate::GroupHandle::recover).
+    ///
+    /// # Errors
+    /// As there, and as [`Client::move_to`].
+    pub fn recover(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::recover(&self.client, self.target, at_most)
     }
 
     /// Waits until the group is in a phase.

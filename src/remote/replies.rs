@@ -38,6 +38,8 @@ pub enum Reply {
     NotTaken(StreamError),
     /// How far a trajectory is; `None` if it is none under way.
     Progress(Option<TrajectoryProgress>),
+    /// Why drives were not brought up again; `None` if they were, or are being brought up.
+    BringUpFailure(Option<String>),
 }
 
 const DONE: u64 = 0;
@@ -45,6 +47,7 @@ const MOTION: u64 = 1;
 const REFUSED: u64 = 2;
 const NOT_TAKEN: u64 = 3;
 const PROGRESS: u64 = 4;
+const BRING_UP_FAILURE: u64 = 5;
 
 impl Answer {
     /// Its words.
@@ -63,6 +66,9 @@ impl Answer {
                 if let Some(TrajectoryProgress { path_s, of_s, rate }) = *progress {
                     put.number(path_s).number(of_s).number(rate);
                 }
+            }
+            Reply::BringUpFailure(words) => {
+                put.word(BRING_UP_FAILURE).word(words.is_some().into()).text(words.as_deref().unwrap_or(""));
             }
         }
         put.0
@@ -86,6 +92,10 @@ impl Answer {
                 }),
                 _ => return Err(Malformed),
             }),
+            BRING_UP_FAILURE => {
+                let (is_there, words) = (take.word()?, take.text()?);
+                Reply::BringUpFailure((is_there != 0).then_some(words))
+            }
             _ => return Err(Malformed),
         };
         take.end()?;

@@ -190,6 +190,14 @@ impl RunningController for Client {
         self.done(Command::ResetFaults(target))
     }
 
+    fn begin_bring_up(&self, target: RequestTarget) -> Result<(), CommandError> {
+        self.done(Command::BringUp(target))
+    }
+
+    fn bring_up_failure(&self, target: RequestTarget) -> Result<Option<String>, CommandError> {
+        self.asked_for_bring_up_failure(target)
+    }
+
     fn result_of(&self, motion: MotionId) -> Option<Result<(), MotionError>> {
         Self::result_of(self, motion)
     }

@@ -74,7 +74,7 @@ impl Worker {
             Command::Lease { is_taken_over: true } => lease.take_over(self.claimant, now_ns()),
             Command::Release => lease.release(self.claimant.connection),
             // To look is for everybody who may write, and a question only reads.
-            Command::Progress(_) | Command::Question { .. } => {}
+            Command::Progress(_) | Command::BringUpFailure(_) | Command::Question { .. } => {}
             _ => lease.renew(self.claimant, now_ns())?,
         }
         Ok(())
@@ -105,6 +105,10 @@ impl Worker {
             Command::Enable(target) => done(controller.begin_enable(target)),
             Command::Disable(target) => done(controller.begin_disable(target)),
             Command::ResetFaults(target) => done(controller.clear_faults(target)),
+            Command::BringUp(target) => done(controller.begin_bring_up(target)),
+            Command::BringUpFailure(target) => {
+                controller.bring_up_failure(target).map_or_else(Reply::Refused, Reply::BringUpFailure)
+            }
             Command::BeginStream(target) => done(controller.begin_streaming(target)),
             Command::Point { target, at_ns, axes } => taken(controller.push_point(target, at_ns, &axes)),
             Command::Chunk { target, from_ns, interval, points } => {

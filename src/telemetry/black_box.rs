@@ -70,6 +70,8 @@ pub enum Incident {
     },
     /// The real-time thread ended by itself.
     ThreadDied,
+    /// The real-time loop stood still, and was given up.
+    Stalled,
     /// A function that the caller gave to the run panicked, with this message.
     CallbackPanicked(String),
 }
@@ -81,6 +83,7 @@ impl Incident {
             Self::Stop { stop, .. } => words::rule_key(stop.rule()),
             Self::Drive { .. } => words::rule_key(Rule::DriveFault),
             Self::ThreadDied => "thread_died",
+            Self::Stalled => "stalled",
             Self::CallbackPanicked(_) => "callback_panicked",
         }
     }
@@ -101,6 +104,7 @@ impl Incident {
                 format!("{cause} while {}; try: {}", words::phase(*phase), machine.drive_cure(*axis, *code))
             }
             Self::ThreadDied => "the real-time thread ended by itself".to_owned(),
+            Self::Stalled => "the real-time loop stood still, and was given up".to_owned(),
             Self::CallbackPanicked(message) => format!("a function of the caller panicked: {message}"),
         }
     }
@@ -138,7 +142,7 @@ impl Incident {
                 add("value", code.to_string());
                 add("axis", machine.axis_name(*axis));
             }
-            Self::ThreadDied | Self::CallbackPanicked(_) => {}
+            Self::ThreadDied | Self::Stalled | Self::CallbackPanicked(_) => {}
         }
         metadata
     }

@@ -88,6 +88,7 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         spin_guard_ns: None,
         is_realtime_required: false,
         clock_journal: None,
+        watch: Default::default(),
     };
     let folder = tempfile::tempdir().unwrap();
     let options = LoggerOptions {

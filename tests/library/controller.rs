@@ -9,8 +9,8 @@ use takt::internals::RunInside;
 use takt::sim::{DriveFault, Observation, SimulatedBus};
 use takt::{Interrupt, Outcome, VirtualRun};
 use takt_rt::{
-    Answer, BusHealth, BusPort, Clock, DriveState, Frame, Id, MAX_AXES, MotionState, Move, Phase,
-    ReceiveBatch, RejectReason, Request, RequestKind, Rule, StopCategory,
+    Answer, BusHealth, BusPort, Clock, DriveState, Fault, Frame, Id, MAX_AXES, MotionState, Move, Phase,
+    ReceiveBatch, RejectReason, Request, RequestKind, Rule, StopCategory, StopCause,
 };
 
 /// A minute of 1 ms cycles. Every program here takes less.
@@ -215,6 +215,23 @@ fn stalls_of_the_computer_are_counted_and_the_program_still_finishes() {
     assert_eq!(outcome, Some(Outcome::Finished));
     let missed = run.snapshot().missed_slots;
     assert!(missed >= 10 * 29, "{missed}");
+}
+
+#[test]
+fn an_arm_stops_when_its_computer_resumes_after_a_suspension_and_a_disabled_one_takes_no_notice() {
+    let config = load("arm6-erob.toml");
+    let mut run = start(&config);
+    run.clock().suspend(3_600_000_000_000);
+    while run.snapshot().groups[0].phase != Phase::Moving {
+        assert!(run.step());
+    }
+    run.clock().suspend(3_200_000_000);
+    assert!(run.step());
+    let stop = run.snapshot().groups[0].stop.unwrap();
+    assert_eq!(stop.cause, StopCause::Fault(Fault::Suspended { suspended_ns: 3_200_000_000 }));
+    assert_eq!(stop.category, StopCategory::One);
+    let outcome = run.run(CYCLES_AT_MOST, |_| {});
+    assert_eq!(rule_and_axis(outcome), (Rule::TimingUnfit, None));
 }
 
 /// Runs into a move, injects a fault, and runs on to the end.

@@ -1,6 +1,7 @@
 //! What a program embeds: configurations, drives, controllers and their handles.
 
 mod bit_fields;
+mod bring_up_again;
 mod callbacks;
 mod canopen_bring_up;
 mod cia402_family;

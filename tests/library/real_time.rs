@@ -259,3 +259,34 @@ fn a_call_that_is_too_slow_by_the_real_clock_is_a_stop_that_says_by_how_much() {
     assert!(callback.times().overruns >= 4, "{:?}", callback.times());
     assert_eq!(joint.wait_for(Phase::Holding, PATIENCE), Ok(()));
 }
+
+#[test]
+fn a_callback_that_does_not_return_ends_the_run_and_every_wait_and_moves_nothing_afterwards() {
+    let arm = start("single-erob.toml");
+    let is_held = Arc::new(AtomicBool::new(true));
+    let (holding, mut calls) = (Arc::clone(&is_held), 0);
+    let callback = arm
+        .in_loop(move |_, _, command| {
+            command.velocity(0, 0.1);
+            calls += 1;
+            while calls > 50 && holding.load(Ordering::Relaxed) {
+                std::hint::spin_loop();
+            }
+        })
+        .unwrap();
+    let waiting = arm.handle();
+    let waited = thread::spawn(move || waiting.wait_for(Phase::Disabled, PATIENCE));
+    assert_eq!(waited.join().unwrap(), Err(WaitError::Ended));
+    assert_eq!(arm.stop(StopCategory::One), Err(CommandError::Ended));
+    let stopped_at = arm.state();
+    // The thread that was given up does not go on when the callback returns at last.
+    is_held.store(false, Ordering::Relaxed);
+    thread::sleep(Duration::from_millis(300));
+    assert_eq!(arm.state().slot, stopped_at.slot);
+    drop(callback);
+    let session = arm.finish().unwrap();
+    let Outcome::Stalled { after, told } = session.outcome else { panic!("{:?}", session.outcome) };
+    assert!(after >= Duration::from_secs(1), "{after:?}");
+    assert_eq!(told, ["the drives of can are simulated"]);
+    assert_eq!(session.unreached, [0]);
+}

@@ -68,6 +68,7 @@ fn run<P: BusPort + Send + 'static>(
         spin_guard_ns: None,
         is_realtime_required: false,
         clock_journal: None,
+        watch: Default::default(),
     };
     let running = realtime_thread::start(realtime_thread::thread_config(&config.realtime), work).unwrap();
     let mut supervisor = Supervisor::new(config, None);

@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use takt::Port;
-use takt::config::Config;
+use takt::config::{Config, Interface};
 use takt::internals::link::{
     InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
 };
@@ -103,6 +103,23 @@ fn frames_of_all_kinds_cross_and_own_ones_only_confirm() {
     assert_eq!(left.unconfirmed(0), 0);
     assert_eq!((left.health().tx_frames, left.health().rx_frames), (5, 0));
     assert_eq!((right.health().tx_frames, right.health().rx_frames), (0, 5));
+}
+
+#[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
+fn drives_are_stopped_beside_a_loop_that_stands_still() {
+    let bus = VirtualCan::new("takt-resort");
+    let mut listener = bus.port(&[]);
+    let mut config = Config::load("configs/arm6-erob.toml".as_ref()).unwrap();
+    config.buses[0].interface = Interface::SocketCan("takt-resort".to_owned());
+    let told = takt::internals::stop_drives(&config);
+    let stops: Vec<Frame> = config.axes.iter().map(|axis| Frame::of(id(0), [0x02, axis.node])).collect();
+    assert_eq!(frames(&mut listener), stops);
+    assert_eq!(told, ["NMT stop was sent to the drives of arm"]);
+    run(&["ip", "link", "set", "takt-resort", "down"]);
+    let told = takt::internals::stop_drives(&config);
+    assert_eq!(told.len(), 1);
+    assert!(told[0].contains("could not be sent") && told[0].contains("was set down"), "{told:?}");
 }
 
 #[test]

@@ -85,7 +85,11 @@ impl Client {
     fn request_of(&mut self, config: &Config, snapshot: &Snapshot, group: usize) -> Request {
         // Whoever finds the group stopped and disabled mostly wants it back, though not always in the right order.
         if snapshot.groups()[group].phase == Phase::Disabled && self.dice.chance(0.8) {
-            return if self.dice.chance(0.5) { Request::Enable } else { Request::ResetFaults };
+            return match self.dice.fraction() {
+                0.0..0.49 => Request::Enable,
+                0.49..0.5 => Request::BringUp,
+                _ => Request::ResetFaults,
+            };
         }
         match self.dice.below(24) {
             0 => Request::Stop(self.dice.pick(&[StopCategory::Two, StopCategory::One, StopCategory::Zero])),
@@ -93,6 +97,8 @@ impl Client {
             2 => Request::Disable,
             3 => Request::Enable,
             4..=5 => Request::ResetFaults,
+            // It is for whoever brings the drives up: a client has no such call.
+            6 if snapshot.groups()[group].phase == Phase::Passive => Request::Enable,
             6 => Request::Activate,
             7..=11 => {
                 self.begin_stream(config, snapshot, group);

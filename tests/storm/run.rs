@@ -408,7 +408,7 @@ impl Clients {
 
     fn act(&mut self, case: &Case, world: &mut World, is_raging: bool) {
         let snapshot = &world.snapshot;
-        let is_passive = snapshot.groups().iter().any(|group| group.phase == Phase::Passive);
+        let is_passive = snapshot.groups().iter().all(|group| group.phase == Phase::Passive);
         let is_waited_for = is_passive || !case.is_serving && !are_open(snapshot);
         if !is_raging || is_waited_for {
             return;

@@ -348,6 +348,7 @@ impl Machine {
         }
         let asked = self.hall.asked;
         let input = CycleInput {
+            suspended_ns: 0,
             slot: self.slot,
             slot_start_ns: now_ns,
             set_points_due_ns: now_ns,

@@ -100,7 +100,7 @@ impl Watch {
                 let group = &mut self.groups[number];
                 assert_eq!(from, group.phase, "the phase before {to:?}");
                 let is_possible = match to {
-                    Phase::Passive => false,
+                    Phase::Passive => from == Phase::Disabled && !is_retired,
                     Phase::Disabled => matches!(from, Phase::Passive | Phase::Disabling),
                     Phase::Enabling => from == Phase::Disabled && !is_retired,
                     Phase::Holding => matches!(from, Phase::Enabling | Phase::Moving | Phase::Stopping),

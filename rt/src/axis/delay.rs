@@ -31,6 +31,11 @@ impl SetPointDelay {
         self.cycles = (cycles as usize).min(LENGTH - 1);
     }
 
+    /// Without set-points, which will wait for as many cycles.
+    pub fn anew(&self) -> Self {
+        Self { cycles: self.cycles, ..Self::default() }
+    }
+
     /// How many cycles set-points wait.
     pub fn cycles(&self) -> usize {
         self.cycles

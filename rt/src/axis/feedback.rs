@@ -32,6 +32,12 @@ impl Axis {
         self.late_reply.begin();
     }
 
+    /// The drive is brought up, and has to report from now on.
+    pub fn begin_reports(&mut self) {
+        self.late_reply.begin();
+        self.reception.begin();
+    }
+
     /// SYNC requests the feedback of a cycle from the drive; see [`Axis::expect_feedback`].
     pub fn request_feedback(&mut self, now_ns: Nanoseconds) {
         self.expect_feedback(now_ns);
@@ -92,6 +98,11 @@ impl Axis {
             self.duplicate_node.note_repetition();
         }
         Ok(())
+    }
+
+    /// Drops what has arrived of a report in this cycle.
+    pub fn drop_report(&mut self) {
+        self.reception.drop_arrived();
     }
 
     /// Takes the error code of an emergency message; 0 says that all errors are gone.

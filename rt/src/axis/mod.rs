@@ -50,6 +50,7 @@ mod torque_loop;
 mod velocity_estimate;
 
 use crate::bit_fields::FieldDrive;
+use crate::cia402::OperationMode;
 use crate::control::{ControlLaw, TrackingError};
 use crate::frame::Frame;
 use crate::guard::FollowingErrorGuard;
@@ -105,6 +106,8 @@ pub struct Axis {
     off_cycle_temperature: Option<f32>,
     set_points: SetPoints,
     mode: Mode,
+    /// The mode of operation in which the drive is brought up.
+    first_mode: OperationMode,
     /// What is done with a target beyond the limits, by what leads the axis now.
     follow: Follow,
     /// Where the axis rests while a stream has run dry, or a callback commands nothing.
@@ -140,7 +143,8 @@ impl Axis {
         let following =
             FollowingErrorGuard::new(parameters.following_error_limit, parameters.following_error_cycles);
         let mut command = ProcessImage::default();
-        command.set(CommandSlot::OperationMode, parameters.law.operation_mode() as i32);
+        let first_mode = parameters.law.operation_mode();
+        command.set(CommandSlot::OperationMode, first_mode as i32);
         Self {
             reported_slots: parameters.exchange.reported_slots(),
             follow: parameters.follow,
@@ -152,6 +156,7 @@ impl Axis {
             off_cycle_temperature: None,
             set_points: SetPoints::default(),
             mode: Mode::default(),
+            first_mode,
             stream_rest: 0.0,
             torque_loop: TorqueLoop::default(),
             error_if_unheard: TrackingError::default(),
@@ -188,6 +193,15 @@ impl Axis {
     /// What does not change.
     pub fn parameters(&self) -> &AxisParameters {
         &self.parameters
+    }
+
+    /// Forgets what the drive has reported, and goes back to the mode of operation in which it is brought up. Process data, units and the delay
+    /// of its set-points stay.
+    pub fn begin_again(&mut self) {
+        self.return_to_first_mode();
+        let (set_points, cycle_s) = (self.set_points.anew(), self.reception.cycle_s());
+        *self = Self { set_points, ..Self::new(self.number, self.parameters.clone()) };
+        self.set_cycle(cycle_s);
     }
 
     /// Takes over the period of the axis' bus.

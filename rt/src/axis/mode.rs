@@ -80,15 +80,25 @@ impl Axis {
         self.command.set(CommandSlot::OperationMode, to.operation_mode() as i32);
     }
 
+    /// Puts the law of a mode in force, if the axis has one.
+    fn use_law_of(&mut self, mode: OperationMode) {
+        let laws = &mut self.parameters.mode_changes.laws;
+        if let Some(place) = laws.iter_mut().find(|law| law.operation_mode() == mode) {
+            core::mem::swap(place, &mut self.parameters.law);
+        }
+    }
+
+    /// Puts the law in force with which the axis has begun: the drive is about to be brought up in its mode.
+    pub(super) fn return_to_first_mode(&mut self) {
+        self.use_law_of(self.first_mode);
+    }
+
     /// The drive shows the new mode: its law is in force.
     pub fn end_mode_change(&mut self) {
         let Mode::Changing { to, holding } = core::mem::take(&mut self.mode) else { return };
         let was_torque = matches!(self.parameters.law, ControlLaw::Torque { .. });
         let is_torque = matches!(to, ControlLaw::Torque { .. });
-        let laws = &mut self.parameters.mode_changes.laws;
-        if let Some(place) = laws.iter_mut().find(|law| **law == to) {
-            core::mem::swap(place, &mut self.parameters.law);
-        }
+        self.use_law_of(to.operation_mode());
         // The offsets are those of the new mode from now on.
         self.command.set(CommandSlot::VelocityOffset, 0);
         self.command.set(CommandSlot::TorqueOffset, 0);

@@ -68,6 +68,11 @@ impl Reception {
         self.arrived = 0;
     }
 
+    /// Reports are expected from now on: none has been missed.
+    pub(super) fn begin(&mut self) {
+        (self.arrived, self.age_cycles, self.waited_cycles) = (0, 0, 0);
+    }
+
     /// Whether a PDO that arrived then belongs to the present cycle.
     pub(super) const fn is_in_time(&self, at_ns: Nanoseconds) -> bool {
         at_ns >= self.expected_since_ns

@@ -38,6 +38,11 @@ impl SetPoints {
         self.delay.set(cycles);
     }
 
+    /// None yet, with the same delay.
+    pub(super) fn anew(&self) -> Self {
+        Self { delay: self.delay.anew(), ..Self::default() }
+    }
+
     /// For how many cycles set-points wait before they are sent.
     fn delay_cycles(&self) -> f64 {
         self.delay.cycles() as f64

@@ -1,9 +1,9 @@
 //! What is wrong with the group, and how it stops.
 
-use super::Engine;
 use super::group::{Group, GroupContext};
 use super::shared::Shared;
 use super::state::{AtRest, GroupState, PowerRemoval};
+use super::{CycleInput, Engine};
 use crate::axis::Axis;
 use crate::control::ControlLaw;
 use crate::fault::Fault;
@@ -13,6 +13,7 @@ use crate::port::{BusHealth, BusState};
 use crate::record::EventKind;
 use crate::stop::{CauseRank, MergedStop, Origin, StopCause, StopReason};
 use crate::stop_category::StopCategory;
+use crate::time::Nanoseconds;
 use crate::watch::{NodeFault, TimingLevel};
 
 /// Cycles in a row whose set-points may be too late.
@@ -20,8 +21,8 @@ const LATE_CYCLES_AT_MOST: u32 = 50;
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Lets every group look for what is wrong.
-    pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
-        self.for_each_group(|group| group.check_faults(buses));
+    pub(super) fn check_faults(&mut self, input: &CycleInput<'_>) {
+        self.for_each_group(|group| group.check_faults(input));
         // While no drive has power they stay, until a group is enabled.
         if !self.shared.foreign_frames.is_empty() && self.groups.iter().any(|group| group.state.has_power()) {
             self.shared.foreign_frames.forget();
@@ -54,12 +55,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     /// Begins a stop for everything that is wrong while drives may have torque.
     #[inline]
-    pub(super) fn check_faults(&mut self, buses: &[BusHealth]) {
+    pub(super) fn check_faults(&mut self, input: &CycleInput<'_>) {
         if !self.group.state.has_power() {
             return self.watch_disabled();
         }
-        self.check_buses(buses);
-        self.check_timing();
+        self.check_buses(input.buses);
+        self.check_timing(input.suspended_ns);
         self.check_transmission();
         self.check_axes();
         self.check_enable_timeout();
@@ -67,8 +68,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// Whether slots are missed too often. A thread that is late in every cycle cannot go on, however many slots may be missed.
-    fn check_timing(&mut self) {
-        if self.shared.slots.level() == TimingLevel::Unfit {
+    fn check_timing(&mut self, suspended_ns: Nanoseconds) {
+        if suspended_ns > 0 {
+            self.fail(Origin::Group, Fault::Suspended { suspended_ns });
+        } else if self.shared.slots.level() == TimingLevel::Unfit {
             let (missed, limit) = self.shared.slots.unforgiven();
             self.fail(Origin::Group, Fault::TimingUnfit { missed, limit });
         } else if self.shared.slots.late_cycles > LATE_CYCLES_AT_MOST {

@@ -26,9 +26,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     pub(super) fn check_request(&self, request: &Request<AXES>) -> Handled {
         match request {
             Request::Activate => self.require_phase(&[Phase::Passive]),
-            Request::Enable if self.shared.requested.ending >= Ending::EnableInhibited => {
+            Request::BringUp | Request::Enable if self.shared.requested.ending >= Ending::EnableInhibited => {
                 Err(RejectReason::EnableInhibited.into())
             }
+            Request::BringUp => self.require_phase(&[Phase::Disabled]),
             Request::Enable => {
                 self.require_phase(&[Phase::Disabled])?;
                 self.require_no_fault()?;
@@ -53,6 +54,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     pub(super) fn try_request(&mut self, id: RequestId, request: &Request<AXES>) -> Handled {
         match request {
             Request::Activate => self.activate(),
+            Request::BringUp => self.return_to_passive(),
             Request::Enable => self.begin_enabling(),
             Request::Move(parameters) => self.begin_move(id, parameters)?,
             Request::SetProfileTarget(target) => self.set_profile_target(id, target)?,
@@ -111,8 +113,18 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     fn activate(&mut self) {
-        self.axes.iter_mut().for_each(Axis::start_from_actual);
+        self.axes.iter_mut().for_each(|axis| {
+            axis.start_from_actual();
+            axis.begin_reports();
+        });
         self.enter(GroupState::Disabled);
+    }
+
+    #[cold]
+    fn return_to_passive(&mut self) {
+        self.axes.iter_mut().for_each(Axis::begin_again);
+        self.group.fault_reset_cycles = 0;
+        self.enter(GroupState::Passive);
     }
 
     fn begin_enabling(&mut self) {

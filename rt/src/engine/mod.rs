@@ -84,6 +84,8 @@ pub struct CycleInput<'a> {
     pub set_points_due_ns: Nanoseconds,
     /// The time.
     pub now_ns: Nanoseconds,
+    /// How long the computer has been suspended since the cycle before: the clock stood still then.
+    pub suspended_ns: Nanoseconds,
     /// The state of each bus.
     pub buses: &'a [BusHealth],
     /// The buses on which own frames of an earlier cycle still wait for the wire.
@@ -216,6 +218,7 @@ pub enum Deadline {
 ///         slot_start_ns: now_ns,
 ///         set_points_due_ns: now_ns + 800_000,
 ///         now_ns,
+///         suspended_ns: 0,
 ///         buses: &buses,
 ///         behind: BitSet::default(),
 ///     };
@@ -306,7 +309,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.sense(input);
         self.handle_requests(host);
         self.sample_streams(input.slot_start_ns, host);
-        self.check_faults(input.buses);
+        self.check_faults(input);
         self.couple_stops();
         self.probe_late_drives();
         self.sample_trajectories(host);

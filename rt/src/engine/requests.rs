@@ -4,8 +4,10 @@ use core::ops::Range;
 
 use super::Engine;
 use super::shared::Ending;
+use super::state::GroupState;
 use super::targets::Rejection;
 use crate::axis::Axis;
+use crate::bit_set::BitSet;
 use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::record::EventKind;
@@ -74,6 +76,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Request::ProcessData(data) => self.set_process_data(data)?,
             Request::Position { axis, counts } => self.axis_mut(*axis)?.set_reported_position(*counts),
             Request::Activate
+            | Request::BringUp
             | Request::Enable
             | Request::Move(_)
             | Request::SetProfileTarget(_)
@@ -96,7 +99,12 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Hands a request to the groups that it is for. Where one of them rejects it, none carries it out.
     fn ask_groups(&mut self, id: RequestId, target: RequestTarget, request: &Request<AXES>) -> Handled {
-        for number in self.asked_groups(target, request)? {
+        let asked = match (self.asked_groups(target, request)?, request) {
+            (asked, Request::BringUp) => self.with_groups_of_same_nodes(asked),
+            (asked, Request::Disable) => self.without_passive_groups(asked),
+            (asked, _) => asked.map(usize::from).collect(),
+        };
+        for number in asked.iter().map(|group| group as u8) {
             let rejection = self.group(number).and_then(|group| group.check_request(request).err());
             if let Some(rejection) = rejection {
                 return Err(Rejection { group: Some(number), ..rejection });
@@ -105,7 +113,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         if *request == Request::Enable && !self.groups.iter().any(|group| group.state.has_power()) {
             self.forget_observations();
         }
-        for number in self.asked_groups(target, request)? {
+        for number in asked.iter().map(|group| group as u8) {
             if let Some(mut group) = self.group(number) {
                 group
                     .try_request(id, request)
@@ -113,6 +121,35 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             }
         }
         Ok(())
+    }
+
+    /// These groups, and those with axes of the same nodes.
+    fn with_groups_of_same_nodes(&self, asked: Range<u8>) -> BitSet {
+        let node_of = |axis: &Axis| (axis.parameters().bus, axis.parameters().node);
+        let mut found: BitSet = asked.map(usize::from).collect();
+        loop {
+            let of_found =
+                |axis: &&Axis| self.group_of(axis.number()).is_ok_and(|group| found.contains(group.into()));
+            let is_beside =
+                |axis: &&Axis| self.axes.iter().filter(of_found).any(|other| node_of(other) == node_of(axis));
+            let beside =
+                self.axes.iter().filter(is_beside).filter_map(|axis| self.group_of(axis.number()).ok());
+            let all = beside.map(usize::from).collect::<BitSet>().union(found);
+            if all == found {
+                return found;
+            }
+            found = all;
+        }
+    }
+
+    /// Those of these groups that are not passive: they have no power to be taken. All of them, if every one is.
+    fn without_passive_groups(&self, asked: Range<u8>) -> BitSet {
+        let all: BitSet = asked.map(usize::from).collect();
+        let is_passive = |group: &usize| {
+            self.groups.get(*group).is_some_and(|group| matches!(group.state, GroupState::Passive))
+        };
+        let active: BitSet = all.iter().filter(|group| !is_passive(group)).collect();
+        if active.is_empty() { all } else { active }
     }
 
     /// Forgets what was observed while nothing could move.

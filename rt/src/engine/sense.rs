@@ -1,6 +1,7 @@
 //! What the cycle begins with: the slot, the frames that have arrived, and what the drives report by them.
 
 use super::group::Group;
+use super::state::GroupState;
 use super::{CycleInput, Deadline, Engine};
 use crate::axis::{Axis, FeedbackSince};
 use crate::bit_set::BitSet;
@@ -147,6 +148,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         let unasked =
             if self.shared.requested.sync { in_cycle.without(asked_by_sync) } else { BitSet::default() };
         let to_answer_sync = in_cycle.without(unasked);
+        self.drop_reports_of_passive_groups();
         for (place, axis) in self.axes.iter_mut().enumerate() {
             let is_asked_by_sync = axis.parameters().feedback_since == FeedbackSince::Sync;
             let to_report = if is_asked_by_sync { to_answer_sync } else { in_cycle };
@@ -172,6 +174,14 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             axis.watch();
         }
         self.watch_guarded_nodes();
+    }
+
+    /// A drive that is being brought up may be reset at any moment: what it reports counts when its group is active.
+    fn drop_reports_of_passive_groups(&mut self) {
+        for group in self.groups.iter().filter(|group| matches!(group.state, GroupState::Passive)) {
+            let axes = self.axes.get_mut(group.places.range()).unwrap_or_default();
+            axes.iter_mut().for_each(Axis::drop_report);
+        }
     }
 }
 

@@ -16,7 +16,7 @@ impl Clock for MonotonicClock {
     fn wait_until(&mut self, deadline_ns: Nanoseconds) -> Wake {
         let now_ns = monotonic_ns();
         if now_ns >= deadline_ns {
-            return Wake { now_ns, timer_latency_ns: 0 };
+            return Wake { now_ns, timer_latency_ns: 0, suspended_ns: 0 };
         }
         sleep_until(deadline_ns);
         // If the kernel refuses to sleep, the wait goes on as a spin.
@@ -25,13 +25,20 @@ impl Clock for MonotonicClock {
             core::hint::spin_loop();
             now_ns = monotonic_ns();
         }
-        Wake { now_ns, timer_latency_ns: now_ns - deadline_ns }
+        Wake { now_ns, timer_latency_ns: now_ns - deadline_ns, suspended_ns: 0 }
     }
 }
 
 /// Reads the clock. The vDSO does it without a system call.
 pub(super) fn monotonic_ns() -> Nanoseconds {
     read_clock(libc::CLOCK_MONOTONIC)
+}
+
+/// How far `CLOCK_BOOTTIME` is ahead of `CLOCK_MONOTONIC`: the time for which the computer has been suspended since it was booted.
+pub(super) fn suspended_since_boot_ns() -> Nanoseconds {
+    // In this order the difference is never larger than it was.
+    let boot_ns = read_clock(libc::CLOCK_BOOTTIME);
+    boot_ns.saturating_sub(monotonic_ns())
 }
 
 /// The time of day. Somebody can set it while the program runs.

@@ -28,7 +28,7 @@ pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};
 pub use memory::{PREFAULT_LIMIT_BYTES, PageFaults};
 pub use paced_clock::PacedClock;
-pub use scheduling::{Policy, Scheduling, set_nice};
+pub use scheduling::{Policy, Scheduling, set_fifo, set_nice, set_ordinary};
 pub use spin_guard::SpinGuard;
 pub use step::{Outcome, STEP_COUNT, Step, StepResult};
 pub use thread::{RealtimeThread, ThreadConfig, ThreadReport};

@@ -1,11 +1,14 @@
 //! The clock of the loop. Where a frame must leave on time, it wakes early and spins for the rest.
 
-use super::clock::{MonotonicClock, monotonic_ns};
+use super::clock::{MonotonicClock, monotonic_ns, suspended_since_boot_ns};
 use super::kernel::is_preempt_rt;
 use super::send_path::SendPath;
 use super::spin_guard::SpinGuard;
 use crate::port::{Clock, Wake};
 use crate::time::Nanoseconds;
+
+/// A computer takes longer than this to be suspended and to resume.
+const SHORTEST_SUSPENSION_NS: Nanoseconds = 1_000_000;
 
 /// `CLOCK_MONOTONIC` with absolute sleeps. Where a frame must leave on time ([`Clock::wait_to_send`]), the sleep ends earlier by
 /// the guard time, and the thread spins for the rest.
@@ -21,6 +24,8 @@ pub struct PacedClock {
     clock: MonotonicClock,
     guard: Guard,
     send_path: Option<SendPath>,
+    /// See [`suspended_since_boot_ns`], at the last wait.
+    suspended_since_boot_ns: Nanoseconds,
 }
 
 #[derive(Debug)]
@@ -53,7 +58,8 @@ impl PacedClock {
     fn new(guard: Guard, has_spin: bool) -> Self {
         let has_locks = has_spin && is_preempt_rt();
         let send_path = has_locks.then(SendPath::new).and_then(Result::ok);
-        Self { clock: MonotonicClock::default(), guard, send_path }
+        let suspended_since_boot_ns = suspended_since_boot_ns();
+        Self { clock: MonotonicClock::default(), guard, send_path, suspended_since_boot_ns }
     }
 
     /// How long before the time of sending the sleep ends, in ns.
@@ -90,6 +96,12 @@ impl Clock for PacedClock {
         while wake.now_ns < deadline_ns {
             core::hint::spin_loop();
             wake.now_ns = monotonic_ns();
+        }
+        let suspended_ns = suspended_since_boot_ns();
+        // Two clocks that are read one after the other differ by what lies between.
+        if suspended_ns > self.suspended_since_boot_ns.saturating_add(SHORTEST_SUSPENSION_NS) {
+            wake.suspended_ns = suspended_ns - self.suspended_since_boot_ns;
+            self.suspended_since_boot_ns = suspended_ns;
         }
         wake
     }

@@ -77,13 +77,23 @@ fn empty_attributes() -> libc::sched_attr {
 }
 
 /// Gives the calling thread `SCHED_FIFO` at `priority` (1 to 99). Threads that it starts later do not inherit it.
-pub(super) fn set_fifo(priority: u8) -> Outcome {
+///
+/// Without the right to it (`RLIMIT_RTPRIO`), the old policy stays and the outcome is [`Outcome::Refused`].
+pub fn set_fifo(priority: u8) -> Outcome {
     let mut attributes = empty_attributes();
     attributes.sched_policy = libc::SCHED_FIFO as u32;
     attributes.sched_priority = priority.into();
     attributes.sched_flags = RESET_ON_FORK;
     // SAFETY: `attributes` is valid for reading and contains its own size. Thread 0 is the caller.
     Outcome::of(unsafe { libc::syscall(libc::SYS_sched_setattr, 0, &raw const attributes, 0) })
+}
+
+/// Takes a thread of this process, by its ID (gettid(2)), back to the time-sharing policy.
+pub fn set_ordinary(thread: i32) -> Outcome {
+    let mut attributes = empty_attributes();
+    attributes.sched_policy = libc::SCHED_OTHER as u32;
+    // SAFETY: `attributes` is valid for reading and contains its own size.
+    Outcome::of(unsafe { libc::syscall(libc::SYS_sched_setattr, thread, &raw const attributes, 0) })
 }
 
 /// Sets the nice value of the calling thread, from -20 (most CPU time) to 19, for a time-sharing policy.

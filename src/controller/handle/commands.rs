@@ -9,7 +9,9 @@ use takt_rt::{
 
 use super::Handle;
 use crate::channels::{MotionEnd, WAITING_AT_MOST};
-use crate::command::{CommandError, MotionId, MoveOptions, Refused, needed};
+use crate::command::{
+    CommandError, MotionId, MoveOptions, RecoveryError, Refused, RunningController, needed,
+};
 use crate::config::{Axis, Control};
 
 impl Handle {
@@ -221,6 +223,26 @@ impl Handle {
     /// [`CommandError::Refused`] in motion, [`CommandError::Full`], [`CommandError::Ended`].
     pub fn reset_faults(&self) -> Result<(), CommandError> {
         self.request(Request::ResetFaults)
+    }
+
+    /// Brings the drives up again, which must be disabled: after one has lost its power or was reset, or after its interface was down. Returns
+    /// when they report. The axes stay disabled, and a latched fault stays.
+    ///
+    /// # Errors
+    /// [`RecoveryError::Command`] unless the axes are disabled, [`RecoveryError::NotBroughtUp`], [`RecoveryError::Wait`] after `at_most`. A
+    /// bring-up that takes longer goes on.
+    pub fn bring_up(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::bring_up(self, RequestTarget::All, at_most)
+    }
+
+    /// Takes the axes out of what has stopped them: waits until they are still, clears the fault, brings drives up that do not report any
+    /// more, and enables. Returns when the axes hold their position; at once where they are in operation without a fault.
+    ///
+    /// # Errors
+    /// As [`Handle::bring_up`]; [`RecoveryError::Stopped`] where a fault stops the axes again. A stop that comes meanwhile ends the call with
+    /// [`CommandError::Overtaken`], and the axes are not enabled.
+    pub fn recover(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::recover(self, RequestTarget::All, at_most)
     }
 
     fn expiry_ns(&self, valid_for: Duration) -> u64 {

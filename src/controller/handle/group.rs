@@ -7,7 +7,9 @@ use takt_rt::{CallbackCycle, GroupSnapshot, OperationMode, Phase, Request, Reque
 use super::Handle;
 use super::in_loop::{CallbackHandle, CallbackOptions};
 use crate::channels::{CallbackCommand, CallbackState};
-use crate::command::{CommandError, MotionId, MoveOptions, RunningController, Stopped, WaitError};
+use crate::command::{
+    CommandError, MotionId, MoveOptions, RecoveryError, RunningController, Stopped, WaitError,
+};
 
 /// Commands and observes one group of a running controller, from any thread. Clones are cheap and equal. The drives in profile velocity
 /// and profile torque are commanded by [`Handle::velocity`] and [`Handle::torque`]: the axis names its group.
@@ -159,6 +161,23 @@ impl GroupHandle {
     /// See [`Handle::reset_faults`].
     pub fn reset_faults(&self) -> Result<(), CommandError> {
         self.handle.request_of(self.target(), Request::ResetFaults)
+    }
+
+    /// As [`Handle::bring_up`]. The other groups may be in motion, but for those with axes of the same drives: they must be disabled, and are
+    /// brought up with it.
+    ///
+    /// # Errors
+    /// See [`Handle::bring_up`].
+    pub fn bring_up(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::bring_up(&self.handle, self.target(), at_most)
+    }
+
+    /// As [`Handle::recover`].
+    ///
+    /// # Errors
+    /// See [`Handle::recover`].
+    pub fn recover(&self, at_most: Duration) -> Result<(), RecoveryError> {
+        RunningController::recover(&self.handle, self.target(), at_most)
     }
 
     /// Waits until the group is in a phase.

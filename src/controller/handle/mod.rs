@@ -45,7 +45,7 @@ use std::time::Duration;
 
 use takt_rt::Snapshot;
 
-use crate::channels::{ClientRequests, EventReader, Observer, Questions, Streamer};
+use crate::channels::{BringUpFailures, ClientRequests, EventReader, Observer, Questions, Streamer};
 use crate::config::{Axis, Group};
 use crate::telemetry::{LoopTiming, Machine, ShownTiming};
 use in_loop::Callbacks;
@@ -88,6 +88,7 @@ struct Shared {
     trajectories: Trajectories,
     callbacks: Callbacks,
     questions: Questions,
+    bring_up_failures: BringUpFailures,
     messages: Arc<Messages>,
     life: Arc<Life>,
     pace: Pace,

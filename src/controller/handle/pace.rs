@@ -77,7 +77,7 @@ impl VirtualPace {
     }
 
     /// Hands the ports out.
-    #[cfg(feature = "browser")]
+    #[cfg(any(feature = "browser", feature = "internals"))]
     pub(super) fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> T {
         with(self.lock().run.ports())
     }

@@ -199,6 +199,17 @@ impl RunningController for Handle {
         self.request_of(target, takt_rt::Request::ResetFaults)
     }
 
+    fn begin_bring_up(&self, target: RequestTarget) -> Result<(), CommandError> {
+        self.request_of(target, takt_rt::Request::BringUp)
+    }
+
+    fn bring_up_failure(&self, target: RequestTarget) -> Result<Option<String>, CommandError> {
+        let groups = 0..self.state().group_count;
+        let mut meant = groups
+            .filter(|group| matches!(target, RequestTarget::All) || target == RequestTarget::Group(*group));
+        Ok(meant.find_map(|group| self.0.bring_up_failures.of(group)))
+    }
+
     fn result_of(&self, motion: MotionId) -> Option<Result<(), MotionError>> {
         Self::result_of(self, motion)
     }

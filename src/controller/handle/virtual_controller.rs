@@ -116,6 +116,7 @@ impl VirtualController {
             trajectories: Trajectories::new(host.trajectories()),
             callbacks: Callbacks::new(host.callbacks(), &assemble::slot_plan(config)),
             questions: host.questions(),
+            bring_up_failures: host.bring_up_failures(),
             messages: Arc::default(),
             life: Arc::<Life>::default(),
             pace: Pace::Virtual(Box::new(VirtualPace::new(run, log))),
@@ -131,7 +132,7 @@ impl VirtualController {
     }
 
     /// Hands the ports out, to break something.
-    #[cfg(feature = "browser")]
+    #[cfg(any(feature = "browser", feature = "internals"))]
     pub(crate) fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> Option<T> {
         self.handle.virtual_pace().map(|pace| pace.with_ports(with))
     }
@@ -172,11 +173,11 @@ impl VirtualController {
         let shared = &self.handle.0;
         shared.life.begin_end();
         shared.clients.stop(MotionEnd::Stop(StopCategory::Two));
-        let Some(pace) = self.handle.virtual_pace() else { return Outcome::ThreadDied };
+        let Some(pace) = self.handle.virtual_pace() else { return Outcome::ThreadDied { told: vec![] } };
         pace.interrupt();
         // Each stage of the end has a time-out, so that it ends.
         while pace.step(1, &shared.life) > 0 {}
-        pace.outcome().unwrap_or(Outcome::ThreadDied)
+        pace.outcome().unwrap_or(Outcome::ThreadDied { told: vec![] })
     }
 }
 

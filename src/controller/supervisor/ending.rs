@@ -18,6 +18,7 @@ impl Supervisor {
         match (self.interrupt, self.stage) {
             (None, _) | (_, Stage::Done | Stage::RemovePower) => {}
             (Some(Interrupt::Immediate), _) => {
+                self.end_bring_up_again();
                 self.request(Request::InhibitEnable);
                 self.request(Request::Stop(StopCategory::Zero));
                 self.outcome.get_or_insert(Outcome::Interrupted);
@@ -30,6 +31,11 @@ impl Supervisor {
             }
             (Some(Interrupt::Controlled), _) => self.end(now_ns, Outcome::Interrupted),
         }
+    }
+
+    /// The loop does not run any more: nobody has confirmed anything of the drives that were brought up.
+    pub fn abandon(&mut self) {
+        self.unreached = if self.facts.is_empty() { vec![] } else { (0..self.axes).collect() };
     }
 
     /// Begins the end of the run, from any stage.
@@ -72,6 +78,7 @@ impl Supervisor {
     }
 
     fn begin_disable(&mut self, now_ns: u64) {
+        self.end_bring_up_again();
         // In this order, so that no client can enable the group after it has been disabled.
         self.request(Request::InhibitEnable);
         self.request(Request::Disable);
@@ -163,12 +170,10 @@ impl Supervisor {
         if self.facts.is_empty() {
             return vec![];
         }
-        // None has been told to start.
-        let is_passive = is_any(snapshot, |phase| phase == Phase::Passive);
         let is_unconfirmed = |axis: &usize| match not_shut_down {
             Some(axes) if axes.contains(axis) => true,
             Some(_) if self.has_pdos.get(*axis) == Some(&true) => false,
-            _ => !is_passive && snapshot.axes.get(*axis).is_some_and(|own| !own.is_confirmed_off),
+            _ => self.has_been_active && snapshot.axes.get(*axis).is_some_and(|own| !own.is_confirmed_off),
         };
         (0..self.axes).filter(is_unconfirmed).collect()
     }
@@ -176,8 +181,7 @@ impl Supervisor {
     /// Whether the drives that do not stop by themselves have been told to stop for long enough, and the last report of none shows
     /// torque, however old it is. What a drive with PDOs confirms is no misheard reply.
     fn are_told_to_stop(&self, elapsed_ns: u64, snapshot: &Snapshot, unconfirmed: &[usize]) -> bool {
-        if is_any(snapshot, |phase| phase == Phase::Passive) {
-            // None has been told to start.
+        if !self.has_been_active {
             return true;
         }
         let axes = self.axes_of(snapshot).iter().zip(&self.has_pdos).zip(&self.least_shut_down_ns);

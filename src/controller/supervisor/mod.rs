@@ -8,6 +8,7 @@
 //! [`Supervisor::poll`] is called repeatedly with the host's side of the channels. It never blocks. So it runs beside the
 //! real-time thread, and also between the cycles of a run in virtual time.
 
+mod bring_up_again;
 mod ending;
 mod phases;
 mod start_up;
@@ -15,10 +16,11 @@ mod start_up;
 use std::collections::VecDeque;
 
 use takt_rt::{
-    AxisSnapshot, BusState, Frame, Request, RequestEnvelope, RequestTarget, Snapshot, StopCategory,
+    AxisSnapshot, BusState, Frame, Phase, Request, RequestEnvelope, RequestTarget, Snapshot, StopCategory,
 };
 use tracing::{info, warn};
 
+use self::bring_up_again::BringUpAgain;
 use super::arrival::Arrival;
 use super::assemble::enabled_from_ns;
 use super::lines::Lines;
@@ -30,7 +32,7 @@ use crate::config::Config;
 use crate::family;
 use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
-use phases::fault_stop;
+use phases::{fault_stop, is_any};
 
 /// A stage must be completed within this time, where every drive can be enabled at once. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
@@ -89,6 +91,8 @@ pub struct Supervisor {
     stage_since_ns: Option<u64>,
     stage_timeout_ns: u64,
     bring_up: BringUp,
+    /// That of groups that have gone back to passive, while it is under way.
+    again: Option<BringUpAgain>,
     off_cycle: OffCycleDrives,
     /// Whether the drive of an axis has PDOs: such a one tells its position at bring-up, and confirms its shut-down by SDO.
     has_pdos: Vec<bool>,
@@ -115,6 +119,8 @@ pub struct Supervisor {
     duration_ns: Option<u64>,
     /// Whether a client commands the group, in place of the program.
     is_serving: bool,
+    /// Whether any group has left the passive phase: before that no drive has been told to start.
+    has_been_active: bool,
     after_bring_up: AfterBringUp,
     /// The buses, and their states as `tracing` knows them.
     buses: Vec<(String, BusState)>,
@@ -129,6 +135,7 @@ impl Supervisor {
             stage_since_ns: None,
             stage_timeout_ns: STAGE_TIMEOUT_NS + enabled_from_ns(config),
             bring_up: BringUp::new(config),
+            again: None,
             off_cycle: OffCycleDrives::new(config),
             has_pdos: config.axes.iter().map(|axis| family::has_pdos(axis, config)).collect(),
             shutdown: Shutdown::new(config),
@@ -156,6 +163,7 @@ impl Supervisor {
             deadline_ns: None,
             duration_ns,
             is_serving: false,
+            has_been_active: false,
             after_bring_up: AfterBringUp::Enable,
             buses: config.buses.iter().map(|bus| (bus.name.clone(), BusState::default())).collect(),
         }
@@ -228,20 +236,26 @@ impl Supervisor {
     pub fn poll(&mut self, now_ns: u64, host: &mut HostSide) {
         while let Some((bus, received)) = host.take_service() {
             self.bring_up.receive(bus, &received.frame);
+            if let Some(again) = &mut self.again {
+                again.receive(bus, &received.frame);
+            }
             self.off_cycle.receive(now_ns, bus, &received.frame);
             self.shutdown.receive(bus, &received.frame);
         }
         let mut snapshot = self.seen.take().unwrap_or_default();
         host.read_snapshot(&mut snapshot);
+        self.has_been_active |= is_any(&snapshot, |phase| phase != Phase::Passive);
         self.tell_of_buses(&snapshot);
         self.numbers = host.numbers();
         self.handle_interrupt(now_ns);
         let since_ns = *self.stage_since_ns.get_or_insert(now_ns);
         self.step(now_ns, now_ns.saturating_sub(since_ns), &snapshot, host);
         if !matches!(self.stage, Stage::Configure | Stage::Start | Stage::Done) {
-            self.off_cycle.poll(now_ns, &snapshot, host);
+            let is_brought_up = |axis| self.again.as_ref().is_some_and(|again| again.speaks_to(axis));
+            self.off_cycle.poll(now_ns, &snapshot, host, is_brought_up);
         }
         if self.stage == Stage::Run {
+            self.bring_up_again(now_ns, &snapshot, host);
             self.pass_question_on(now_ns, host);
         }
         while let Some(request) = self.outgoing.front() {
@@ -269,7 +283,7 @@ impl Supervisor {
         match self.stage {
             Stage::Configure => self.configure(now_ns, host),
             Stage::Start => self.start(now_ns, host),
-            Stage::Activate => self.activate(now_ns, elapsed_ns, snapshot),
+            Stage::Activate => self.wait_for_reports(now_ns, elapsed_ns, snapshot),
             Stage::ResetFaults => self.reset_faults(now_ns, elapsed_ns, snapshot),
             Stage::Enable => self.enable(now_ns, elapsed_ns, snapshot),
             Stage::Run => self.run(now_ns, snapshot),
@@ -313,11 +327,11 @@ impl Supervisor {
     }
 
     fn request(&mut self, request: Request) {
-        self.outgoing.push_back(RequestEnvelope {
-            id: self.numbers.next(),
-            target: RequestTarget::All,
-            request,
-        });
+        self.request_of(RequestTarget::All, request);
+    }
+
+    fn request_of(&mut self, target: RequestTarget, request: Request) {
+        self.outgoing.push_back(RequestEnvelope { id: self.numbers.next(), target, request });
     }
 
     /// Tells `tracing` of buses whose state has changed.

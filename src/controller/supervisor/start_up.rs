@@ -6,6 +6,7 @@ use super::phases::{fault_stop, is_any, is_in_operation, is_off, stuck_phase};
 use super::{AfterBringUp, Stage, Supervisor, service_sender};
 use crate::channels::HostSide;
 use crate::controller::outcome::Outcome;
+use crate::family::bring_up::AxisFacts;
 
 impl Supervisor {
     pub(super) fn configure(&mut self, now_ns: u64, host: &mut HostSide) {
@@ -14,16 +15,8 @@ impl Supervisor {
             None => {}
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
-                for (axis, facts) in (0..).zip(&facts) {
-                    if let Some(data) = &facts.process_data {
-                        self.request(data.request(axis));
-                    }
-                    if let Some(torque) = facts.rated_torque {
-                        let limit_per_mille = facts.max_torque_per_mille;
-                        self.request(Request::RatedTorque { axis, torque, limit_per_mille });
-                    }
-                }
                 self.facts = facts;
+                self.tell_facts(&self.all_axes());
                 // The first part of the bring-up has succeeded, so the second part can begin.
                 let _ = self.bring_up.start();
                 self.enter(Stage::Start, now_ns);
@@ -37,12 +30,7 @@ impl Supervisor {
             None => {}
             Some(Err(error)) => self.end(now_ns, Outcome::BringUpFailed(error)),
             Some(Ok(facts)) => {
-                // Some drives send feedback by process data only after they have received a target.
-                let told = (0..).zip(&facts).zip(&self.has_pdos).filter(|(_, tells)| **tells);
-                let positions: Vec<_> = told
-                    .map(|((axis, facts), _)| Request::Position { axis, counts: facts.position_counts })
-                    .collect();
-                positions.into_iter().for_each(|position| self.request(position));
+                self.tell_positions(&self.all_axes(), &facts);
                 // Every node is operational now. Each answers the first SYNC, or is a drive that always answers late.
                 self.request(Request::Sync(true));
                 self.request(Request::Activate);
@@ -51,7 +39,36 @@ impl Supervisor {
         }
     }
 
-    pub(super) fn activate(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
+    fn all_axes(&self) -> Vec<usize> {
+        (0..self.axes).collect()
+    }
+
+    /// Tells the engine the process data and the torque that the drives of these axes have reported.
+    pub(super) fn tell_facts(&mut self, axes: &[usize]) {
+        let of_axis = |axis: &usize| Some((u8::try_from(*axis).ok()?, self.facts.get(*axis)?));
+        let mut requests = vec![];
+        for (axis, facts) in axes.iter().filter_map(of_axis) {
+            requests.extend(facts.process_data.as_ref().map(|data| data.request(axis)));
+            requests.extend(facts.rated_torque.map(|torque| Request::RatedTorque {
+                axis,
+                torque,
+                limit_per_mille: facts.max_torque_per_mille,
+            }));
+        }
+        requests.into_iter().for_each(|request| self.request(request));
+    }
+
+    /// Tells the engine where the drives with process data are: some send feedback only after they have received a target.
+    pub(super) fn tell_positions(&mut self, axes: &[usize], facts: &[AxisFacts]) {
+        let has_pdos = |axis: &&usize| self.has_pdos.get(**axis) == Some(&true);
+        for axis in axes.iter().filter(has_pdos).copied().collect::<Vec<_>>() {
+            if let (Ok(number), Some(facts)) = (u8::try_from(axis), facts.get(axis)) {
+                self.request(Request::Position { axis: number, counts: facts.position_counts });
+            }
+        }
+    }
+
+    pub(super) fn wait_for_reports(&mut self, now_ns: u64, elapsed_ns: u64, snapshot: &Snapshot) {
         let silent = self.axes_of(snapshot).iter().position(|axis| !axis.is_heard);
         match silent {
             // A client may have begun to enable the group before this poll.

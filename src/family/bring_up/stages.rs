@@ -116,8 +116,16 @@ impl BringUp {
 
     /// As [`BringUp::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
-        let config = Arc::new(config.clone());
-        let mut group = Group::new(&config, timing);
+        Self::of_axes(Arc::new(config.clone()), timing, |_| true)
+    }
+
+    /// Begins anew with [`Stage::Configure`], for these axes alone: all of each node. The facts of the others are unknown in its outcome.
+    pub fn again(&self, axes: &[usize]) -> Self {
+        Self::of_axes(Arc::clone(&self.config), self.timing, |axis| axes.contains(&axis))
+    }
+
+    fn of_axes(config: Arc<Config>, timing: BringUpTiming, is_its: impl Fn(usize) -> bool) -> Self {
+        let mut group = Group::new(&config, timing, is_its);
         group.begin(Part::Configure, &config, timing, &[]);
         Self { config, timing, group, stage: Stage::Configure }
     }
@@ -132,6 +140,11 @@ impl BringUp {
             }
             _ => Err(NotConfigured),
         }
+    }
+
+    /// The configuration whose drives it brings up.
+    pub const fn config(&self) -> &Arc<Config> {
+        &self.config
     }
 
     /// The current or last stage.
@@ -179,7 +192,7 @@ impl Shutdown {
 
     /// As [`Shutdown::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
-        let mut group = Group::new(config, timing);
+        let mut group = Group::new(config, timing, |_| true);
         group.begin(Part::ShutDown, &Arc::new(config.clone()), timing, &[]);
         Self { group }
     }
@@ -257,16 +270,17 @@ struct NodeFailure {
 }
 
 impl Group {
-    fn new(config: &Config, timing: BringUpTiming) -> Self {
+    fn new(config: &Config, timing: BringUpTiming, is_its: impl Fn(usize) -> bool) -> Self {
         let axes = config.axes.iter().map(|axis| AxisName {
             name: axis.name.clone(),
             bus_name: config.buses.get(axis.bus).map(|bus| bus.name.clone()).unwrap_or_default(),
             node: axis.node,
         });
         let mut members: Vec<Member> = vec![];
-        for (index, axis) in config.axes.iter().enumerate() {
-            let is_its = |member: &&mut Member| (member.bus, member.session.node()) == (axis.bus, axis.node);
-            match members.iter_mut().find(is_its) {
+        for (index, axis) in config.axes.iter().enumerate().filter(|(index, _)| is_its(*index)) {
+            let is_of_node =
+                |member: &&mut Member| (member.bus, member.session.node()) == (axis.bus, axis.node);
+            match members.iter_mut().find(is_of_node) {
                 Some(member) => member.axes.push(index),
                 None => members.push(Member {
                     bus: axis.bus,

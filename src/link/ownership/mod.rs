@@ -277,7 +277,7 @@ mod tests {
 
         fn wait_until(&mut self, deadline_ns: Nanoseconds) -> Wake {
             self.now_ns = deadline_ns;
-            Wake { now_ns: deadline_ns, timer_latency_ns: 0 }
+            Wake { now_ns: deadline_ns, ..Wake::default() }
         }
 
         fn wait_to_send(&mut self, deadline_ns: Nanoseconds) -> Wake {

@@ -26,8 +26,8 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ),
     ("push points at once after the stream has begun, and clear the fault", "点流开始后立即发送点；清除故障"),
     (
-        "check the power of the drive, its cable and the termination of the bus",
-        "检查驱动器电源、电缆和总线终端电阻",
+        "check the power of the drive, its cable and the termination of the bus; after a loss of power, bring it up again",
+        "检查驱动器电源、电缆和总线终端电阻；断电后重新启动该驱动器",
     ),
     (
         "another master or an adapter delays its frames: end it, or give the bus a longer cycle",
@@ -52,8 +52,8 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "检查短路、终端电阻和波特率；总线恢复后清除故障",
     ),
     (
-        "set the interface up, or plug the adapter in again; clear the fault when the bus works again",
-        "启用接口或重新插入适配器；总线恢复后清除故障",
+        "set the interface up, or plug the adapter in again, and bring the drives up again",
+        "启用接口或重新插入适配器，并重新启动驱动器",
     ),
     (
         "the bus is blocked by other frames or errors; look at its load and its cable",
@@ -63,11 +63,21 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "check that the drive is in the mode that is configured; clear the fault",
         "检查驱动器是否处于配置的模式；清除故障",
     ),
-    ("check the power of the drive and its cable", "检查驱动器电源与电缆"),
-    ("no other master may send NMT commands; clear the fault", "不得有其他主站发送 NMT 指令；清除故障"),
-    ("check the supply of the drive; start takt anew", "检查驱动器电源；重新启动 takt"),
+    (
+        "check the power of the drive and its cable, and bring it up again",
+        "检查驱动器电源与电缆，并重新启动该驱动器",
+    ),
+    (
+        "no other master may send NMT commands; bring the drive up again",
+        "不得有其他主站发送 NMT 指令；重新启动该驱动器",
+    ),
+    ("check the supply of the drive, and bring it up again", "检查驱动器电源，并重新启动该驱动器"),
     ("give one of the two drives another node ID", "为其中一个驱动器设置其他节点 ID"),
     ("end the other master, or disconnect it", "结束或断开另一个主站"),
+    (
+        "keep the computer awake while drives are under power (`systemd-inhibit`); then bring the drives up again",
+        "驱动器带电时保持计算机不休眠 (`systemd-inhibit`)；然后重新启动驱动器",
+    ),
     ("`takt doctor` says what this computer lacks for real time", "运行 `takt doctor` 查看本机实时性的不足"),
     ("begin the stream where the axis is", "从轴的当前位置开始点流"),
     ("command a smoother motion, or look at `limits.jerk`", "使运动更平滑，或检查 `limits.jerk`"),

@@ -95,6 +95,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "the controller misses its slots too often: {0} recently (allowed: {1})",
         "控制器错过时隙过多：最近 {0} 次（允许：{1}）",
     ),
+    ("the computer was suspended for {0} s", "计算机休眠了 {0} 秒"),
     ("the callback took {0} µs (allowed: {1} µs)", "回调函数耗时 {0} µs（允许：{1} µs）"),
     ("the callback panicked", "回调函数崩溃（panic）"),
     ("<0> is error-passive: almost no frame gets through", "<0> 处于被动错误状态：几乎没有帧能通过"),

@@ -105,7 +105,7 @@ export class Groups {
       const button = (what) => element("button", { type: "button", class: what, onclick: () => act(what, number) }, text(what));
       const row = {
         phase: element("span", { class: "phase" }),
-        buttons: { enable: button("enable"), disable: button("disable"), halt: button("halt"), clear_fault: button("clear_fault") },
+        buttons: { enable: button("enable"), disable: button("disable"), halt: button("halt"), clear_fault: button("clear_fault"), bring_up: button("bring_up") },
       };
       row.item = element(
         "div",
@@ -128,6 +128,7 @@ export class Groups {
       row.buttons.disable.disabled = !commands || phase === "disabled" || phase === "passive";
       row.buttons.halt.disabled = !["moving", "streaming"].includes(phase);
       row.buttons.clear_fault.disabled = !commands || !isFault || phase === "stopping";
+      row.buttons.bring_up.disabled = !commands || phase !== "disabled";
     });
   }
 }

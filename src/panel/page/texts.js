@@ -29,6 +29,7 @@ export const TEXTS = {
   disable: ["Disable", "去使能"],
   halt: ["Come to rest", "停稳"],
   clear_fault: ["Clear fault", "清除故障"],
+  bring_up: ["Bring up again", "重新启动驱动器"],
   axes: ["Axes", "轴"],
   motion: ["Motion", "运动"],
   plots: ["Plots", "曲线"],

@@ -19,7 +19,7 @@ pub(super) const fn cure(fault: &Fault) -> &'static str {
         }
         Fault::StreamNotBegun { .. } => "push points at once after the stream has begun, and clear the fault",
         Fault::MissedFeedback { .. } => {
-            "check the power of the drive, its cable and the termination of the bus"
+            "check the power of the drive, its cable and the termination of the bus; after a loss of power, bring it up again"
         }
         Fault::LateFeedback { .. } => {
             "another master or an adapter delays its frames: end it, or give the bus a longer cycle"
@@ -36,20 +36,21 @@ pub(super) const fn cure(fault: &Fault) -> &'static str {
         Fault::BusOff => {
             "look for a short circuit, the termination and the bit rate; clear the fault when the bus works again"
         }
-        Fault::BusDown => {
-            "set the interface up, or plug the adapter in again; clear the fault when the bus works again"
-        }
+        Fault::BusDown => "set the interface up, or plug the adapter in again, and bring the drives up again",
         Fault::NotTransmitted { .. } => {
             "the bus is blocked by other frames or errors; look at its load and its cable"
         }
         Fault::NotAcknowledged { .. } => {
             "check that the drive is in the mode that is configured; clear the fault"
         }
-        Fault::NodeLost { .. } => "check the power of the drive and its cable",
-        Fault::NodeNotOperational { .. } => "no other master may send NMT commands; clear the fault",
-        Fault::UnexpectedBootUp => "check the supply of the drive; start takt anew",
+        Fault::NodeLost { .. } => "check the power of the drive and its cable, and bring it up again",
+        Fault::NodeNotOperational { .. } => "no other master may send NMT commands; bring the drive up again",
+        Fault::UnexpectedBootUp => "check the supply of the drive, and bring it up again",
         Fault::DuplicateNode { .. } => "give one of the two drives another node ID",
         Fault::ForeignMaster { .. } => "end the other master, or disconnect it",
+        Fault::Suspended { .. } => {
+            "keep the computer awake while drives are under power (`systemd-inhibit`); then bring the drives up again"
+        }
         Fault::TimingUnfit { .. } => "`takt doctor` says what this computer lacks for real time",
         Fault::StartPose { .. } => "begin the stream where the axis is",
         Fault::JerkLimit { .. } => "command a smoother motion, or look at `limits.jerk`",

@@ -25,6 +25,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
         RequestKind::Stop => "the stop",
         RequestKind::Disable => "disabling",
         RequestKind::ResetFaults => "the fault reset",
+        RequestKind::BringUp => "the bring-up",
         RequestKind::InhibitEnable => "inhibiting enable",
         RequestKind::Shutdown => "the shutdown",
     }

@@ -184,6 +184,9 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::TimingUnfit { missed, limit } => {
             format!("the controller misses its slots too often: {missed} recently (allowed: {limit})")
         }
+        Fault::Suspended { suspended_ns } => {
+            format!("the computer was suspended for {:.1} s", suspended_ns as f64 * 1e-9)
+        }
         Fault::CallbackOverrun { spent_ns, budget_ns } => format!(
             "the callback took {:.1} µs (allowed: {:.1} µs)",
             spent_ns as f64 * 1e-3,
@@ -474,6 +477,7 @@ mod tests {
                 250.0,
                 "the controller misses its slots too often: 250 recently (allowed: 250)",
             ),
+            (Rule::TimingUnfit, Origin::Group, 3.2e9, 0.0, "the computer was suspended for 3.2 s"),
             (
                 Rule::BusErrorPassive,
                 Origin::Bus(0),

@@ -133,6 +133,7 @@ fn cycles() -> Option<Phase> {
         engine.receive(0, &Received { frame, at_ns });
         engine.compute(
             &CycleInput {
+                suspended_ns: 0,
                 slot,
                 slot_start_ns: at_ns,
                 set_points_due_ns: at_ns,

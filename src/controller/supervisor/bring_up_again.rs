@@ -1,0 +1,159 @@
+//! Groups that a client has let go back to passive are brought up again, beside what the others do.
+
+use takt_rt::{Frame, Phase, Request, RequestTarget, Snapshot};
+use tracing::{error, info};
+
+use super::{Supervisor, service_sender};
+use crate::channels::HostSide;
+use crate::config::Config;
+use crate::controller::outcome::Outcome;
+use crate::family::bring_up::BringUp;
+use crate::telemetry::Machine;
+
+/// The bring-up of some groups.
+pub(super) struct BringUpAgain {
+    /// The numbers of the groups, and of their axes.
+    groups: Vec<u8>,
+    axes: Vec<usize>,
+    bring_up: BringUp,
+    step: Step,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    Configure,
+    Start,
+    /// The groups are to be active. Drives that were brought up have to report within the time of a stage.
+    Report {
+        since_ns: u64,
+        has_failed: bool,
+    },
+}
+
+impl BringUpAgain {
+    /// Of the groups that are passive; `None` if there are none.
+    fn of_passive(config: &Config, first: &BringUp, snapshot: &Snapshot) -> Option<Self> {
+        let numbered = (0..).zip(snapshot.groups());
+        let passive = numbered.filter(|(_, group)| group.phase == Phase::Passive).map(|(number, _)| number);
+        let groups: Vec<u8> = passive.collect();
+        if groups.is_empty() {
+            return None;
+        }
+        let axes: Vec<usize> =
+            groups.iter().flat_map(|group| config.axes_of_group((*group).into())).collect();
+        let bring_up = first.again(&axes);
+        Some(Self { groups, axes, bring_up, step: Step::Configure })
+    }
+
+    /// Takes a received frame.
+    pub(super) fn receive(&mut self, bus: usize, frame: &Frame) {
+        self.bring_up.receive(bus, frame);
+    }
+
+    /// Whether it has the drive of this axis to itself.
+    pub(super) fn speaks_to(&self, axis: usize) -> bool {
+        matches!(self.step, Step::Configure | Step::Start) && self.axes.contains(&axis)
+    }
+}
+
+impl Supervisor {
+    /// Goes on with the bring-up of groups that have gone back to passive, or begins it.
+    pub(super) fn bring_up_again(&mut self, now_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {
+        let config = self.bring_up.config();
+        let Some(mut again) = self.again.take().or_else(|| {
+            let begun = BringUpAgain::of_passive(config, &self.bring_up, snapshot)?;
+            host.bring_up_failures().forget(&begun.groups);
+            self.off_cycle.begin_again(config, &begun.axes);
+            info!(target: "takt::run", groups = ?begun.groups, "drives are brought up again");
+            Some(begun)
+        }) else {
+            return;
+        };
+        let is_over = match again.step {
+            Step::Configure | Step::Start => {
+                self.go_on_with(&mut again, now_ns, host);
+                false
+            }
+            Step::Report { since_ns, has_failed } => {
+                let elapsed_ns = now_ns.saturating_sub(since_ns);
+                has_failed && self.are_active(&again, snapshot)
+                    || self.are_reporting(&again, elapsed_ns, snapshot, host)
+            }
+        };
+        self.again = (!is_over).then_some(again);
+    }
+
+    fn go_on_with(&mut self, again: &mut BringUpAgain, now_ns: u64, host: &mut HostSide) {
+        again.bring_up.poll(now_ns, &mut service_sender(host));
+        match (again.bring_up.outcome(), again.step) {
+            (None, _) => {}
+            (Some(Err(error)), _) => {
+                note_failure(again, error.to_string(), host);
+                // As it was before: the drives show what is wrong with them.
+                self.activate(again);
+                again.step = Step::Report { since_ns: now_ns, has_failed: true };
+            }
+            (Some(Ok(facts)), Step::Configure) => {
+                for axis in &again.axes {
+                    if let (Some(known), Some(facts)) = (self.facts.get_mut(*axis), facts.get(*axis)) {
+                        known.clone_from(facts);
+                    }
+                }
+                self.tell_facts(&again.axes);
+                // The first part has succeeded, so the second one can begin.
+                let _ = again.bring_up.start();
+                again.step = Step::Start;
+            }
+            (Some(Ok(facts)), _) => {
+                self.tell_positions(&again.axes, &facts);
+                self.activate(again);
+                again.step = Step::Report { since_ns: now_ns, has_failed: false };
+            }
+        }
+    }
+
+    /// Ends the bring-up. Its groups are active again, so that their drives are told what those of the others are.
+    pub(super) fn end_bring_up_again(&mut self) {
+        if let Some(again) = self.again.take() {
+            self.activate(&again);
+        }
+    }
+
+    fn activate(&mut self, again: &BringUpAgain) {
+        for group in &again.groups {
+            self.request_of(RequestTarget::Group(*group), Request::Activate);
+        }
+    }
+
+    /// Whether the groups have left the passive phase.
+    fn are_active(&self, again: &BringUpAgain, snapshot: &Snapshot) -> bool {
+        let mut groups = again.groups.iter().filter_map(|group| snapshot.groups().get(usize::from(*group)));
+        groups.all(|group| group.phase != Phase::Passive)
+    }
+
+    /// Whether all drives report, or one has not in time, which is a failure.
+    fn are_reporting(
+        &self,
+        again: &BringUpAgain,
+        elapsed_ns: u64,
+        snapshot: &Snapshot,
+        host: &HostSide,
+    ) -> bool {
+        let is_silent = |axis: &&usize| snapshot.axes.get(**axis).is_some_and(|axis| !axis.is_heard);
+        let is_active = self.are_active(again, snapshot);
+        match again.axes.iter().find(is_silent) {
+            None => is_active,
+            Some(_) if elapsed_ns <= self.stage_timeout_ns => false,
+            Some(axis) => {
+                let machine = Machine::of(self.bring_up.config());
+                note_failure(again, Outcome::NotHeard { axis: *axis }.words(&machine), host);
+                is_active
+            }
+        }
+    }
+}
+
+fn note_failure(again: &BringUpAgain, words: String, host: &HostSide) {
+    error!(target: "takt::run", groups = ?again.groups, "drives were not brought up: {words}");
+    host.bring_up_failures().note(&again.groups, &words);
+}
