@@ -289,6 +289,28 @@ fn a_fault_is_told_with_its_words_and_is_cleared_by_the_page() {
 }
 
 #[test]
+fn a_page_brings_drives_up_again_and_is_told_which_does_not_answer() {
+    let config = config("arm6-erob.toml");
+    let silence = "[[fault]]\nkind = \"silent-node\"\naxis = \"joint2\"\nwhen = \"enabled\"\nat = \"100 ms\"\nfor = \"14 s\"\n";
+    let injector = FaultInjector::new(Scenario::parse("silence", silence, &config).unwrap());
+    let session = SessionOptions { fault_injector: Some(Arc::new(injector)), ..SessionOptions::default() };
+    let shown = Shown::with(config, session, &options(None));
+    let mut page = shown.commander();
+    shown.until_phase(Phase::Disabled);
+    page.does(&json!({ "do": "bring_up", "group": 0 }));
+    shown.until_phase(Phase::Passive);
+    shown.until_phase(Phase::Disabled);
+    let problem = page.next("problem");
+    let words = problem["words"]["en"].as_str().unwrap();
+    assert!(words.contains("joint2") && !words.contains("joint1"), "{problem}");
+    // Until the drive answers again.
+    while shown.controller.bring_up(Duration::from_secs(30)).is_err() {}
+    page.does(&json!({ "do": "clear_faults" }));
+    page.does(&json!({ "do": "enable", "group": 0 }));
+    shown.until_phase(Phase::Holding);
+}
+
+#[test]
 fn pages_are_told_that_the_controller_has_ended() {
     let Shown { panel, controller } = Shown::start("first.toml");
     let page = Page::open(address_of(&panel)).unwrap();
