@@ -335,13 +335,29 @@ pub trait RunningController: Send + Sync {
         self.axes_of(target).iter().all(is_heard).then_some(Ok(()))
     }
 
-    /// Takes a target out of what has stopped it: waits until it is still, clears the fault, brings drives up that do not report any more,
-    /// and enables. Returns when it holds its position, and at once where it is in operation without a fault. A stop that comes meanwhile
-    /// ends it: the target is not enabled then.
+    /// Takes the groups of a target out of what has stopped them, one after the other: waits until each is still, clears its fault, brings
+    /// drives up that do not report any more, and enables. Returns when they hold their positions. A group that is in operation without a
+    /// fault goes on. A stop that comes meanwhile ends it: the group is not enabled then.
+    ///
+    /// # Errors
+    /// See [`RecoveryError`]; the groups that come after that one are as they were.
+    fn recover(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
+        let until_ns = self.now_ns().saturating_add(u64::try_from(at_most.as_nanos()).unwrap_or(u64::MAX));
+        let groups = u8::try_from(self.machine().groups.len()).unwrap_or(u8::MAX);
+        let targets = match target {
+            RequestTarget::All if groups > 1 => (0..groups).map(RequestTarget::Group).collect(),
+            target => vec![target],
+        };
+        targets.into_iter().try_for_each(|group| {
+            self.recover_group(group, Duration::from_nanos(until_ns.saturating_sub(self.now_ns())))
+        })
+    }
+
+    /// As [`RunningController::recover`], for one group.
     ///
     /// # Errors
     /// See [`RecoveryError`].
-    fn recover(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
+    fn recover_group(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
         let until_ns = self.now_ns().saturating_add(u64::try_from(at_most.as_nanos()).unwrap_or(u64::MAX));
         let rest = || Duration::from_nanos(until_ns.saturating_sub(self.now_ns()));
         let is = |state: &Snapshot, phases: &[Phase]| {

@@ -100,6 +100,16 @@ fn one_group_is_brought_up_again_while_the_other_moves() {
 }
 
 #[test]
+fn all_groups_recover_though_only_one_of_them_has_stopped() {
+    let controller = start("arm-and-gripper.toml");
+    reboot(&controller, 3);
+    assert_eq!(controller.group("arm").unwrap().state().phase, Phase::Holding);
+    controller.recover(PATIENCE).unwrap();
+    assert!(controller.state().groups().iter().all(|group| group.phase == Phase::Holding));
+    assert_eq!(controller.finish(), Outcome::Finished);
+}
+
+#[test]
 fn a_drive_that_does_not_answer_is_named_and_the_group_stays_disabled_until_it_does() {
     let arm = start("arm6-erob.toml");
     does(&arm, 2, DriveEffect::Silent, true);

@@ -22,6 +22,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("the callback", "回调函数"),
     ("the stop", "停止"),
     ("the fault reset", "清除故障"),
+    ("the bring-up", "启动驱动器"),
     ("inhibiting enable", "禁止使能"),
     ("the shutdown", "关闭"),
     // Reasons.
