@@ -7,12 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
+use takt::faults::{FaultInjector, Scenario};
 use takt::rt::Fault;
 use takt::rt::linux::{Policy, Step};
 use takt::{
     CallbackOptions, CommandError, Config, Controller, Event, EventKind, Follow, Handle, MotionError,
-    MoveOptions, Outcome, Phase, PointRefusal, SessionOptions, Snapshot, StartFailure, StopCategory,
-    StreamError, StreamState, WaitError,
+    MoveOptions, Outcome, Phase, PointRefusal, RecoveryError, SessionOptions, Snapshot, StartFailure,
+    StopCategory, StreamError, StreamState, WaitError,
 };
 
 const PATIENCE: Duration = Duration::from_secs(30);
@@ -289,4 +290,24 @@ fn a_callback_that_does_not_return_ends_the_run_and_every_wait_and_moves_nothing
     assert!(after >= Duration::from_secs(1), "{after:?}");
     assert_eq!(told, ["the drives of can are simulated"]);
     assert_eq!(session.unreached, [0]);
+}
+
+#[test]
+fn a_bring_up_that_is_asked_for_again_at_once_is_carried_out() {
+    let config = config("arm6-erob.toml");
+    let stuck = "[[fault]]\nkind = \"stuck-sdo\"\naxis = \"joint2\"\nwhen = \"enabled\"\nat = \"100 ms\"\nfor = \"4 s\"\n";
+    let injector = FaultInjector::new(Scenario::parse("stuck", stuck, &config).unwrap());
+    let options = SessionOptions { fault_injector: Some(Arc::new(injector)), ..SessionOptions::default() };
+    let arm = Controller::start(config, options).unwrap();
+    thread::sleep(Duration::from_millis(200));
+    arm.disable().unwrap();
+    arm.wait_for(Phase::Disabled, PATIENCE).unwrap();
+    let mut failures = 0;
+    while let Err(error) = arm.bring_up(PATIENCE) {
+        assert!(matches!(error, RecoveryError::NotBroughtUp { .. }), "{error}");
+        failures += 1;
+    }
+    assert!(failures > 1, "{failures}");
+    arm.enable().unwrap();
+    arm.wait_for(Phase::Holding, PATIENCE).unwrap();
 }

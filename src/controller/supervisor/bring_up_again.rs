@@ -1,6 +1,6 @@
 //! Groups that a client has let go back to passive are brought up again, beside what the others do.
 
-use takt_rt::{Frame, Phase, Request, RequestTarget, Snapshot};
+use takt_rt::{Answer, Frame, Phase, Request, RequestId, RequestTarget, Snapshot};
 use tracing::{error, info};
 
 use super::{Supervisor, service_sender};
@@ -17,6 +17,8 @@ pub(super) struct BringUpAgain {
     axes: Vec<usize>,
     bring_up: BringUp,
     step: Step,
+    /// The requests that make the groups active again.
+    activations: Vec<RequestId>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,12 +44,23 @@ impl BringUpAgain {
         let axes: Vec<usize> =
             groups.iter().flat_map(|group| config.axes_of_group((*group).into())).collect();
         let bring_up = first.again(&axes);
-        Some(Self { groups, axes, bring_up, step: Step::Configure })
+        Some(Self { groups, axes, bring_up, step: Step::Configure, activations: vec![] })
     }
 
     /// Takes a received frame.
     pub(super) fn receive(&mut self, bus: usize, frame: &Frame) {
         self.bring_up.receive(bus, frame);
+    }
+
+    /// Whether the requests that make its groups active have been carried out.
+    fn is_activated(&self, snapshot: &Snapshot) -> bool {
+        let answers = &snapshot.answers;
+        self.activations.iter().all(|id| answers.of(*id) != Answer::None || answers.have_forgotten(*id))
+    }
+
+    fn is_any_passive(&self, snapshot: &Snapshot) -> bool {
+        let mut groups = self.groups.iter().filter_map(|group| snapshot.groups().get(usize::from(*group)));
+        groups.any(|group| group.phase == Phase::Passive)
     }
 
     /// Whether it has the drive of this axis to itself.
@@ -76,8 +89,10 @@ impl Supervisor {
             }
             Step::Report { since_ns, has_failed } => {
                 let elapsed_ns = now_ns.saturating_sub(since_ns);
-                has_failed && self.are_active(&again, snapshot)
-                    || self.are_reporting(&again, elapsed_ns, snapshot, host)
+                let is_active = again.is_activated(snapshot);
+                // A client may ask anew before the supervisor has seen the groups active.
+                let is_settled = has_failed || again.is_any_passive(snapshot);
+                is_active && (is_settled || self.are_reporting(&again, elapsed_ns, snapshot, host))
             }
         };
         self.again = (!is_over).then_some(again);
@@ -90,7 +105,7 @@ impl Supervisor {
             (Some(Err(error)), _) => {
                 note_failure(again, error.to_string(), host);
                 // As it was before: the drives show what is wrong with them.
-                self.activate(again);
+                again.activations = self.activate(again);
                 again.step = Step::Report { since_ns: now_ns, has_failed: true };
             }
             (Some(Ok(facts)), Step::Configure) => {
@@ -106,7 +121,7 @@ impl Supervisor {
             }
             (Some(Ok(facts)), _) => {
                 self.tell_positions(&again.axes, &facts);
-                self.activate(again);
+                again.activations = self.activate(again);
                 again.step = Step::Report { since_ns: now_ns, has_failed: false };
             }
         }
@@ -119,16 +134,9 @@ impl Supervisor {
         }
     }
 
-    fn activate(&mut self, again: &BringUpAgain) {
-        for group in &again.groups {
-            self.request_of(RequestTarget::Group(*group), Request::Activate);
-        }
-    }
-
-    /// Whether the groups have left the passive phase.
-    fn are_active(&self, again: &BringUpAgain, snapshot: &Snapshot) -> bool {
-        let mut groups = again.groups.iter().filter_map(|group| snapshot.groups().get(usize::from(*group)));
-        groups.all(|group| group.phase != Phase::Passive)
+    fn activate(&mut self, again: &BringUpAgain) -> Vec<RequestId> {
+        let targets = again.groups.iter().map(|group| RequestTarget::Group(*group));
+        targets.map(|target| self.request_of(target, Request::Activate)).collect()
     }
 
     /// Whether all drives report, or one has not in time, which is a failure.
@@ -140,14 +148,13 @@ impl Supervisor {
         host: &HostSide,
     ) -> bool {
         let is_silent = |axis: &&usize| snapshot.axes.get(**axis).is_some_and(|axis| !axis.is_heard);
-        let is_active = self.are_active(again, snapshot);
         match again.axes.iter().find(is_silent) {
-            None => is_active,
+            None => true,
             Some(_) if elapsed_ns <= self.stage_timeout_ns => false,
             Some(axis) => {
                 let machine = Machine::of(self.bring_up.config());
                 note_failure(again, Outcome::NotHeard { axis: *axis }.words(&machine), host);
-                is_active
+                true
             }
         }
     }

@@ -16,7 +16,8 @@ mod start_up;
 use std::collections::VecDeque;
 
 use takt_rt::{
-    AxisSnapshot, BusState, Frame, Phase, Request, RequestEnvelope, RequestTarget, Snapshot, StopCategory,
+    AxisSnapshot, BusState, Frame, Phase, Request, RequestEnvelope, RequestId, RequestTarget, Snapshot,
+    StopCategory,
 };
 use tracing::{info, warn};
 
@@ -330,8 +331,10 @@ impl Supervisor {
         self.request_of(RequestTarget::All, request);
     }
 
-    fn request_of(&mut self, target: RequestTarget, request: Request) {
-        self.outgoing.push_back(RequestEnvelope { id: self.numbers.next(), target, request });
+    fn request_of(&mut self, target: RequestTarget, request: Request) -> RequestId {
+        let id = self.numbers.next();
+        self.outgoing.push_back(RequestEnvelope { id, target, request });
+        id
     }
 
     /// Tells `tracing` of buses whose state has changed.
