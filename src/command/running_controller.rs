@@ -310,7 +310,7 @@ pub trait RunningController: Send + Sync {
     /// report, disabled. A latched fault stays.
     ///
     /// # Errors
-    /// See [`RecoveryError`]; the drives are disabled then.
+    /// See [`RecoveryError`]. A bring-up that takes longer than `at_most` goes on.
     fn bring_up(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
         self.begin_bring_up(target)?;
         let mut result = None;
@@ -344,26 +344,33 @@ pub trait RunningController: Send + Sync {
     fn recover(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
         let until_ns = self.now_ns().saturating_add(u64::try_from(at_most.as_nanos()).unwrap_or(u64::MAX));
         let groups = u8::try_from(self.machine().groups.len()).unwrap_or(u8::MAX);
-        let targets = match target {
+        let targets: Vec<RequestTarget> = match target {
             RequestTarget::All if groups > 1 => (0..groups).map(RequestTarget::Group).collect(),
             target => vec![target],
         };
-        targets.into_iter().try_for_each(|group| {
-            self.recover_group(group, Duration::from_nanos(until_ns.saturating_sub(self.now_ns())))
+        // A stop that comes while one group recovers ends the recovery of those that follow, too.
+        let targets: Vec<_> = targets.into_iter().map(|group| (group, self.newest_stop(group))).collect();
+        targets.into_iter().try_for_each(|(group, stop)| {
+            self.recover_group(group, stop, Duration::from_nanos(until_ns.saturating_sub(self.now_ns())))
         })
     }
 
-    /// As [`RunningController::recover`], for one group.
+    /// As [`RunningController::recover`], for one group, unless a stop has come after `stop`.
     ///
     /// # Errors
     /// See [`RecoveryError`].
-    fn recover_group(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
+    fn recover_group(
+        &self,
+        target: RequestTarget,
+        stop: RequestId,
+        at_most: Duration,
+    ) -> Result<(), RecoveryError> {
         let until_ns = self.now_ns().saturating_add(u64::try_from(at_most.as_nanos()).unwrap_or(u64::MAX));
         let rest = || Duration::from_nanos(until_ns.saturating_sub(self.now_ns()));
         let is = |state: &Snapshot, phases: &[Phase]| {
             groups_in(state, target).iter().all(|group| phases.contains(&group.phase))
         };
-        let (fault, stop) = (self.fault_in(target), self.newest_stop(target));
+        let fault = self.fault_in(target);
         let not_overtaken = || match self.newest_stop(target) == stop {
             true => Ok(()),
             false => Err(CommandError::Overtaken),

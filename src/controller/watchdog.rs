@@ -15,8 +15,7 @@ use crate::sleep_alignment;
 
 /// From one look to the next; longer where the period is.
 const LOOK: Duration = Duration::from_millis(100);
-/// Looks without a cycle in between after which the loop is given up: a second. A drive that watches the controller's heartbeat has
-/// stopped by then.
+/// Looks without a cycle in between after which the loop is given up: a second, which is longer than the usual heartbeat time-outs.
 const LOOKS: u32 = 10;
 
 /// What the loop shows of itself.
