@@ -204,6 +204,16 @@ pub(crate) fn stop_limits(start: &State, axis: &AxisLimits) -> Limits {
         .with_position(axis.position_min.min(start.position), axis.position_max.max(start.position))
 }
 
+/// The fastest stop of one axis within its limits.
+///
+/// # Errors
+/// As [`plan::stop`].
+pub(crate) fn fastest_stop(start: &State, axis: &AxisLimits) -> Result<Profile, PlanError> {
+    let mut profile = Profile::hold(0.0);
+    plan::stop(&[*start], &[stop_limits(start, axis)], core::slice::from_mut(&mut profile))?;
+    Ok(profile)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -241,7 +241,10 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 15] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 18] = [
+    (34714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
+    (27432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
+    (11882, "The same in profile velocity"),
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",

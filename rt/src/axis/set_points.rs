@@ -4,9 +4,9 @@ use super::Axis;
 use super::delay::SetPointDelay;
 use crate::control::TorqueDemand;
 use crate::fault::Fault;
-use crate::group_trajectory::stop_limits;
+use crate::group_trajectory::fastest_stop;
 use crate::guard::{self, SetPointSteps, braking_distance};
-use crate::plan::{self, Profile, State};
+use crate::plan::State;
 use crate::source::Follow;
 
 /// How far the velocity of a joint on a spring may overshoot its limit.
@@ -203,19 +203,12 @@ impl Axis {
         if !self.is_enabled() || last == before_last {
             return self.stay();
         }
-        let next = match self.stopping(period_s) {
-            Some(next) if self.check(&next, period_s).is_ok() => next,
+        let stopping = fastest_stop(&self.set_point(), &self.parameters.limits);
+        let next = match stopping.map(|profile| profile.sample(period_s)) {
+            Ok(next) if self.check(&next, period_s).is_ok() => next,
             _ => self.decelerating(period_s),
         };
         self.advance(next);
-    }
-
-    /// The next set-point of the fastest stop within the limits, if one can be planned.
-    fn stopping(&self, period_s: f64) -> Option<State> {
-        let (start, mut profile) = (self.set_point(), Profile::hold(0.0));
-        let limits = stop_limits(&start, &self.parameters.limits);
-        plan::stop(&[start], &[limits], core::slice::from_mut(&mut profile)).ok()?;
-        Some(profile.sample(period_s))
     }
 
     /// The next set-point with the deceleration limit, whatever the jerk.

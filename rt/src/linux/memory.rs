@@ -86,21 +86,26 @@ mod tests {
         core::hint::black_box(&mut frame);
     }
 
+    /// The page faults of a new thread that uses its stack.
+    fn faults_of_a_thread(prefault: bool) -> PageFaults {
+        std::thread::spawn(move || {
+            if prefault {
+                prefault_stack(128 * 1024);
+            }
+            let before = PageFaults::of_this_thread();
+            use_stack();
+            PageFaults::of_this_thread().since(before)
+        })
+        .join()
+        .unwrap()
+    }
+
+    // A page of the program that is used for the first time, or was taken away meanwhile, is a fault of neither stack: so the best of
+    // several threads counts.
     #[test]
     fn a_prefaulted_stack_takes_no_page_fault_and_an_untouched_one_does() {
-        let faults_of = |prefault: bool| {
-            std::thread::spawn(move || {
-                if prefault {
-                    prefault_stack(128 * 1024);
-                }
-                let before = PageFaults::of_this_thread();
-                use_stack();
-                PageFaults::of_this_thread().since(before)
-            })
-            .join()
-            .unwrap()
-        };
-        assert_eq!(faults_of(true), PageFaults::default());
-        assert!(faults_of(false).minor >= 1);
+        let fewest = |prefault| (0..10).map(|_| faults_of_a_thread(prefault).minor).min();
+        assert_eq!(fewest(true), Some(0));
+        assert!(fewest(false) >= Some(1));
     }
 }

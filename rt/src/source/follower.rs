@@ -3,7 +3,7 @@
 //! Every set-point is reached from the one before it with constant jerk, or by a motion of the planner. So the limits of
 //! velocity, acceleration and jerk hold between set-points too, and in every finite difference of them.
 
-use crate::group_trajectory::stop_limits;
+use crate::group_trajectory::{fastest_stop, stop_limits};
 use crate::guard::{AxisLimits, braking_distance};
 use crate::plan::{PlanError, Problem, State};
 
@@ -32,6 +32,24 @@ pub fn follow(start: &State, target: &State, limits: &AxisLimits, period_s: f64)
         Some(next) => Ok(next),
         None => tracked(start, &target, limits, period_s),
     }
+}
+
+/// The set-point one period after `start`, on the way to rest at a position. An axis that cannot stop before it makes its fastest
+/// stop, and does not turn round.
+///
+/// # Errors
+/// As [`follow`].
+pub fn come_to_rest(
+    start: &State,
+    position: f64,
+    limits: &AxisLimits,
+    period_s: f64,
+) -> Result<State, PlanError> {
+    let followed_to = fastest_stop(start, &both_ways(limits))?.end().position;
+    if (followed_to - position) * start.velocity > 0.0 {
+        return Ok(fastest_stop(start, limits)?.sample(period_s));
+    }
+    follow(start, &State::rest(position), limits, period_s)
 }
 
 /// The target; or rest at the position limit that it is beyond. A start beyond a limit comes back first, and does not meet the
@@ -106,10 +124,16 @@ pub(super) fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s
         return false;
     }
     // From the fastest velocity with the highest acceleration.
-    let (farthest, limits) = (braking_bound(limits), &both_ways(limits));
+    let farthest = braking_bound(limits);
     if position + farthest <= limits.position_max && position - farthest >= limits.position_min {
         return true;
     }
+    stops_in_range(next, &both_ways(limits))
+}
+
+/// Returns `true` if the axis can be stopped before its position limits, or where it is beyond one.
+fn stops_in_range(state: &State, limits: &AxisLimits) -> bool {
+    let State { position, velocity, acceleration } = *state;
     let highest = position + braking_distance(limits, velocity, acceleration);
     let lowest = position - braking_distance(limits, -velocity, -acceleration);
     // One that has come back within a limit does not go beyond it again.
@@ -132,8 +156,15 @@ fn braking_bound(limits: &AxisLimits) -> f64 {
 }
 
 /// The set-point on the fastest way to meet the target.
+///
+/// An axis whose acceleration is the smaller one, and that was led here by something else, may come to rest before a position
+/// limit by its deceleration alone. That is what it does first.
 fn tracked(start: &State, target: &State, limits: &AxisLimits, period_s: f64) -> Result<State, PlanError> {
-    Problem { start: *start, target: target.after(-period_s), limits: stop_limits(start, &both_ways(limits)) }
+    let smaller = both_ways(limits);
+    if limits.acceleration < limits.deceleration && !stops_in_range(start, &smaller) {
+        return Ok(fastest_stop(start, limits)?.sample(period_s));
+    }
+    Problem { start: *start, target: target.after(-period_s), limits: stop_limits(start, &smaller) }
         .track(period_s)
 }
 
@@ -276,6 +307,42 @@ pub(super) mod tests {
                 state = follow(&state, &State::rest(far), &LIMITS, PERIOD_S).unwrap();
             }
             prop_assert!((state.position - far.clamp(-1.0, 2.0)).abs() < 1e-9, "{state:?}");
+        }
+    }
+
+    /// The acceleration is the smaller one: from 1.7 rad/s it stops an axis within 0.43 rad, the deceleration within 0.25 rad.
+    const SLOW_TO_START: AxisLimits =
+        AxisLimits { acceleration: 3.4, deceleration: 6.0, jerk: f64::INFINITY, ..LIMITS };
+    const FAST: State = State { position: 1.7, velocity: 1.7, acceleration: 0.0 };
+
+    #[test]
+    fn an_axis_that_only_its_deceleration_stops_before_a_position_limit_is_stopped_by_it() {
+        for jerk in [400.0, f64::INFINITY] {
+            let limits = AxisLimits { jerk, ..SLOW_TO_START };
+            let mut state = FAST;
+            for _ in 0..2_000 {
+                state = follow(&state, &State::rest(5.0), &limits, PERIOD_S).unwrap();
+                assert!(state.position <= limits.position_max + 1e-9, "{state:?}");
+            }
+            assert!((state.position - limits.position_max).abs() < 1e-9, "{state:?}");
+        }
+    }
+
+    #[test]
+    fn an_axis_comes_to_rest_by_its_fastest_stop_where_it_must_and_does_not_turn_round() {
+        for jerk in [50.0, 400.0, f64::INFINITY] {
+            let limits = AxisLimits { position_max: 5.0, jerk, ..SLOW_TO_START };
+            let stop = fastest_stop(&FAST, &limits).unwrap().end().position;
+            for (wanted, expected) in [(1.0, stop), (stop, stop), (stop + 0.05, stop + 0.05), (3.0, 3.0)] {
+                let rest = f64::max(wanted, stop);
+                let mut state = FAST;
+                for _ in 0..3_000 {
+                    let next = come_to_rest(&state, rest, &limits, PERIOD_S).unwrap();
+                    assert!(next.position >= state.position - 1e-7, "{jerk} {wanted}: {state:?} {next:?}");
+                    state = next;
+                }
+                assert!((state.position - expected).abs() < 1e-6, "{jerk} {wanted}: {state:?}");
+            }
         }
     }
 

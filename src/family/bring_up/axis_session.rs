@@ -50,6 +50,8 @@ pub struct AxisSession<'a> {
     /// The timeouts.
     pub timing: BringUpTiming,
     pub(super) bus: CanopenSession,
+    /// Whether the drive has been brought up before, in the same run.
+    pub(super) is_again: bool,
     on_failure: OnFailure,
     facts: RwLock<AxisFacts>,
     /// The remedy of the current step.
@@ -57,6 +59,13 @@ pub struct AxisSession<'a> {
     first_failure: Mutex<Option<StepFailure>>,
     /// In a dry run: every number that was written, in order.
     dry_writes: Option<Mutex<Vec<(ObjectAddress, i64)>>>,
+}
+
+/// The object of an axis that corresponds to an object of the first axis of a node.
+pub(super) fn object_of(axis: &Axis, object: Object) -> Object {
+    let ObjectAddress { index, subindex } = object.address;
+    let own = MappedObject::new(index, subindex, 0).of_node_axis(axis.drive.node_axis);
+    Object { address: ObjectAddress::new(own.index, own.subindex), ..object }
 }
 
 impl<'a> AxisSession<'a> {
@@ -74,12 +83,18 @@ impl<'a> AxisSession<'a> {
             axis,
             timing,
             bus,
+            is_again: false,
             on_failure,
             facts: RwLock::new(facts),
             advice: Mutex::default(),
             first_failure: Mutex::default(),
             dry_writes: None,
         }
+    }
+
+    /// The same procedure with a drive that has been brought up before, or not.
+    pub(super) fn again(self, is_again: bool) -> Self {
+        Self { is_again, ..self }
     }
 
     /// The same procedure without a drive.
@@ -109,8 +124,8 @@ impl<'a> AxisSession<'a> {
         }
     }
 
-    /// The other axes of the same node, in the order of the configuration.
-    fn siblings(&self) -> impl Iterator<Item = &Axis> {
+    /// The axes of the same node, in the order of the configuration.
+    pub(super) fn siblings(&self) -> impl Iterator<Item = &Axis> {
         let is_of_node = |axis: &&Axis| (axis.bus, axis.node) == (self.axis.bus, self.axis.node);
         self.config.axes.iter().filter(is_of_node)
     }
@@ -133,9 +148,7 @@ impl<'a> AxisSession<'a> {
 
     /// The object of this axis that corresponds to an object of the first axis of a node.
     pub(super) fn of_axis(&self, object: Object) -> Object {
-        let ObjectAddress { index, subindex } = object.address;
-        let own = MappedObject::new(index, subindex, 0).of_node_axis(self.axis.drive.node_axis);
-        Object { address: ObjectAddress::new(own.index, own.subindex), ..object }
+        object_of(self.axis, object)
     }
 
     /// Begins a step: its name and its remedy, for progress and failures.

@@ -1,12 +1,12 @@
 //! The NMT states of a drive in bring-up and shutdown: commands, confirmation by boot-up and heartbeat, restarts.
 
-use takt_rt::Nanoseconds;
+use takt_rt::{DriveState, Nanoseconds};
 
-use super::axis_session::{AxisSession, StepResult};
+use super::axis_session::{AxisSession, StepResult, object_of};
 use super::failure::{FailureCause, ProbeResult};
 use super::stages::BringUpTiming;
 use crate::canopen::nmt::{NmtCommand, NmtState};
-use crate::canopen::objects::DEVICE_TYPE;
+use crate::canopen::objects::{DEVICE_TYPE, STATUSWORD};
 use crate::canopen::sdo::{SdoError, Transfer};
 use crate::config::Supervision;
 use crate::family;
@@ -28,14 +28,15 @@ struct StateChange {
 }
 
 impl AxisSession<'_> {
-    /// Resets the communication of the drive and waits for its boot-up. A drive that has restarted does not need it again.
+    /// Resets the drive and waits for its boot-up. A drive that has restarted does not need it again.
     pub async fn restart_communication(&self) -> StepResult {
         if self.bus.watches_restarts() {
             return self.settled(Ok(()));
         }
+        let command = self.reset().await;
         let boot_ups = self.bus.boot_ups();
         let reset = StateChange {
-            command: NmtCommand::ResetCommunication,
+            command,
             awaited: NmtState::BootUp,
             within_ns: self.timing.boot_up_timeout_ns,
             repeat_ns: self.timing.reset_repeat_ns,
@@ -43,6 +44,26 @@ impl AxisSession<'_> {
         let restarted = self.reach(reset).await;
         self.bus.watch_restarts(boot_ups.saturating_add(1));
         self.settled(restarted)
+    }
+
+    /// The command that resets the node: its communication, as the manuals say.
+    ///
+    /// That takes the heartbeat consumer (1016) from it. A drive that has kept its torque and does not obey would then have nothing that
+    /// stops it. So a node that is brought up again restarts as a whole, which ends the torque, unless each of its axes shows that it
+    /// has none.
+    async fn reset(&self) -> NmtCommand {
+        if self.is_again {
+            for axis in self.siblings() {
+                let object = object_of(axis, STATUSWORD).address;
+                let read = self.bus.read_bytes(object).await;
+                let statusword = read.ok().and_then(|uploaded| uploaded.number(STATUSWORD.data_type));
+                let state = statusword.map(|statusword| axis.drive.codec.state(statusword as u16));
+                if state.is_none_or(DriveState::has_torque) {
+                    return NmtCommand::ResetNode;
+                }
+            }
+        }
+        NmtCommand::ResetCommunication
     }
 
     /// Commands a state. The drive's heartbeat must report it, if it has one that comes soon.

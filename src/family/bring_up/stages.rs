@@ -116,16 +116,16 @@ impl BringUp {
 
     /// As [`BringUp::new`], with other timeouts.
     pub fn with_timing(config: &Config, timing: BringUpTiming) -> Self {
-        Self::of_axes(Arc::new(config.clone()), timing, |_| true)
+        Self::begun(Arc::new(config.clone()), timing, Group::new(config, timing, |_| true))
     }
 
     /// Begins anew with [`Stage::Configure`], for these axes alone: all of each node. The facts of the others are unknown in its outcome.
     pub fn again(&self, axes: &[usize]) -> Self {
-        Self::of_axes(Arc::clone(&self.config), self.timing, |axis| axes.contains(&axis))
+        let group = Group::new(&self.config, self.timing, |axis| axes.contains(&axis));
+        Self::begun(Arc::clone(&self.config), self.timing, Group { is_again: true, ..group })
     }
 
-    fn of_axes(config: Arc<Config>, timing: BringUpTiming, is_its: impl Fn(usize) -> bool) -> Self {
-        let mut group = Group::new(&config, timing, is_its);
+    fn begun(config: Arc<Config>, timing: BringUpTiming, mut group: Group) -> Self {
         group.begin(Part::Configure, &config, timing, &[]);
         Self { config, timing, group, stage: Stage::Configure }
     }
@@ -229,6 +229,8 @@ impl Shutdown {
 struct Group {
     axes: Vec<AxisName>,
     members: Vec<Member>,
+    /// Whether the drives have been brought up before, in the same run.
+    is_again: bool,
     procedures: Parallel<CanopenClient, Vec<AxisFacts>, NodeFailure>,
 }
 
@@ -291,11 +293,12 @@ impl Group {
                 }),
             }
         }
-        Self { axes: axes.collect(), members, procedures: Parallel::new([]) }
+        Self { axes: axes.collect(), members, is_again: false, procedures: Parallel::new([]) }
     }
 
     /// Begins a part of every axis. `facts` is what is known of each drive; without it, nothing is known.
     fn begin(&mut self, part: Part, config: &Arc<Config>, timing: BringUpTiming, facts: &[AxisFacts]) {
+        let is_again = self.is_again;
         let begun = self.members.iter_mut().map(|member| {
             let axes = member.axes.iter().filter_map(|index| Some((*index, config.axes.get(*index)?)));
             let facts: Vec<AxisFacts> = axes
@@ -315,6 +318,7 @@ impl Group {
                 let axes = axes.iter().filter_map(|index| config.axes.get(*index));
                 let of_axis = |(axis, facts)| {
                     AxisSession::new(session.clone(), &config, axis, timing, part.on_failure(), facts)
+                        .again(is_again)
                 };
                 let sessions: Vec<AxisSession<'_>> = axes.zip(facts).map(of_axis).collect();
                 let failed = carry_out(part, &sessions).await;

@@ -171,6 +171,25 @@ fn the_drive_keeps_its_torque() {
     );
 }
 
+/// The heartbeat consumer (1016) of the drive is off after the reset.
+#[test]
+fn a_drive_that_is_brought_up_again_and_may_have_torque_restarts_without_it() {
+    let config = config(&[(0, 2)]);
+    let mut world = World::of(&config);
+    let mut bring_up = BringUp::new(&config);
+    world.run(&mut bring_up).unwrap();
+    for is_silent in [false, true] {
+        let drive = world.drive();
+        drive.state = DriveState::OperationEnabled;
+        drive.flaws.ignores_controlwords = true;
+        if is_silent {
+            drive.flaws.silent.insert(at(0x6041, 0));
+        }
+        assert_eq!(world.run(&mut bring_up.again(&[0])).is_err(), is_silent);
+        assert_eq!(world.drive().state, DriveState::SwitchOnDisabled);
+    }
+}
+
 #[test]
 fn a_drive_without_a_rated_torque_cannot_be_commanded_in_torque() {
     let mut config = config(&[(0, 2)]);

@@ -213,7 +213,11 @@ impl ScriptedDrive {
             NmtCommand::Start => self.nmt = NmtState::Operational,
             NmtCommand::Stop => self.nmt = NmtState::Stopped,
             NmtCommand::EnterPreOperational => self.nmt = NmtState::PreOperational,
-            NmtCommand::ResetNode | NmtCommand::ResetCommunication => self.boot(),
+            NmtCommand::ResetNode => {
+                self.state = DriveState::SwitchOnDisabled;
+                self.boot();
+            }
+            NmtCommand::ResetCommunication => self.boot(),
         }
         self.heartbeat_at_ns = 0;
     }
