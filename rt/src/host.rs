@@ -194,6 +194,9 @@ pub struct GroupSnapshot {
     pub remaining_s: f64,
     /// Why it stopped or is stopping; `None` again after it has been re-enabled.
     pub stop: Option<StopReason>,
+    /// True if enabling is refused until a bring-up has succeeded: from [`Request::BringUp`](crate::Request::BringUp) on until
+    /// [`Request::ConfirmBringUp`](crate::Request::ConfirmBringUp). It stays true after a bring-up that has failed.
+    pub needs_bring_up: bool,
     /// Its stream, or the last one.
     pub stream: StreamReport,
     /// Cycles in which its set-points went on, since the start. In the others the last ones had still to leave, or none can.

@@ -185,11 +185,14 @@ pub enum RejectReason {
         /// The nearest position limit.
         limit: f64,
     },
+    /// The last bring-up of the group has failed, or has not been confirmed yet: see
+    /// [`Request::ConfirmBringUp`](crate::Request::ConfirmBringUp).
+    NotBroughtUp,
 }
 
 impl RejectReason {
     /// One of each, in the order of their numbers, with numbers of no meaning.
-    pub const ALL: [Self; 37] = [
+    pub const ALL: [Self; 38] = [
         Self::Phase,
         Self::StopLatched { rule: Rule::FollowingError },
         Self::EnableInhibited,
@@ -227,6 +230,7 @@ impl RejectReason {
         Self::NotAtRest { velocity: 1.0 },
         Self::OffSetPoint { distance: 2.0, limit: 1.0 },
         Self::BeyondCounter { position: 2.0, limit: 1.0 },
+        Self::NotBroughtUp,
     ];
 
     /// The number that stands for it in recordings.
@@ -269,6 +273,7 @@ impl RejectReason {
             Self::NotAtRest { .. } => 34,
             Self::OffSetPoint { .. } => 35,
             Self::BeyondCounter { .. } => 36,
+            Self::NotBroughtUp => 37,
         }
     }
 
@@ -302,6 +307,7 @@ impl RejectReason {
             | Self::UnknownCallback
             | Self::ModeChanging
             | Self::NotDisabled
+            | Self::NotBroughtUp
             | Self::TooLate
             | Self::SuccessorPending
             | Self::Phase
@@ -353,6 +359,7 @@ impl RejectReason {
             34 => Self::NotAtRest { velocity: asked },
             35 => Self::OffSetPoint { distance: asked, limit: allowed },
             36 => Self::BeyondCounter { position: asked, limit: allowed },
+            37 => Self::NotBroughtUp,
             _ => return None,
         })
     }
@@ -426,6 +433,7 @@ impl core::fmt::Display for RejectReason {
             Self::ObjectNotMapped { object } => {
                 write!(f, "object {object} is not in the process data, and a change of the mode needs it")
             }
+            Self::NotBroughtUp => f.write_str("the last bring-up has failed or is not confirmed"),
             Self::NotDisabled => f.write_str("the drive takes another mode only while it is disabled"),
             Self::NotAtRest { velocity } => {
                 write!(f, "the joint is not at rest, or has not been for some cycles: {velocity}")

@@ -70,9 +70,13 @@ pub enum Request<const AXES: usize = MAX_AXES> {
     /// Leave [`Phase::Passive`](crate::Phase::Passive): begin to send set-points, with the drives disabled.
     Activate,
     /// Go back to [`Phase::Passive`](crate::Phase::Passive), from disabled: the host brings the drives up again, and asks for
-    /// [`Request::Activate`] then. What they have reported is forgotten, and they start in the mode of operation of the parameters. A latched
-    /// fault stays. Groups with axes of the same node do it together.
+    /// [`Request::Activate`] then, whether that has succeeded or not. What they have reported is forgotten, and they start in the mode of
+    /// operation of the parameters. A latched fault stays. Groups with axes of the same node do it together. Until
+    /// [`Request::ConfirmBringUp`], enabling and changes of the mode are refused.
     BringUp,
+    /// Allow enabling and changes of the mode after [`Request::BringUp`] and [`Request::Activate`]: every drive is configured and reports. A
+    /// host whose bring-up has failed does not send it.
+    ConfirmBringUp,
     /// Bring every drive to operation enabled; set-points follow the actual positions until it is.
     Enable,
     /// Move to a target, now: a move under way is re-planned from where it is.
@@ -122,6 +126,7 @@ impl<const AXES: usize> Request<AXES> {
             Self::Position { .. } => RequestKind::Position,
             Self::Activate => RequestKind::Activate,
             Self::BringUp => RequestKind::BringUp,
+            Self::ConfirmBringUp => RequestKind::ConfirmBringUp,
             Self::Enable => RequestKind::Enable,
             Self::Move(_) => RequestKind::Move,
             Self::SetProfileTarget(_) => RequestKind::SetProfileTarget,
@@ -261,11 +266,13 @@ pub enum RequestKind {
     ChangeMode = 17,
     /// Another bring-up of the drives.
     BringUp = 18,
+    /// The end of another bring-up that has succeeded.
+    ConfirmBringUp = 19,
 }
 
 impl RequestKind {
     /// Every kind, in the order of their numbers.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Sync,
         Self::TimeOfDay,
         Self::RatedTorque,
@@ -285,5 +292,6 @@ impl RequestKind {
         Self::RunCallback,
         Self::ChangeMode,
         Self::BringUp,
+        Self::ConfirmBringUp,
     ];
 }

@@ -1,4 +1,4 @@
-//! Why the drives of groups were not brought up again.
+//! Failures of bringing drives up again.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,17 +8,17 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub struct BringUpFailures(Arc<Mutex<BTreeMap<u8, String>>>);
 
 impl BringUpFailures {
-    /// Keeps why these groups were not brought up.
+    /// Keeps the failure of these groups.
     pub fn note(&self, groups: &[u8], words: &str) {
         self.failures().extend(groups.iter().map(|group| (*group, words.to_owned())));
     }
 
-    /// These groups are brought up anew.
+    /// Forgets the failures of these groups, which are being brought up.
     pub fn forget(&self, groups: &[u8]) {
         self.failures().retain(|group, _| !groups.contains(group));
     }
 
-    /// Why a group was not brought up at its last bring-up; `None` if it was, or is being brought up.
+    /// Returns the failure of the last bring-up of a group; `None` if that has succeeded or is under way.
     pub fn of(&self, group: u8) -> Option<String> {
         self.failures().get(&group).cloned()
     }

@@ -40,6 +40,7 @@ pub const NO_SNAPSHOT: Snapshot = Snapshot {
         phase: Phase::Passive,
         remaining_s: 0.0,
         stop: None,
+        needs_bring_up: false,
         stream: StreamReport {
             state: StreamState::Idle,
             counts: StreamCounts { lag_ns: 0, points: 0, late_points: 0, lost_points: 0 },
@@ -144,7 +145,7 @@ pub fn fill<T>(places: &mut [Option<T>], mut next: impl FnMut() -> Option<T>) {
 }
 
 fn put_group(group: &GroupSnapshot, words: &mut Words<'_>) {
-    words.put(pack([group.phase as u8, u8::from(group.stop.is_some()), 0, 0]));
+    words.put(pack([group.phase as u8, group.stop.is_some().into(), group.needs_bring_up.into(), 0]));
     words.put_f64(group.remaining_s);
     words.put(group.steps);
     put_stream(&group.stream, words);
@@ -154,9 +155,10 @@ fn put_group(group: &GroupSnapshot, words: &mut Words<'_>) {
 }
 
 fn take_group(words: &mut Words<'_>) -> GroupSnapshot {
-    let [phase, is_stopped, ..] = unpack(words.take());
+    let [phase, is_stopped, needs_bring_up, _] = unpack(words.take());
     GroupSnapshot {
         phase: phase_of(phase),
+        needs_bring_up: needs_bring_up == 1,
         remaining_s: words.take_f64(),
         steps: words.take(),
         stream: take_stream(words),
@@ -483,9 +485,11 @@ pub(super) mod tests {
 
     fn groups() -> impl Strategy<Value = GroupSnapshot> {
         let phases = prop::sample::select(&Phase::ALL[..]);
-        (phases, any::<f64>(), prop::option::of(stop_reasons()), streams(), any::<u64>()).prop_map(
-            |(phase, remaining_s, stop, stream, steps)| GroupSnapshot {
+        let flag_and_steps = any::<(bool, u64)>();
+        (phases, any::<f64>(), prop::option::of(stop_reasons()), streams(), flag_and_steps).prop_map(
+            |(phase, remaining_s, stop, stream, (needs_bring_up, steps))| GroupSnapshot {
                 phase,
+                needs_bring_up,
                 remaining_s,
                 stop,
                 stream,

@@ -322,7 +322,7 @@ pub enum RecoveryError {
     /// It has not come about in time, or the controller has ended.
     #[error(transparent)]
     Wait(#[from] WaitError),
-    /// Drives were not brought up.
+    /// Drives were not brought up. Enabling them is refused until a bring-up has succeeded.
     #[error("{words}")]
     NotBroughtUp {
         /// Each drive, the step that failed, and what to do.

@@ -310,7 +310,8 @@ pub trait RunningController: Send + Sync {
     /// report, disabled. A latched fault stays.
     ///
     /// # Errors
-    /// See [`RecoveryError`]. A bring-up that takes longer than `at_most` goes on.
+    /// See [`RecoveryError`]. A bring-up that takes longer than `at_most` continues. After one that has failed, the drives stay disabled, and
+    /// enabling them is refused ([`RejectReason::NotBroughtUp`](takt_rt::RejectReason::NotBroughtUp)) until a bring-up has succeeded.
     fn bring_up(&self, target: RequestTarget, at_most: Duration) -> Result<(), RecoveryError> {
         self.begin_bring_up(target)?;
         let mut result = None;
@@ -321,7 +322,7 @@ pub trait RunningController: Send + Sync {
         result.unwrap_or(Ok(()))
     }
 
-    /// How the bring-up of a target has ended that was begun before a state; `None` while it is under way. Does not wait.
+    /// Returns the result of the bring-up of a target that was begun before a state; `None` while it is under way. Does not wait.
     fn bring_up_result(&self, target: RequestTarget, state: &Snapshot) -> Option<Result<(), RecoveryError>> {
         if groups_in(state, target).iter().any(|group| group.phase == Phase::Passive) {
             return None;
@@ -331,13 +332,13 @@ pub trait RunningController: Send + Sync {
             Ok(None) => {}
             Err(error) => return Some(Err(error.into())),
         }
-        let is_heard = |axis: &usize| state.axes().get(*axis).is_some_and(|axis| axis.is_heard);
-        self.axes_of(target).iter().all(is_heard).then_some(Ok(()))
+        let is_confirmed = groups_in(state, target).iter().all(|group| !group.needs_bring_up);
+        is_confirmed.then_some(Ok(()))
     }
 
     /// Takes the groups of a target out of what has stopped them, one after the other: waits until each is still, clears its fault, brings
-    /// drives up that do not report any more, and enables. Returns when they hold their positions. A group that is in operation without a
-    /// fault goes on. A stop that comes meanwhile ends it: the group is not enabled then.
+    /// drives up that do not report any more or whose last bring-up has failed, and enables. Returns when they hold their positions. A group
+    /// that is in operation without a fault continues. A stop that comes meanwhile ends it: the group is not enabled then.
     ///
     /// # Errors
     /// See [`RecoveryError`]; the groups that come after that one are as they were.
@@ -391,13 +392,16 @@ pub trait RunningController: Send + Sync {
         if !is(&self.state(), &[Phase::Disabled]) {
             return self.enabled(target, rest());
         }
+        let needs_bring_up =
+            has_restarted || groups_in(&self.state(), target).iter().any(|group| group.needs_bring_up);
         let axes = self.axes_of(target);
         let is_reporting = |state: &Snapshot| {
             axes.iter().all(|axis| state.axes().get(*axis).is_some_and(|axis| !axis.is_stale()))
         };
         // One report may be missing on a bus that works.
-        let reports = self.wait_until_seen(rest().min(REPORTS_WITHIN), &mut |state| is_reporting(state));
-        if has_restarted || reports.is_err() {
+        let are_reporting =
+            || self.wait_until_seen(rest().min(REPORTS_WITHIN), &mut |state| is_reporting(state)).is_ok();
+        if needs_bring_up || !are_reporting() {
             not_overtaken()?;
             self.bring_up(target, rest())?;
         }

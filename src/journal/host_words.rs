@@ -176,6 +176,7 @@ fn put_request(envelope: &RequestEnvelope, put: &mut Put) {
         }
         Request::Activate
         | Request::BringUp
+        | Request::ConfirmBringUp
         | Request::Enable
         | Request::Stream
         | Request::Disable
@@ -202,6 +203,7 @@ fn take_request(take: &mut Take<'_>) -> Result<RequestEnvelope, Malformed> {
         RequestKind::Position => Request::Position { axis: byte(take)?, counts: take.word()? as u32 as i32 },
         RequestKind::Activate => Request::Activate,
         RequestKind::BringUp => Request::BringUp,
+        RequestKind::ConfirmBringUp => Request::ConfirmBringUp,
         RequestKind::Enable => Request::Enable,
         RequestKind::Move => Request::Move(Move {
             target: axes_of(take)?,

@@ -8,8 +8,8 @@ use takt::faults::DriveEffect;
 use takt::internals::inject;
 use takt::rt::RequestTarget;
 use takt::{
-    CommandError, Config, Handle, Outcome, Phase, RecoveryError, Rule, RunningController, Snapshot,
-    StopCategory, VirtualController,
+    CommandError, Config, Handle, Outcome, Phase, RecoveryError, RejectReason, Rule, RunningController,
+    Snapshot, StopCategory, VirtualController,
 };
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -124,6 +124,69 @@ fn a_drive_that_does_not_answer_is_named_and_the_group_stays_disabled_until_it_d
     does(&arm, 2, DriveEffect::Silent, false);
     arm.recover(PATIENCE).unwrap();
     moves(&arm, "arm6-erob.toml");
+}
+
+#[track_caller]
+fn assert_needs_bring_up(asked: Result<(), CommandError>) {
+    let Err(CommandError::Refused(refused)) = asked else { panic!("{asked:?}") };
+    assert_eq!(refused.refusal.unwrap().reason, RejectReason::NotBroughtUp);
+    assert!(refused.to_string().contains("call `bring_up`"), "{refused}");
+}
+
+#[test]
+fn a_group_whose_bring_up_has_failed_is_enabled_only_after_one_that_succeeds() {
+    let controller = start("arm-and-gripper.toml");
+    let (arm, gripper) = (controller.group("arm").unwrap(), controller.group("gripper").unwrap());
+    does(&controller, 1, DriveEffect::Silent, true);
+    arm.wait_for(Phase::Disabled, PATIENCE).unwrap();
+    assert!(matches!(arm.bring_up(PATIENCE), Err(RecoveryError::NotBroughtUp { .. })));
+    arm.reset_faults().unwrap();
+    assert_needs_bring_up(arm.enable());
+    assert_needs_bring_up(controller.enable());
+    arm.stop(StopCategory::Two).unwrap();
+    arm.disable().unwrap();
+    arm.reset_faults().unwrap();
+    // The other group is not concerned.
+    gripper.recover(PATIENCE).unwrap();
+
+    does(&controller, 1, DriveEffect::Silent, false);
+    controller.pass(Duration::from_secs(1));
+    assert_needs_bring_up(arm.enable());
+    assert_eq!((arm.state().phase, controller.fault()), (Phase::Disabled, None));
+    arm.bring_up(PATIENCE).unwrap();
+    arm.enable().unwrap();
+    arm.wait_for(Phase::Holding, PATIENCE).unwrap();
+    let motion = arm.move_to(&[0.1, 0.1, 0.1]).unwrap();
+    assert_eq!(controller.wait(motion, PATIENCE), Ok(()));
+    assert_eq!(controller.finish(), Outcome::Finished);
+}
+
+#[test]
+fn drives_that_report_after_a_bring_up_that_has_failed_are_brought_up_by_a_recovery() {
+    // Their drives report whatever was configured.
+    for name in ["hollow-arm.toml", "damiao-arm.toml"] {
+        let arm = start(name);
+        does(&arm, 1, DriveEffect::Silent, true);
+        arm.wait_for(Phase::Disabled, PATIENCE).unwrap();
+        assert!(matches!(arm.bring_up(PATIENCE), Err(RecoveryError::NotBroughtUp { .. })), "{name}");
+        does(&arm, 1, DriveEffect::Silent, false);
+        arm.pass(Duration::from_secs(5));
+        arm.reset_faults().unwrap();
+        assert_needs_bring_up(arm.enable());
+        arm.recover(PATIENCE).unwrap_or_else(|error| panic!("{name}: {error}"));
+        moves(&arm, name);
+    }
+}
+
+#[test]
+fn a_run_ends_as_usual_after_a_bring_up_that_has_failed() {
+    let arm = start("arm6-erob.toml");
+    does(&arm, 2, DriveEffect::Silent, true);
+    arm.wait_for(Phase::Disabled, PATIENCE).unwrap();
+    assert!(matches!(arm.bring_up(PATIENCE), Err(RecoveryError::NotBroughtUp { .. })));
+    does(&arm, 2, DriveEffect::Silent, false);
+    arm.reset_faults().unwrap();
+    assert_eq!(arm.finish(), Outcome::Finished);
 }
 
 #[test]

@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 18] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 21] = [
     (34714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11882, "The same in profile velocity"),
@@ -292,6 +292,12 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 18] = [
         67_000_011_973,
         "A YZ-AIM whose alarm ended by itself was enabled again after its group was disabled, for want of another controlword",
     ),
+    (
+        11_072,
+        "A drive without a fault was enabled after a bring-up that another one had failed, and its silence stopped the group",
+    ),
+    (30_375, "The same in one of three groups"),
+    (32_006, "The same, with the boot-up message of the drive, which the bring-up had reset"),
     (65_000_032_737, "The correction of a velocity stayed as it was when the feedback did not come any more"),
 ];
 

@@ -16,7 +16,7 @@ const STREAM_STEP: f64 = 2e-8;
 /// Any request.
 pub fn request(config: &Config, now_ns: u64, input: &mut Input<'_>) -> Request {
     let categories = [StopCategory::Zero, StopCategory::One, StopCategory::Two];
-    match input.byte() % 19 {
+    match input.byte() % 20 {
         0 => Request::Sync(input.byte() & 1 == 1),
         1 => Request::RatedTorque { axis: input.byte(), torque: input.number(), limit_per_mille: None },
         2 => Request::Activate,
@@ -31,6 +31,7 @@ pub fn request(config: &Config, now_ns: u64, input: &mut Input<'_>) -> Request {
         13 => Request::Position { axis: input.byte(), counts: input.word() as i32 },
         14 => Request::TimeOfDay { at_zero_ns: u64::from_le_bytes(input.bytes()) },
         18 => Request::BringUp,
+        19 => Request::ConfirmBringUp,
         15 | 16 => Request::SetProfileTarget(profile_move(config, now_ns, input)),
         _ => Request::InhibitEnable,
     }

@@ -26,6 +26,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             return Err(RejectReason::EnableInhibited.into());
         }
         self.require_phase(&[Phase::Disabled, Phase::Holding])?;
+        self.require_bring_up()?;
         self.require_no_fault()?;
         let is_enabled = matches!(self.group.state, GroupState::Holding);
         for axis in self.axes.iter() {

@@ -43,6 +43,8 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) motion: GroupTrajectory,
     /// Why the group stops or has stopped. It stays until a request ends it: a fault must be reset.
     pub(super) stop: Option<StopReason>,
+    /// True if enabling is refused until the host has confirmed another bring-up.
+    pub(super) needs_bring_up: bool,
     /// Cycles of a fault reset that are still to come.
     pub(super) fault_reset_cycles: u32,
     /// Cycles of each of its three parts.
@@ -81,6 +83,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             callback_ns: None,
             state_cycles: 0,
             stop: None,
+            needs_bring_up: false,
             fault_reset_cycles: 0,
             fault_reset_part: 1,
             commands: Commands::None,
@@ -108,6 +111,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
             phase,
             remaining_s: self.remaining_s(),
             stop: self.stop,
+            needs_bring_up: self.needs_bring_up,
             stream: self.stream_report(),
             steps: self.steps,
         };

@@ -29,9 +29,10 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
             Request::BringUp | Request::Enable if self.shared.requested.ending >= Ending::EnableInhibited => {
                 Err(RejectReason::EnableInhibited.into())
             }
-            Request::BringUp => self.require_phase(&[Phase::Disabled]),
+            Request::BringUp | Request::ConfirmBringUp => self.require_phase(&[Phase::Disabled]),
             Request::Enable => {
                 self.require_phase(&[Phase::Disabled])?;
+                self.require_bring_up()?;
                 self.require_no_fault()?;
                 self.require_commandable_positions()
             }
@@ -55,6 +56,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         match request {
             Request::Activate => self.activate(),
             Request::BringUp => self.return_to_passive(),
+            Request::ConfirmBringUp => self.group.needs_bring_up = false,
             Request::Enable => self.begin_enabling(),
             Request::Move(parameters) => self.begin_move(id, parameters)?,
             Request::SetProfileTarget(target) => self.set_profile_target(id, target)?,
@@ -99,6 +101,11 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
+    /// Drives that a failed bring-up has left are not configured, or were reset: those that have no fault would be blamed for it.
+    pub(super) fn require_bring_up(&self) -> Handled {
+        if self.group.needs_bring_up { Err(RejectReason::NotBroughtUp.into()) } else { Ok(()) }
+    }
+
     /// No joint may be enabled beyond a wrap of its drive's position counter: the drive might go around the world to its set-point.
     fn require_commandable_positions(&self) -> Handled {
         match self.axes.iter().find(|axis| !axis.is_position_commandable()) {
@@ -124,6 +131,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     fn return_to_passive(&mut self) {
         self.axes.iter_mut().for_each(Axis::begin_again);
         self.group.fault_reset_cycles = 0;
+        self.group.needs_bring_up = true;
         self.enter(GroupState::Passive);
     }
 

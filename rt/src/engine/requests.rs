@@ -77,6 +77,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             Request::Position { axis, counts } => self.axis_mut(*axis)?.set_reported_position(*counts),
             Request::Activate
             | Request::BringUp
+            | Request::ConfirmBringUp
             | Request::Enable
             | Request::Move(_)
             | Request::SetProfileTarget(_)

@@ -5,7 +5,7 @@
 //! ─────────  ──────────────────────────────────────────────────────────────────────  ─────────────────────
 //! Passive    Request::Activate                                                       Disabled
 //! Disabled   Request::Enable                                                         Enabling
-//!            Request::BringUp                                                        Passive
+//!            Request::BringUp (and no enabling before Request::ConfirmBringUp)       Passive
 //!            Request::ChangeMode                                                     Disabled, changing mode
 //! Enabling   every drive shows operation enabled                                     Holding
 //!            a stop, Request::Disable                                                Disabling

@@ -8,6 +8,7 @@ mod plain_host;
 mod thinking;
 
 mod bit_field_axes;
+mod bring_up_again;
 mod bus_cycles;
 mod bus_kinds;
 mod callbacks;

@@ -230,13 +230,13 @@ impl Handle {
     ///
     /// # Errors
     /// [`RecoveryError::Command`] unless the axes are disabled, [`RecoveryError::NotBroughtUp`], [`RecoveryError::Wait`] after `at_most`. A
-    /// bring-up that takes longer goes on.
+    /// bring-up that takes longer continues. After one that has failed, enabling is refused until a bring-up has succeeded.
     pub fn bring_up(&self, at_most: Duration) -> Result<(), RecoveryError> {
         RunningController::bring_up(self, RequestTarget::All, at_most)
     }
 
     /// Takes the axes out of what has stopped them: waits until they are still, clears the fault, brings drives up that do not report any
-    /// more, and enables. Returns when the axes hold their position; at once where they are in operation without a fault.
+    /// more or whose last bring-up has failed, and enables. Returns when the axes hold their position; at once where they are in operation without a fault.
     ///
     /// # Errors
     /// As [`Handle::bring_up`]; [`RecoveryError::Stopped`] where a fault stops the axes again. A stop that comes meanwhile ends the call with

@@ -25,11 +25,12 @@ pub(super) struct BringUpAgain {
 enum Step {
     Configure,
     Start,
-    /// The groups are to be active. Drives that were brought up have to report within the time of a stage.
+    /// The groups are to be active. The drives have to report within the time of a stage.
     Report {
         since_ns: u64,
-        has_failed: bool,
     },
+    /// The groups are to be active, so that the drives show what is wrong with them.
+    Failed,
 }
 
 impl BringUpAgain {
@@ -52,7 +53,7 @@ impl BringUpAgain {
         self.bring_up.receive(bus, frame);
     }
 
-    /// Whether the requests that make its groups active have been carried out.
+    /// Returns `true` if the requests that make its groups active have been carried out.
     fn is_activated(&self, snapshot: &Snapshot) -> bool {
         let answers = &snapshot.answers;
         self.activations.iter().all(|id| answers.of(*id) != Answer::None || answers.have_forgotten(*id))
@@ -63,14 +64,14 @@ impl BringUpAgain {
         groups.any(|group| group.phase == Phase::Passive)
     }
 
-    /// Whether it has the drive of this axis to itself.
+    /// Returns `true` if it has the drive of this axis to itself.
     pub(super) fn speaks_to(&self, axis: usize) -> bool {
         matches!(self.step, Step::Configure | Step::Start) && self.axes.contains(&axis)
     }
 }
 
 impl Supervisor {
-    /// Goes on with the bring-up of groups that have gone back to passive, or begins it.
+    /// Continues the bring-up of groups that have gone back to passive, or begins it.
     pub(super) fn bring_up_again(&mut self, now_ns: u64, snapshot: &Snapshot, host: &mut HostSide) {
         let config = self.bring_up.config();
         let Some(mut again) = self.again.take().or_else(|| {
@@ -87,13 +88,14 @@ impl Supervisor {
                 self.go_on_with(&mut again, now_ns, host);
                 false
             }
-            Step::Report { since_ns, has_failed } => {
+            Step::Report { since_ns } => {
                 let elapsed_ns = now_ns.saturating_sub(since_ns);
-                let is_active = again.is_activated(snapshot);
                 // A client may ask anew before the supervisor has seen the groups active.
-                let is_settled = has_failed || again.is_any_passive(snapshot);
-                is_active && (is_settled || self.are_reporting(&again, elapsed_ns, snapshot, host))
+                again.is_activated(snapshot)
+                    && (again.is_any_passive(snapshot)
+                        || self.confirm_reports(&again, elapsed_ns, snapshot, host))
             }
+            Step::Failed => again.is_activated(snapshot),
         };
         self.again = (!is_over).then_some(again);
     }
@@ -104,9 +106,8 @@ impl Supervisor {
             (None, _) => {}
             (Some(Err(error)), _) => {
                 note_failure(again, error.to_string(), host);
-                // As it was before: the drives show what is wrong with them.
-                again.activations = self.activate(again);
-                again.step = Step::Report { since_ns: now_ns, has_failed: true };
+                again.activations = self.request_of_each(again, Request::Activate);
+                again.step = Step::Failed;
             }
             (Some(Ok(facts)), Step::Configure) => {
                 for axis in &again.axes {
@@ -121,8 +122,8 @@ impl Supervisor {
             }
             (Some(Ok(facts)), _) => {
                 self.tell_positions(&again.axes, &facts);
-                again.activations = self.activate(again);
-                again.step = Step::Report { since_ns: now_ns, has_failed: false };
+                again.activations = self.request_of_each(again, Request::Activate);
+                again.step = Step::Report { since_ns: now_ns };
             }
         }
     }
@@ -130,18 +131,18 @@ impl Supervisor {
     /// Ends the bring-up. Its groups are active again, so that their drives are told what those of the others are.
     pub(super) fn end_bring_up_again(&mut self) {
         if let Some(again) = self.again.take() {
-            self.activate(&again);
+            self.request_of_each(&again, Request::Activate);
         }
     }
 
-    fn activate(&mut self, again: &BringUpAgain) -> Vec<RequestId> {
+    fn request_of_each(&mut self, again: &BringUpAgain, request: Request) -> Vec<RequestId> {
         let targets = again.groups.iter().map(|group| RequestTarget::Group(*group));
-        targets.map(|target| self.request_of(target, Request::Activate)).collect()
+        targets.map(|target| self.request_of(target, request)).collect()
     }
 
-    /// Whether all drives report, or one has not in time, which is a failure.
-    fn are_reporting(
-        &self,
+    /// Confirms the bring-up if all drives report. It has failed if one has not reported in time. Returns `true` if either is the case.
+    fn confirm_reports(
+        &mut self,
         again: &BringUpAgain,
         elapsed_ns: u64,
         snapshot: &Snapshot,
@@ -149,7 +150,10 @@ impl Supervisor {
     ) -> bool {
         let is_silent = |axis: &&usize| snapshot.axes.get(**axis).is_some_and(|axis| !axis.is_heard);
         match again.axes.iter().find(is_silent) {
-            None => true,
+            None => {
+                self.request_of_each(again, Request::ConfirmBringUp);
+                true
+            }
             Some(_) if elapsed_ns <= self.stage_timeout_ns => false,
             Some(axis) => {
                 let machine = Machine::of(self.bring_up.config());

@@ -23,6 +23,7 @@ pub const PHRASES: &[ChinesePhrase] = &[
     ("the stop", "停止"),
     ("the fault reset", "清除故障"),
     ("the bring-up", "启动驱动器"),
+    ("confirming the bring-up", "确认驱动器已启动"),
     ("inhibiting enable", "禁止使能"),
     ("the shutdown", "关闭"),
     // Reasons.
@@ -84,6 +85,10 @@ pub const PHRASES: &[ChinesePhrase] = &[
     (
         "{0} is not in the PDOs of {1}, and a change of its mode needs it",
         "{0} 不在 {1} 的 PDO 中，而切换其模式需要它",
+    ),
+    (
+        "the last bring-up of the drives has failed or is not finished: call `bring_up`",
+        "上次启动驱动器失败或尚未完成：请重新启动驱动器（`bring_up`）",
     ),
     ("the drive of {0} must be disabled for it", "为此须先将 {0} 的驱动器去使能"),
     ("{0} is not at rest, or has not been for some cycles ({1})", "{0} 未静止，或静止时间还不够（{1}）"),

@@ -26,6 +26,7 @@ pub const fn request(kind: RequestKind) -> &'static str {
         RequestKind::Disable => "disabling",
         RequestKind::ResetFaults => "the fault reset",
         RequestKind::BringUp => "the bring-up",
+        RequestKind::ConfirmBringUp => "confirming the bring-up",
         RequestKind::InhibitEnable => "inhibiting enable",
         RequestKind::Shutdown => "the shutdown",
     }
@@ -141,6 +142,9 @@ fn reason(rejected: &RequestError, machine: &Machine) -> String {
         RejectReason::ObjectNotMapped { object } => {
             format!("{object} is not in the PDOs of {axis}, and a change of its mode needs it")
         }
+        RejectReason::NotBroughtUp => {
+            "the last bring-up of the drives has failed or is not finished: call `bring_up`".to_owned()
+        }
         RejectReason::NotDisabled => format!("the drive of {axis} must be disabled for it"),
         RejectReason::NotAtRest { velocity } => {
             format!(
@@ -214,6 +218,11 @@ mod tests {
                 RejectReason::NoRoomToStop { rest: -3.05, limit: -3.0 },
                 Some(0),
                 "at such a speed shoulder comes to rest only at -3.0500 rad, beyond its position limit of -3.0000 rad",
+            ),
+            (
+                RejectReason::NotBroughtUp,
+                None,
+                "the last bring-up of the drives has failed or is not finished: call `bring_up`",
             ),
             (
                 RejectReason::VelocityScale { scale: 1.5 },

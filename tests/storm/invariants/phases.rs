@@ -1,7 +1,7 @@
 //! The state machine of a group: it never stays where it must pass, and every stop has one reason.
 
 use takt::config::{Axis, Config, Control};
-use takt_rt::{EventKind, Phase, Rule};
+use takt_rt::{EventKind, GroupSnapshot, Phase, Rule};
 
 use super::Seen;
 use crate::bounds;
@@ -22,7 +22,10 @@ impl Phases {
 
     pub fn check(&mut self, seen: &Seen<'_>) -> Result<(), String> {
         self.check_reasons(seen)?;
-        let phase = seen.snapshot.groups()[self.group].phase;
+        let GroupSnapshot { phase, needs_bring_up, .. } = seen.snapshot.groups()[self.group];
+        if needs_bring_up && !matches!(phase, Phase::Passive | Phase::Disabled) {
+            return Err(format!("group {}: {phase:?} without a bring-up that has succeeded", self.group));
+        }
         if phase == self.phase {
             self.cycles += 1;
         } else {
