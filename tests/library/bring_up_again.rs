@@ -153,9 +153,12 @@ fn a_group_whose_bring_up_has_failed_is_enabled_only_after_one_that_succeeds() {
     controller.pass(Duration::from_secs(1));
     assert_needs_bring_up(arm.enable());
     assert_eq!((arm.state().phase, controller.fault()), (Phase::Disabled, None));
+    controller.pass(Duration::from_secs(10));
+    // The others confirmed that they are disabled before their bring-up.
+    let unconfirmed = arm.fault().unwrap().reason;
+    assert_eq!((unconfirmed.rule(), unconfirmed.axis()), (Rule::NotDisabled, Some(1)));
     arm.bring_up(PATIENCE).unwrap();
-    arm.enable().unwrap();
-    arm.wait_for(Phase::Holding, PATIENCE).unwrap();
+    controller.recover(PATIENCE).unwrap();
     let motion = arm.move_to(&[0.1, 0.1, 0.1]).unwrap();
     assert_eq!(controller.wait(motion, PATIENCE), Ok(()));
     assert_eq!(controller.finish(), Outcome::Finished);

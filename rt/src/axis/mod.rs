@@ -15,6 +15,7 @@
 //!
 //! | event | Off | Enabling | On | Releasing | NotReleased |
 //! | --- | --- | --- | --- | --- | --- |
+//! | [`Axis::begin_again`] | – | Releasing | Releasing | – | Releasing |
 //! | [`Axis::begin_watch`] | Enabling | – | Enabling | Enabling | – |
 //! | [`Axis::prepare_to_enable`], its conditions hold | – | On | – | – | – |
 //! | [`Axis::latch_off`] | Releasing | Releasing | Releasing | – | Releasing |
@@ -195,12 +196,13 @@ impl Axis {
         &self.parameters
     }
 
-    /// Forgets what the drive has reported, and goes back to the mode of operation in which it is brought up. Process data, units and the delay
-    /// of its set-points stay.
+    /// Forgets what the drive has reported, but for that it has no torque, and goes back to the mode of operation in which it is brought up.
+    /// Process data, units and the delay of its set-points stay.
     pub fn begin_again(&mut self) {
         self.return_to_first_mode();
-        let (set_points, cycle_s) = (self.set_points.anew(), self.reception.cycle_s());
-        *self = Self { set_points, ..Self::new(self.number, self.parameters.clone()) };
+        let (set_points, power) = (self.set_points.anew(), self.power.anew());
+        let cycle_s = self.reception.cycle_s();
+        *self = Self { set_points, power, ..Self::new(self.number, self.parameters.clone()) };
         self.set_cycle(cycle_s);
     }
 

@@ -57,6 +57,14 @@ impl Default for Power {
 }
 
 impl Power {
+    /// The drive is brought up again, which gives it no torque: that it had none stays confirmed, and whatever else is known is forgotten.
+    pub(super) fn anew(self) -> Self {
+        match self {
+            Self::Off { .. } => Self::Off { contradictions: 0 },
+            _ => Self::default(),
+        }
+    }
+
     /// The group begins to enable its drives: every drive must show anew that it may be enabled.
     fn begin_watch(&mut self) {
         if !matches!(self, Self::NotReleased(_)) {
@@ -242,6 +250,7 @@ mod tests {
     #[test]
     fn every_event_leads_where_the_table_says() {
         let silent = NotReleased(Unreleased::Silent);
+        assert_eq!(after(|power| *power = power.anew()), [OFF, LED, LED, LED, LED, LED]);
         assert_eq!(after(Power::begin_watch), [Enabling, Enabling, Enabling, Enabling, Enabling, STUCK]);
         assert_eq!(after(Power::grant), [OFF, On, On, LED, KEPT, STUCK]);
         assert_eq!(after(Power::latch_off), [KEPT; 6]);
