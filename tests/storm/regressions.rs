@@ -241,10 +241,11 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 21] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 25] = [
     (34714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11882, "The same in profile velocity"),
+const FAILED_WITH_EVERYTHING: [(u64, &str); 22] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -299,6 +300,10 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 21] = [
     (30_375, "The same in one of three groups"),
     (32_006, "The same, with the boot-up message of the drive, which the bring-up had reset"),
     (65_000_032_737, "The correction of a velocity stayed as it was when the feedback did not come any more"),
+    (9_123, "A fault was reset before the group that stops with this one had stopped for it"),
+    (34_885, "A group was enabled after a stop of the same cycle, and stopped by it"),
+    (38_616, "A group moved and was disabled after a stop of the same cycle, and stopped by it"),
+    (12_763, "The same, with three groups"),
 ];
 
 /// The same of those whose streams command every kind of point.

@@ -30,7 +30,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 
     /// Stops the groups that stop with one that does, for the same reason. A stop that begins in the step of a cycle stops the others
-    /// in the next one.
+    /// in the next one, before its requests.
     pub(super) fn couple_stops(&mut self) {
         // A group that must stop harder than the one with which it stops makes others harder: there are three categories.
         while self.groups.iter().any(|group| group.untold.is_some()) {

@@ -25,6 +25,8 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     pub(super) fn handle_requests(&mut self, host: &mut impl HostInterface<AXES, BUSES>) {
         for _ in 0..REQUESTS_PER_CYCLE {
             let Some(envelope) = host.request() else { break };
+            // Stops and requests take effect in their order: a group that is commanded after a stop is not stopped by it.
+            self.couple_stops();
             self.handle_request(&envelope, host);
         }
     }

@@ -312,6 +312,45 @@ fn groups_that_stop_with_each_other_stop_once_for_each_stop() {
     }
 }
 
+/// A stop and a command that come in one cycle are carried out in their order.
+#[test]
+fn a_group_that_is_commanded_after_a_stop_of_the_same_cycle_is_not_stopped_by_it() {
+    let mut parameters = three();
+    parameters.groups[0].stops_with.push(1);
+    parameters.groups[1].stops_with.push(0);
+    let mut rig = enabled(parameters);
+    (0..2).for_each(|group| ask(&mut rig, group, Request::Disable));
+    (0..2).for_each(|group| run_until(&mut rig, group, Phase::Disabled, 300));
+    let stop = (0, Request::Stop(StopCategory::Two));
+    rig.host.group_requests.extend([stop, (1, Request::Enable), (0, Request::Enable)]);
+    rig.run(1);
+    assert_eq!([0, 1].map(|group| rig.phase_of(group)), [Phase::Enabling; 2]);
+    (0..2).for_each(|group| run_until(&mut rig, group, Phase::Holding, 200));
+    let command = (1, Request::Move(move_to(2.5)));
+    rig.host.group_requests.extend([stop, command]);
+    rig.run(1);
+    assert_eq!([0, 1].map(|group| rig.phase_of(group)), [Phase::Holding, Phase::Moving]);
+    rig.run(100);
+    rig.host.group_requests.extend([command, stop]);
+    rig.run(1);
+    assert_eq!([0, 1].map(|group| rig.phase_of(group)), [Phase::Holding, Phase::Stopping]);
+    rig.assert_limits_kept();
+}
+
+/// The torque expires in the step of a cycle, after the requests of that cycle.
+#[test]
+fn a_fault_reaches_the_groups_that_stop_with_another_one_before_the_next_request() {
+    let mut parameters = arm_and_gripper();
+    parameters.groups[usize::from(ARM)].stops_with.push(GRIPPER);
+    let mut rig = enabled(parameters);
+    grip(&mut rig, 2.0, 20 * PERIOD_NS);
+    run_until(&mut rig, GRIPPER, Phase::Stopping, 30);
+    assert_eq!(stops(&rig), [(GRIPPER, Rule::StaleCommand)]);
+    ask(&mut rig, ARM, Request::Move(move_to(2.5)));
+    assert_eq!((last_rejection(&rig), rig.phase_of(ARM)), (RejectReason::Phase, Phase::Disabling));
+    assert_eq!(stops(&rig), [GRIPPER, ARM].map(|group| (group, Rule::StaleCommand)));
+}
+
 #[test]
 fn another_master_on_a_bus_without_power_does_not_hide_one_on_another_bus() {
     let mut rig = enabled(three());

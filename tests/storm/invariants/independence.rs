@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use takt::config::Config;
 use takt::internals::controller::assemble::slot_plan;
-use takt_rt::{EventKind, GroupSnapshot, Origin, Phase, StopCategory, StopReason};
+use takt_rt::{Event, EventKind, GroupSnapshot, Origin, Phase, StopCategory, StopReason};
 
 use super::Seen;
 
@@ -82,29 +82,32 @@ impl Independence {
         Ok(())
     }
 
-    /// Groups that are coupled stop together.
+    /// Groups that are coupled stop together. One that has stopped may be commanded or reset in the same cycle.
     fn check_coupled(&mut self, seen: &Seen<'_>) -> Result<(), String> {
-        let takes_part = |group: usize, category: StopCategory| {
+        let takes_part = |group: usize, category: StopCategory, place: usize| {
             let shown = &seen.snapshot.groups()[group];
             let is_stopped = shown.stop.is_some_and(|stop| stop.category <= category);
-            is_stopped || matches!(shown.phase, Phase::Passive | Phase::Disabled)
+            let (before, after) = seen.events.split_at(place);
+            let stops = |event: &Event| has_stopped(event, group, category);
+            let begins = |event: &Event| has_begun(event, group);
+            is_stopped
+                || matches!(shown.phase, Phase::Passive | Phase::Disabled)
+                || seen.asked[group].has_reset
+                || before.iter().rev().find(|event| stops(event) || begins(event)).is_some_and(stops)
+                || after.iter().any(|event| stops(event) || begins(event))
         };
         for (group, category) in self.pending.drain(..) {
-            if !takes_part(group, category) {
+            if !takes_part(group, category, 0) {
                 let shown = &seen.snapshot.groups()[group];
                 return Err(format!("group {group} does not stop with the other one: {shown:?}"));
             }
         }
-        for other in 0..self.sources.len() {
-            for stop in stops(seen, other) {
-                let coupled =
-                    (0..self.sources.len()).filter(|group| self.stops_with[*group].contains(&other));
-                self.pending.extend(
-                    coupled
-                        .filter(|group| !takes_part(*group, stop.category))
-                        .map(|group| (group, stop.category)),
-                );
-            }
+        for (place, event) in seen.events.iter().enumerate() {
+            let (Some(other), EventKind::Stop(stop)) = (event.group, event.kind) else { continue };
+            let coupled = (0..self.sources.len())
+                .filter(|group| self.stops_with[*group].contains(&usize::from(other)))
+                .filter(|group| !takes_part(*group, stop.category, place));
+            self.pending.extend(coupled.map(|group| (group, stop.category)));
         }
         Ok(())
     }
@@ -143,4 +146,22 @@ fn stops<'a>(seen: &'a Seen<'_>, group: usize) -> impl Iterator<Item = StopReaso
         EventKind::Stop(reason) => Some(reason),
         _ => None,
     })
+}
+
+/// Whether a group begins a stop of this category, or a harder one.
+fn has_stopped(event: &Event, group: usize, category: StopCategory) -> bool {
+    event.group == Some(group as u8)
+        && matches!(event.kind, EventKind::Stop(stop) if stop.category <= category)
+}
+
+/// Whether a group leaves rest, which only a request makes it do.
+fn has_begun(event: &Event, group: usize) -> bool {
+    event.group == Some(group as u8)
+        && matches!(
+            event.kind,
+            EventKind::PhaseChanged {
+                from: Phase::Disabled | Phase::Holding,
+                to: Phase::Enabling | Phase::Moving | Phase::Streaming,
+            }
+        )
 }
