@@ -176,7 +176,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 
     /// Fails for the first drive that has not given up its power, unless a fault of this kind is latched already.
-    pub(super) fn report_unreleased(&mut self) {
+    fn report_unreleased(&mut self) {
         let latched = self.group.stop.map_or(CauseRank::Requested, |stop| stop.cause.rank());
         if latched == CauseRank::Unreleased {
             return;

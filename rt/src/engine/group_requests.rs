@@ -284,7 +284,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
         self.group.stop = None;
         if matches!(self.group.state, GroupState::Disabled) {
-            self.report_unreleased();
+            self.settle_power(false);
         }
     }
 }

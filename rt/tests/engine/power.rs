@@ -101,6 +101,20 @@ fn a_drive_that_fell_silent_with_torque_stays_a_fault_until_it_is_heard_without_
 }
 
 #[test]
+fn a_reset_in_the_cycle_in_which_a_silent_drive_reports_that_it_is_off_leaves_no_fault() {
+    let mut rig = disabled(|_| {}, 0);
+    rig.drive(1).is_silent = true;
+    rig.request(Request::Enable);
+    rig.run_until(Phase::Disabled, 100);
+    rig.run(20);
+    assert_eq!(latched(&rig), Some((Rule::MissedFeedback, Some(1))));
+    rig.drive(1).is_silent = false;
+    rig.request(Request::ResetFaults);
+    assert_eq!(rig.host.snapshot.axes[1].feedback_age, 0);
+    assert_eq!(latched(&rig), None);
+}
+
+#[test]
 fn a_silent_drive_without_another_fault_is_one_when_its_group_is_disabled() {
     let mut patient = parameters(3);
     patient.axes[1].missed_feedback_cycles = u16::MAX;
