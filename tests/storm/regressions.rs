@@ -241,12 +241,13 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 26] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 27] = [
     (34714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11882, "The same in profile velocity"),
-const FAILED_WITH_EVERYTHING: [(u64, &str); 23] = [
-const FAILED_WITH_EVERYTHING: [(u64, &str); 23] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 24] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 24] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 24] = [
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
@@ -305,6 +306,7 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 23] = [
     (34_885, "A group was enabled after a stop of the same cycle, and stopped by it"),
     (38_616, "A group moved and was disabled after a stop of the same cycle, and stopped by it"),
     (12_763, "The same, with three groups"),
+    (20_099, "The feedback of a bus that is too slow did not come in time, and the joint moved unseen"),
     (7_771, "A fault was reset in the cycle in which a drive that had been silent confirmed that it is off"),
 ];
 

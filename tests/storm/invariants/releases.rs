@@ -43,7 +43,11 @@ impl Releases {
                 SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s + unseen_speed(seen, axis);
             // A drive that has missed the heartbeat stops by its own fault reaction, and is not enabled again after it.
             let is_own_reaction = concern.missed_heartbeat == MissedHeartbeat::Shown;
-            let is_taken = (is_released || is_braked) && !self.is_cut[number] && !is_own_reaction;
+            // `takt run` refuses a bus whose feedback comes too late. The speed of such a joint is not known.
+            let is_unheard = seen.overloaded_buses[axis.bus]
+                && seen.snapshot.axes[number].feedback_age > axis.missed_feedback_cycles;
+            let is_taken =
+                (is_released || is_braked) && !self.is_cut[number] && !is_own_reaction && !is_unheard;
             if is_taken && !concern.is_present && speed > slow {
                 return Err(format!(
                     "{}: power taken at {speed} of {}: {now:?}, {:?}",
