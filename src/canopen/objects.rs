@@ -60,6 +60,14 @@ pub const PROFILE_VELOCITY: Object = Object::new(0x6081, 0, DataType::U32, "prof
 pub const PROFILE_ACCELERATION: Object = Object::new(0x6083, 0, DataType::U32, "profile acceleration");
 /// 6084
 pub const PROFILE_DECELERATION: Object = Object::new(0x6084, 0, DataType::U32, "profile deceleration");
+/// 607D:1
+pub const SOFTWARE_LIMIT_LOWEST: Object =
+    Object::new(0x607D, 1, DataType::I32, "software position limit, lowest");
+/// 607D:2
+pub const SOFTWARE_LIMIT_HIGHEST: Object =
+    Object::new(0x607D, 2, DataType::I32, "software position limit, highest");
+/// 6080
+pub const MAX_MOTOR_SPEED: Object = Object::new(0x6080, 0, DataType::U32, "max motor speed");
 /// 607F
 pub const MAX_PROFILE_VELOCITY: Object = Object::new(0x607F, 0, DataType::U32, "max profile velocity");
 /// 6086
@@ -70,6 +78,8 @@ pub const MAX_ACCELERATION: Object = Object::new(0x60C5, 0, DataType::U32, "max 
 pub const MAX_DECELERATION: Object = Object::new(0x60C6, 0, DataType::U32, "max deceleration");
 /// 6085
 pub const QUICK_STOP_DECELERATION: Object = Object::new(0x6085, 0, DataType::U32, "quick stop deceleration");
+/// 60A4:1 to 60A4:4
+pub const PROFILE_JERK: [Object; 4] = [profile_jerk(1), profile_jerk(2), profile_jerk(3), profile_jerk(4)];
 /// 60B0
 pub const POSITION_OFFSET: Object = Object::new(0x60B0, 0, DataType::I32, "position offset");
 /// 60B1
@@ -85,6 +95,10 @@ pub const INTERPOLATION_TIME_INDEX: Object = Object::new(0x60C2, 2, DataType::I8
 pub const TARGET_VELOCITY: Object = Object::new(0x60FF, 0, DataType::I32, "target velocity");
 /// 6502: a bit for each mode.
 pub const SUPPORTED_DRIVE_MODES: Object = Object::new(0x6502, 0, DataType::U32, "supported drive modes");
+
+const fn profile_jerk(subindex: u8) -> Object {
+    Object::new(0x60A4, subindex, DataType::U32, "profile jerk")
+}
 
 /// Values of [`COMMUNICATION_ERROR_BEHAVIOUR`].
 pub mod error_behaviour {

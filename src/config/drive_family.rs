@@ -56,6 +56,10 @@ pub struct DriveFacts {
     pub profile_velocity_unit: Option<VelocityUnit>,
     /// The unit of accelerations (6083, 6084, 6085): so much velocity in a second; `None`: that of profile velocities.
     pub acceleration_unit: Option<VelocityUnit>,
+    /// The unit of the highest speed of the motor (6080). CiA 402: r/min.
+    pub motor_speed_unit: VelocityUnit,
+    /// True if software position limits (607D) of which the lowest is not below the highest, as 0 and 0, are off.
+    pub empty_software_limits_are_off: bool,
     /// The modes that the drives have.
     pub modes: ModeSet,
     /// The mode where a configuration names none.
@@ -249,6 +253,8 @@ impl DriveFacts {
             velocity_unit: VelocityUnit::Counts(1.0),
             profile_velocity_unit: None,
             acceleration_unit: None,
+            motor_speed_unit: VelocityUnit::RevolutionsPerMinute(1.0),
+            empty_software_limits_are_off: true,
             modes: ModeSet::of(&OperationMode::ALL),
             usual_mode: Control::Position,
             mode_changes: ModeChangeRule::When(ModeCondition::Disabled),
@@ -304,6 +310,11 @@ impl DriveFacts {
     pub fn acceleration_units_per_velocity_unit(&self, counts_per_turn: f64) -> f64 {
         let unit = self.acceleration_unit.or(self.profile_velocity_unit).unwrap_or(self.velocity_unit);
         unit.units_per_turn(counts_per_turn) / self.velocity_units_per_turn(counts_per_turn)
+    }
+
+    /// Units of the highest speed of the motor (6080) for one unit of velocities (60FF).
+    pub fn motor_speed_units_per_velocity_unit(&self, counts_per_turn: f64) -> f64 {
+        self.motor_speed_unit.units_per_turn(counts_per_turn) / self.velocity_units_per_turn(counts_per_turn)
     }
 }
 

@@ -286,6 +286,22 @@ pub enum ProblemKind {
         /// Why.
         reason: DcfError,
     },
+    /// A value of a device configuration file with which bring-up refuses the drive.
+    #[error("{file} writes {value} to {object}, and {axis:?} needs {needed}")]
+    RefusedValue {
+        /// The file.
+        file: String,
+        /// The object, with its name.
+        object: String,
+        /// The value, in the unit of the drive and in SI units.
+        value: String,
+        /// The condition for it.
+        needed: String,
+        /// The name of the axis.
+        axis: String,
+        /// The remedy.
+        advice: &'static str,
+    },
     /// A robot description that cannot be used, or a joint of it.
     #[error("{reason}")]
     Urdf {
@@ -406,6 +422,7 @@ impl ProblemKind {
             Self::EmptyRange { .. } => "the lowest position comes first".into(),
             Self::BeyondCounts { .. } => "check counts_per_turn, gear_ratio, lead and zero_counts".into(),
             Self::Dcf { reason } => reason.help().into(),
+            Self::RefusedValue { advice, .. } => (*advice).into(),
             Self::Urdf { reason } => reason.help(),
             Self::WiderThanUrdf { .. } => {
                 "a limit may be narrower than that of the robot description, not wider: leave it out to take that one".into()
@@ -433,6 +450,7 @@ impl ProblemKind {
             | Self::DuplicateInterface { .. }
             | Self::InTwoGroups { .. } => "again",
             Self::InNoGroup { .. } => "in no group",
+            Self::RefusedValue { .. } => "a value that bring-up refuses",
             Self::TargetCount { .. } => "wrong length",
             Self::TargetOutsideLimits { .. } | Self::InitialPositionOutsideLimits { .. } => {
                 "outside the limits"

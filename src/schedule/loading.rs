@@ -1,5 +1,5 @@
-//! A configuration from a file or a text. Reading it is a matter of [`config`], except for two things that are known here:
-//! the families of drives, and `command_phase = "auto"`, which depends on what the buses carry.
+//! A configuration from a file or a text. Reading it is a matter of [`config`], except for what is known here:
+//! the families of drives, what their bring-up refuses, and `command_phase = "auto"`, which depends on what the buses carry.
 
 use std::path::Path;
 
@@ -30,7 +30,8 @@ impl Config {
 fn with_knowledge<T>(read: impl FnOnce(&Knowledge<'_>) -> T) -> T {
     let families: Vec<&'static dyn ConfiguredFamily> =
         family::all().into_iter().map(|family| -> &'static dyn ConfiguredFamily { family }).collect();
-    read(&Knowledge { command_phase, needs_shared_frames, families: &families })
+    let refused_values = family::bring_up::refused_values;
+    read(&Knowledge { command_phase, needs_shared_frames, refused_values, families: &families })
 }
 
 fn command_phase(config: &Config) -> Result<u64, String> {

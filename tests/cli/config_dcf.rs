@@ -88,3 +88,106 @@ fn takt_check_tells_what_of_the_file_is_not_written() {
         "{text}"
     );
 }
+
+/// The data sheet of a drive whose ramps are limited in jerk, and nothing else: profile jerk (60A4) instead of motion profile type (6086).
+fn with_jerk(sheet: &str) -> String {
+    let jerk = "[60A4]\nParameterName=Jerk\nObjectType=0x8\nSubNumber=2\n\n\
+        [60A4sub0]\nParameterName=Count\nDataType=5\nAccessType=const\nDefaultValue=1\n\n\
+        [60A4sub1]\nParameterName=Jerk 1\nDataType=7\nAccessType=rw\n\n";
+    let (before, after) = sheet.split_once("[6086]").unwrap();
+    let (_, after) = after.split_once("[6087]").unwrap();
+    format!("{before}{jerk}[6087]{after}").replace("=0x6086", "=0x60A4")
+}
+
+/// What `takt check` prints of the configuration above with these changes, with a file that writes an object of 32 bits, and its exit code.
+fn checked(changes: &[(&str, &str)], object: &str, value: &str) -> (String, Option<i32>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("small.toml");
+    let sheet = include_str!("../../configs/eds/erob-canopen.eds");
+    fs::write(folder.path().join("jerk.eds"), with_jerk(sheet)).unwrap();
+    let text = changes.iter().fold(CONFIG.to_owned(), |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replace(from, to)
+    });
+    fs::write(&path, text).unwrap();
+    let file = variable(&format!("ParameterValue={value}")).replace("609A", object);
+    let file = if object.starts_with("607D") { file.replace("DataType=7", "DataType=4") } else { file };
+    fs::write(folder.path().join("shoulder.dcf"), file).unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_takt")).arg("check").arg(&path).output().unwrap();
+    // Lines of a diagnostic are broken and framed.
+    let words = String::from_utf8(output.stderr).unwrap().replace(['│', '\n'], " ");
+    (words.split_whitespace().collect::<Vec<_>>().join(" "), output.status.code())
+}
+
+const IN_PROFILE_VELOCITY: &[(&str, &str)] = &[("[axis.limits]", "mode = \"pv\"\n[axis.limits]")];
+const BY_DATA_SHEET: &[(&str, &str)] = &[
+    ("drive = \"erob-canopen\"", "drive = \"cia402\"\neds = \"EDS\"\ncounts_per_turn = 65536"),
+    ("EDS", concat!(env!("CARGO_MANIFEST_DIR"), "/configs/eds/erob-canopen.eds")),
+];
+
+#[test]
+fn takt_check_names_a_value_of_the_file_with_which_bring_up_would_refuse_the_drive() {
+    let data_sheet_pv = [BY_DATA_SHEET, IN_PROFILE_VELOCITY].concat();
+    for (changes, object, value, needed) in [
+        (IN_PROFILE_VELOCITY, "60C6", "20000", "max deceleration"),
+        (IN_PROFILE_VELOCITY, "6083", "2000000", "at most 83443 = 1 rad/s"),
+        (IN_PROFILE_VELOCITY, "6084", "20000", "at least 83443 = 1 rad/s"),
+        (IN_PROFILE_VELOCITY, "6085", "20000", "at least 83443"),
+        (IN_PROFILE_VELOCITY, "607F", "20000", "or 0 for no bound"),
+        (&data_sheet_pv, "60C6", "2000", "at least 10430 = 0.999964 rad/"),
+        (&data_sheet_pv, "607Dsub1", "-10", "at most -10430 = "),
+        (&[], "607Dsub2", "10", "at least 83443 = 1 rad"),
+        (&[], "6080", "2", "at least 10 = 1.0472 rad/s"),
+        (BY_DATA_SHEET, "6080", "2", "at least 10 = 1.0472 rad/s"),
+    ] {
+        let (text, code) = checked(changes, object, value);
+        let object = object.replace("sub", ":0");
+        for part in [
+            "small.toml:10",
+            "shoulder.dcf writes",
+            &format!("{value} "),
+            &object,
+            needed,
+            "\"shoulder\" needs",
+        ] {
+            let part = if changes.len() > 1 { part.trim_end_matches(":10") } else { part };
+            assert!(text.contains(part), "{object}: {part} is not in: {text}");
+        }
+        assert_eq!(code, Some(2), "{text}");
+    }
+}
+
+#[test]
+fn takt_check_names_a_jerk_by_which_the_way_to_stop_is_longer_than_planned() {
+    let (eds, counts) = ("eds = \"jerk.eds\"", "counts_per_turn = 65536\nmode = \"pv\"");
+    let drive = format!("drive = \"cia402\"\n{eds}\n{counts}");
+    let changes = [("drive = \"erob-canopen\"", drive.as_str())];
+    let (text, code) = checked(&changes, "60A4sub1", "2000");
+    for part in ["writes 2000 = 0.191748 rad/s^3 to 60A4:01 (profile jerk)", "\"shoulder\" needs at least "] {
+        assert!(text.contains(part), "{part} is not in: {text}");
+    }
+    assert_eq!(code, Some(2));
+    for suits in ["0", "4000000"] {
+        assert_eq!(checked(&changes, "60A4sub1", suits).1, Some(0), "{suits}");
+    }
+}
+
+#[test]
+fn takt_check_accepts_values_of_the_file_that_bring_up_accepts_or_overwrites() {
+    let data_sheet_pv = [BY_DATA_SHEET, IN_PROFILE_VELOCITY].concat();
+    for (changes, object, value) in [
+        (IN_PROFILE_VELOCITY, "60C6", "83443"),
+        (IN_PROFILE_VELOCITY, "60C6", "0"),
+        (IN_PROFILE_VELOCITY, "60C5", "20000"),
+        (IN_PROFILE_VELOCITY, "6085", "123456"),
+        (IN_PROFILE_VELOCITY, "607Dsub1", "-83443"),
+        // In modes that follow set-points, the drive plans nothing.
+        (&[], "60C6", "20000"),
+        (&[], "6084", "20000"),
+        (&data_sheet_pv, "607Dsub1", "-100000"),
+        (&[], "1017", "77"),
+    ] {
+        let (text, code) = checked(changes, object, value);
+        assert_eq!(code, Some(0), "{object} = {value}: {text}");
+    }
+}

@@ -21,10 +21,11 @@ use crate::config::{MODES, PowerUpState};
 const LONGEST_S: f64 = 600.0;
 
 /// The velocity and acceleration objects whose unit a file may give.
-const UNITS: [(&str, u16); 4] = [
+const UNITS: [(&str, u16); 5] = [
     ("velocity", 0x606C),
     ("target_velocity", 0x60FF),
     ("profile_velocity", 0x6081),
+    ("motor_speed", 0x6080),
     ("acceleration", 0x6083),
 ];
 

@@ -37,9 +37,15 @@ pub struct ReadAxis {
     place: Option<(usize, u8)>,
     drive: Option<DriveFamily>,
     header: Range<usize>,
+    dcf: Range<usize>,
 }
 
 impl ReadAxis {
+    /// The bytes of its `dcf`, or else of its header.
+    pub fn dcf(&self) -> Range<usize> {
+        self.dcf.clone()
+    }
+
     /// The bytes of its header.
     pub fn header(&self) -> Range<usize> {
         self.header.clone()
@@ -244,8 +250,9 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
         let others = earlier.iter().filter_map(|other| Some((other.axis.as_ref()?, Some(&other.header))));
         rules::identifiers::axis(axis, others, machine.master_node, at);
     }
+    let dcf = section.spot("dcf").span().unwrap_or_else(|| header.clone());
     section.finish();
-    ReadAxis { name, quantities: q, limits, axis, place, drive: family_drive, header }
+    ReadAxis { name, quantities: q, limits, axis, place, drive: family_drive, header, dcf }
 }
 
 /// For how many cycles of its bus feedback may be missing: the number, or the cycles of a time.

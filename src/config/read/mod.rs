@@ -21,7 +21,7 @@ use toml::de::DeTable;
 
 use super::drive_family::ConfiguredFamily;
 use super::error::{ConfigError, Location, Problem};
-use super::model::{CommandFrames, Config};
+use super::model::{Axis, CommandFrames, Config};
 use super::problem_kind::ProblemKind;
 use super::spot::Problems;
 use section::Section;
@@ -44,6 +44,8 @@ pub(crate) struct Knowledge<'a> {
     /// Whether the bus with this index carries its traffic only if axes share command frames; with the command phase of the
     /// configuration, or with any.
     pub needs_shared_frames: fn(&Config, usize, PhaseChoice) -> bool,
+    /// The values of configuration files (`dcf`) with which the bring-up of an axis refuses its drive.
+    pub refused_values: fn(&Config, &Axis) -> Vec<ProblemKind>,
     /// The families that a drive may be of.
     pub families: &'a [&'static dyn ConfiguredFamily],
 }
@@ -118,6 +120,7 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowl
     let program = program::program(root.section("program"), &axes, &groups);
     root.finish();
 
+    let dcf_spans: Vec<_> = axes.iter().map(axis::ReadAxis::dcf).collect();
     let automatic_frames: Vec<bool> = buses.iter().map(|bus| bus.has_automatic_frames).collect();
     let axes: Option<Vec<_>> = axes.into_iter().map(|axis| axis.axis).collect();
     let master = master.complete(axes.as_deref().unwrap_or_default(), cycle.period_ns);
@@ -151,6 +154,13 @@ fn read<'a>(document: &'a DeTable<'a>, problems: &'a Problems, knowledge: &Knowl
         match (knowledge.command_phase)(&config) {
             Ok(command_phase_ns) => config.cycle.command_phase_ns = command_phase_ns,
             Err(cause) => automatic_phase.report(ProblemKind::NoCommandPhase { cause }),
+        }
+    }
+    if problems.is_empty() {
+        for (axis, span) in config.axes.iter().zip(dcf_spans) {
+            for kind in (knowledge.refused_values)(&config, axis) {
+                problems.report(kind, span.clone());
+            }
         }
     }
     Some(config)

@@ -4,18 +4,21 @@
 //! object that a drive may lack is an optional one: it returns `false` then, and notes the object in
 //! [`AxisFacts::absent`].
 //!
-//! In a dry run there is no drive: each read gives what is expected, and each write is accepted and listed.
+//! In a dry run there is no drive: each read gives what is expected, and each write is accepted and listed. What a configuration file
+//! has for an object is in it as in a drive, until it is written; a value of a file that is not as expected is listed.
 
 use std::ops::Deref;
+use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
 use takt_rt::{Frame, MappedObject, Nanoseconds};
 
+use super::axis_units::SiUnit;
 use super::check::Check;
 use super::facts::AxisFacts;
 use super::failure::{Content, FailureCause};
 use super::stages::BringUpTiming;
-use crate::canopen::dcf::Download;
+use crate::canopen::dcf::{DeviceConfiguration, Download};
 use crate::canopen::object::{Object, ObjectAddress};
 use crate::canopen::sdo::{AbortCode, SdoError, Transfer};
 use crate::config::{Axis, Config};
@@ -57,8 +60,56 @@ pub struct AxisSession<'a> {
     /// The remedy of the current step.
     advice: Mutex<&'static str>,
     first_failure: Mutex<Option<StepFailure>>,
-    /// In a dry run: every number that was written, in order.
-    dry_writes: Option<Mutex<Vec<(ObjectAddress, i64)>>>,
+    /// In a dry run: what has happened.
+    dry_run: Option<Mutex<DryRun>>,
+}
+
+/// What has happened in a dry run.
+#[derive(Default)]
+pub(super) struct DryRun {
+    /// Every number that was written, in order. Values of a configuration file are not listed.
+    pub writes: Vec<(ObjectAddress, i64)>,
+    /// The values of configuration files that are not as expected.
+    pub refused: Vec<RefusedValue>,
+    /// The values that the drive has from configuration files.
+    in_drive: Vec<FileValue>,
+    /// Those that it will have from the files of later axes of its node.
+    later: Vec<FileValue>,
+}
+
+/// A value of a configuration file with which bring-up refuses a drive.
+pub(super) struct RefusedValue {
+    /// The file.
+    pub file: PathBuf,
+    /// Object, received and expected value.
+    pub cause: FailureCause,
+    /// The remedy of the step that reads it.
+    pub advice: &'static str,
+}
+
+/// A value of a configuration file.
+#[derive(Clone)]
+struct FileValue {
+    file: PathBuf,
+    download: Download,
+}
+
+impl FileValue {
+    fn all_of(file: &DeviceConfiguration) -> impl Iterator<Item = Self> {
+        let of = |download: &Download| Self { file: file.path.clone(), download: download.clone() };
+        file.downloads.iter().map(of)
+    }
+}
+
+impl DryRun {
+    fn file_value(&self, object: ObjectAddress) -> Option<&FileValue> {
+        let mut values = self.in_drive.iter().chain(&self.later).rev();
+        values.find(|value| value.download.object == object)
+    }
+}
+
+fn values_of<'a>(axes: impl Iterator<Item = &'a Axis>) -> Vec<FileValue> {
+    axes.filter_map(|axis| axis.dcf.as_ref()).flat_map(FileValue::all_of).collect()
 }
 
 /// The object of an axis that corresponds to an object of the first axis of a node.
@@ -88,7 +139,7 @@ impl<'a> AxisSession<'a> {
             facts: RwLock::new(facts),
             advice: Mutex::default(),
             first_failure: Mutex::default(),
-            dry_writes: None,
+            dry_run: None,
         }
     }
 
@@ -99,16 +150,19 @@ impl<'a> AxisSession<'a> {
 
     /// The same procedure without a drive.
     pub(super) fn dry_run(self) -> Self {
-        Self { dry_writes: Some(Mutex::default()), ..self }
+        let is_own = |axis: &&Axis| axis.drive.node_axis == self.axis.drive.node_axis;
+        let in_drive = values_of(self.siblings().take_while(|axis| !is_own(axis)));
+        let later = values_of(self.siblings().skip_while(|axis| !is_own(axis)).skip(1));
+        Self { dry_run: Some(Mutex::new(DryRun { in_drive, later, ..DryRun::default() })), ..self }
     }
 
     pub(super) fn is_dry_run(&self) -> bool {
-        self.dry_writes.is_some()
+        self.dry_run.is_some()
     }
 
-    /// Every number that was written in a dry run, in order.
-    pub(super) fn dry_writes(self) -> Vec<(ObjectAddress, i64)> {
-        self.dry_writes.map(|writes| std::mem::take(&mut *lock(&writes))).unwrap_or_default()
+    /// What has happened in a dry run.
+    pub(super) fn end_dry_run(self) -> DryRun {
+        self.dry_run.map(|dry_run| std::mem::take(&mut *lock(&dry_run))).unwrap_or_default()
     }
 
     /// The facts, or the first failure.
@@ -177,7 +231,7 @@ impl<'a> AxisSession<'a> {
         let object = self.of_axis(object);
         let compared = self.number(object, Access::Read, expected).await.and_then(|received| {
             self.keep(|facts| keep(facts, received));
-            compared(object, Access::Read, expected, received)
+            self.compared(object, Access::Read, expected, received, None)
         });
         self.settled(compared)
     }
@@ -188,33 +242,67 @@ impl<'a> AxisSession<'a> {
         object: Object,
         keep: impl FnOnce(&mut AxisFacts, i64),
     ) -> StepResult<bool> {
-        let object = self.of_axis(object);
-        let read = match self.number(object, Access::Read, Check::Any).await {
-            Ok(received) => {
-                self.keep(|facts| keep(facts, received));
-                Ok(true)
-            }
-            Err(FailureCause::Transfer { error, .. }) if self.may_refuse(error) => {
-                self.note_absent(object.address);
-                Ok(false)
-            }
-            Err(cause) => Err(cause),
-        };
-        self.settled(read)
+        let received = self.number_optional(self.of_axis(object), Check::Any).await;
+        if let Ok(Some(received)) = received {
+            self.keep(|facts| keep(facts, received));
+        }
+        self.settled(received.map(|received| received.is_some()))
     }
 
     /// Reads a number from an object that the drive may lack or refuse, and compares it.
-    pub async fn compare_optional(&self, object: Object, expected: Check) -> StepResult {
+    pub async fn compare_optional(
+        &self,
+        object: Object,
+        expected: Check,
+        unit: Option<SiUnit>,
+    ) -> StepResult {
         let object = self.of_axis(object);
-        let read = match self.number(object, Access::Read, expected).await {
-            Ok(received) => compared(object, Access::Read, expected, received),
+        let read = self.number_optional(object, expected).await.and_then(|received| match received {
+            Some(received) => self.compared(object, Access::Read, expected, received, unit),
+            None => Ok(()),
+        });
+        self.settled(read)
+    }
+
+    /// Reads two bounds from objects that the drive may lack or refuse, and compares each unless `are_off` says that they bound nothing.
+    pub async fn compare_bounds(
+        &self,
+        bounds: [(Object, Check); 2],
+        unit: SiUnit,
+        are_off: impl FnOnce(i64, i64) -> bool,
+    ) -> StepResult {
+        let compared = async {
+            let [lowest, highest] = bounds.map(|(object, expected)| (self.of_axis(object), expected));
+            let received = [
+                self.number_optional(lowest.0, lowest.1).await?,
+                self.number_optional(highest.0, highest.1).await?,
+            ];
+            if let [Some(lowest), Some(highest)] = received
+                && are_off(lowest, highest)
+            {
+                return Ok(());
+            }
+            for ((object, expected), received) in [lowest, highest].into_iter().zip(received) {
+                if let Some(received) = received {
+                    self.compared(object, Access::Read, expected, received, Some(unit))?;
+                }
+            }
+            Ok(())
+        };
+        let compared = compared.await;
+        self.settled(compared)
+    }
+
+    /// Reads a number from an object that the drive may lack or refuse; `None` if it does.
+    async fn number_optional(&self, object: Object, expected: Check) -> StepResult<Option<i64>> {
+        match self.number(object, Access::Read, expected).await {
+            Ok(received) => Ok(Some(received)),
             Err(FailureCause::Transfer { error, .. }) if self.may_refuse(error) => {
                 self.note_absent(object.address);
-                Ok(())
+                Ok(None)
             }
             Err(cause) => Err(cause),
-        };
-        self.settled(read)
+        }
     }
 
     /// Reads a text from an object that the drive may lack or refuse.
@@ -259,9 +347,10 @@ impl<'a> AxisSession<'a> {
             let waited_ns = self.bus.now_ns().saturating_sub(began_ns);
             if expected.passes(received) {
                 break Ok(());
-            } else if waited_ns >= within_ns {
+            } else if waited_ns >= within_ns || self.is_dry_run() {
                 let access = Access::Read;
-                break Err(FailureCause::Value { object, access, expected, received, waited_ns });
+                let cause = FailureCause::Value { object, access, expected, received, unit: None, waited_ns };
+                break self.refused(object.address, cause);
             }
             self.bus.sleep(POLL_NS).await;
         };
@@ -314,7 +403,7 @@ impl<'a> AxisSession<'a> {
             self.written(object, value).await?;
             let access = Access::ReadBack(value);
             let received = self.number(object, access, expected).await?;
-            compared(object, access, expected, received)
+            self.compared(object, access, expected, received, None)
         };
         let written = written.await;
         self.settled(written)
@@ -327,7 +416,9 @@ impl<'a> AxisSession<'a> {
     }
 
     async fn written_download(&self, download: &Download) -> StepResult {
-        if self.is_dry_run() {
+        if let Some(dry_run) = &self.dry_run {
+            let file = self.axis.dcf.as_ref().map(|file| file.path.clone()).unwrap_or_default();
+            lock(dry_run).in_drive.push(FileValue { file, download: download.clone() });
             return Ok(());
         }
         let Download { object, data } = download;
@@ -356,8 +447,10 @@ impl<'a> AxisSession<'a> {
 
     async fn written(&self, object: Object, value: i64) -> StepResult {
         let data = object.data_type.encode(value).ok_or(FailureCause::DoesNotFit { object, value })?;
-        if let Some(writes) = &self.dry_writes {
-            lock(writes).push((object.address, value));
+        if let Some(dry_run) = &self.dry_run {
+            let mut dry_run = lock(dry_run);
+            dry_run.writes.push((object.address, value));
+            dry_run.in_drive.retain(|value| value.download.object != object.address);
             return Ok(());
         }
         let failed = |error| FailureCause::Transfer { object, access: Access::Write(value), error };
@@ -366,8 +459,11 @@ impl<'a> AxisSession<'a> {
     }
 
     async fn number(&self, object: Object, access: Access, expected: Check) -> StepResult<i64> {
-        if self.is_dry_run() {
-            return Ok(expected.example());
+        if let Some(dry_run) = &self.dry_run {
+            let dry_run = lock(dry_run);
+            let in_file = dry_run.file_value(object.address);
+            let number = in_file.and_then(|value| object.data_type.decode(&value.download.data));
+            return Ok(number.unwrap_or_else(|| expected.example()));
         }
         let failed = |error| FailureCause::Transfer { object, access, error };
         let uploaded = self.bus.read_bytes(object.address).await.map_err(failed)?;
@@ -377,6 +473,31 @@ impl<'a> AxisSession<'a> {
             uploaded.number(object.data_type)
         };
         number.ok_or(FailureCause::Length { object, received: uploaded.bytes.len() })
+    }
+
+    fn compared(
+        &self,
+        object: Object,
+        access: Access,
+        expected: Check,
+        received: i64,
+        unit: Option<SiUnit>,
+    ) -> StepResult {
+        if expected.passes(received) {
+            return Ok(());
+        }
+        let cause = FailureCause::Value { object, access, expected, received, unit, waited_ns: 0 };
+        self.refused(object.address, cause)
+    }
+
+    /// The failure by a value that is not as expected. A dry run lists it, and goes on.
+    fn refused(&self, object: ObjectAddress, cause: FailureCause) -> StepResult {
+        let Some(dry_run) = &self.dry_run else { return Err(cause) };
+        let mut dry_run = lock(dry_run);
+        if let Some(file) = dry_run.file_value(object).map(|value| value.file.clone()) {
+            dry_run.refused.push(RefusedValue { file, cause, advice: *lock(&self.advice) });
+        }
+        Ok(())
     }
 
     /// Whether an object that may be absent is so by this error. Some drives abort with a code that has another meaning.
@@ -413,11 +534,4 @@ impl<'a> AxisSession<'a> {
 /// A procedure may move to another thread between two polls, but runs in one at a time: nobody waits for a lock.
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-fn compared(object: Object, access: Access, expected: Check, received: i64) -> StepResult {
-    if expected.passes(received) {
-        return Ok(());
-    }
-    Err(FailureCause::Value { object, access, expected, received, waited_ns: 0 })
 }

@@ -3,6 +3,62 @@
 use takt_rt::Nanoseconds;
 
 use crate::config::Axis;
+use crate::config::quantities::{Counting, Quantities};
+use crate::config::quantity::Quantity;
+
+/// The unit of a number of a drive, for people: its size in SI units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SiUnit {
+    quantity: Quantity,
+    /// rad, m or their rates for one unit.
+    size: f64,
+    /// The number of zero.
+    zero: f64,
+}
+
+impl SiUnit {
+    /// Counts of the position of an axis.
+    pub fn position(axis: &Axis) -> Self {
+        let counting = Counting::of(axis);
+        let direction = if axis.reversed { -1.0 } else { 1.0 };
+        let quantity = Quantities::of(axis.travel).position;
+        Self { quantity, size: direction / counting.counts_per_unit(), zero: axis.zero_counts.into() }
+    }
+
+    /// The drive's units of profile velocities (6081).
+    pub fn profile_velocity(axis: &Axis) -> Self {
+        let per_velocity_unit = axis.drive.profile_velocity_units_per_velocity_unit(axis.counts_per_turn);
+        Self::rate(axis, Quantities::of(axis.travel).velocity, per_velocity_unit)
+    }
+
+    /// The drive's units of the speed of its motor (6080).
+    pub fn motor_speed(axis: &Axis) -> Self {
+        let per_velocity_unit = axis.drive.motor_speed_units_per_velocity_unit(axis.counts_per_turn);
+        Self::rate(axis, Quantities::of(axis.travel).velocity, per_velocity_unit)
+    }
+
+    /// The drive's units of accelerations (6083).
+    pub fn acceleration(axis: &Axis) -> Self {
+        let per_velocity_unit = axis.drive.acceleration_units_per_velocity_unit(axis.counts_per_turn);
+        Self::rate(axis, Quantities::of(axis.travel).acceleration, per_velocity_unit)
+    }
+
+    /// The drive's units of jerks (60A4): those of accelerations in a second.
+    pub fn jerk(axis: &Axis) -> Self {
+        Self { quantity: Quantities::of(axis.travel).jerk, ..Self::acceleration(axis) }
+    }
+
+    fn rate(axis: &Axis, quantity: Quantity, per_velocity_unit: f64) -> Self {
+        let per_turn = axis.drive.velocity_units_per_turn(axis.counts_per_turn) * per_velocity_unit;
+        Self { quantity, size: 1.0 / (turns(axis, 1.0) * per_turn), zero: 0.0 }
+    }
+
+    /// The number with its meaning: `1000 = 0.5 rad/s²`.
+    pub fn show(self, number: i64) -> String {
+        let value = (number as f64 - self.zero) * self.size;
+        format!("{number} = {}", self.quantity.show(value))
+    }
+}
 
 /// Turns of the drive's encoder for a distance (rad, m), or turns per second for a velocity.
 pub fn turns(axis: &Axis, distance: f64) -> f64 {
@@ -24,9 +80,24 @@ pub fn profile_velocity_units(axis: &Axis, velocity: f64) -> i64 {
     motion_units(axis, velocity, axis.drive.profile_velocity_units_per_velocity_unit(axis.counts_per_turn))
 }
 
+/// A velocity in the drive's units of the speed of its motor (6080).
+pub fn motor_speed_units(axis: &Axis, velocity: f64) -> i64 {
+    motion_units(axis, velocity, axis.drive.motor_speed_units_per_velocity_unit(axis.counts_per_turn))
+}
+
 /// An acceleration in the drive's units (6083).
 pub fn acceleration_units(axis: &Axis, acceleration: f64) -> i64 {
     motion_units(axis, acceleration, axis.drive.acceleration_units_per_velocity_unit(axis.counts_per_turn))
+}
+
+/// A jerk in the drive's units (60A4): those of accelerations in a second.
+pub fn jerk_units(axis: &Axis, jerk: f64) -> i64 {
+    acceleration_units(axis, jerk)
+}
+
+/// The count of a position, not rounded.
+pub fn position_counts(axis: &Axis, position: f64) -> f64 {
+    Counting::of(axis).position(position)
 }
 
 /// A velocity or an acceleration in units, of which so many are one unit of velocity (in a second): at least 1.

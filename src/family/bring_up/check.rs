@@ -2,6 +2,7 @@
 
 use takt_rt::{DriveState, OperationMode};
 
+use super::axis_units::SiUnit;
 use crate::canopen::object::Object;
 
 /// The condition that a number must meet.
@@ -68,8 +69,9 @@ impl Check {
         }
     }
 
-    /// The condition in words, for a value of `object`.
-    pub fn words(self, object: &Object) -> String {
+    /// The condition in words, for a value of `object`, also in SI units where its unit is known.
+    pub fn words(self, object: &Object, unit: Option<SiUnit>) -> String {
+        let show = |value: i64| unit.map_or_else(|| value.to_string(), |unit| unit.show(value));
         match self {
             Self::Any => "any value".into(),
             Self::Equals(value) => object.show(value),
@@ -80,9 +82,9 @@ impl Check {
             }
             Self::NoTorque => "a state without torque".into(),
             Self::Standstill(limit) => format!("standstill (at most {limit})"),
-            Self::AtMost(limit) => format!("at most {limit}"),
-            Self::AtLeast(limit) => format!("at least {limit}"),
-            Self::BoundAbove(limit) => format!("at least {limit}, or 0 for no bound"),
+            Self::AtMost(limit) => format!("at most {}", show(limit)),
+            Self::AtLeast(limit) => format!("at least {}", show(limit)),
+            Self::BoundAbove(limit) => format!("at least {}, or 0 for no bound", show(limit)),
             Self::Positive => "more than zero".into(),
         }
     }

@@ -4,6 +4,7 @@ use std::fmt;
 
 use takt_rt::Nanoseconds;
 
+use super::axis_units::SiUnit;
 use super::check::Check;
 use super::reported_mapping::MappingProblem;
 use crate::canopen::emcy::Emergency;
@@ -73,7 +74,7 @@ impl fmt::Display for AxisFailure {
 }
 
 /// The cause of a failure: what was expected and what was received.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum FailureCause {
     /// The node did not report the commanded NMT state.
@@ -120,6 +121,8 @@ pub enum FailureCause {
         expected: Check,
         /// The received value.
         received: i64,
+        /// Its unit, where it is known.
+        unit: Option<SiUnit>,
         /// How long the procedure waited for it; 0 when it was read once.
         waited_ns: Nanoseconds,
     },
@@ -234,8 +237,9 @@ impl fmt::Display for FailureCause {
                 let expected = object.data_type.length();
                 write!(f, "reading {object}: expected {expected} bytes, got {received}")
             }
-            Self::Value { object, access, expected, received, waited_ns } => {
-                let (wanted, came) = (expected.words(object), object.show(*received));
+            Self::Value { object, access, expected, received, unit, waited_ns } => {
+                let came = unit.map_or_else(|| object.show(*received), |unit| unit.show(*received));
+                let wanted = expected.words(object, *unit);
                 write!(f, "{}: expected {wanted}, got {came}", access.words(object))?;
                 if let Some(meaning) = expected.meaning(*received) {
                     write!(f, " ({meaning})")?;

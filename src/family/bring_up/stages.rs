@@ -17,14 +17,15 @@ use std::task::{Context, Waker};
 use takt_rt::{Frame, Nanoseconds};
 use tracing::{debug, error, info};
 
-use super::axis_session::{AxisSession, OnFailure, StepFailure};
+use super::axis_session::{AxisSession, DryRun, OnFailure, RefusedValue, StepFailure};
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError, FailureCause};
 use super::network_state::RESTART_STEP;
 use crate::canopen::object::ObjectAddress;
 use crate::canopen::sdo;
-use crate::config::{Axis, Config};
+use crate::config::{Axis, Config, ProblemKind};
 use crate::family::{self, SettingUp};
+use crate::printable::printable_path;
 use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure};
 
 /// The target of what is told of bring-up and shutdown.
@@ -97,7 +98,7 @@ pub fn overwritten(config: &Config, axis: &Axis) -> Vec<ObjectAddress> {
     let Some(file) = &axis.dcf else { return vec![] };
     // The last write of each object counts: a PDO is made invalid before it is made valid.
     let mut last: Vec<(ObjectAddress, i64)> = vec![];
-    for (object, value) in dry_run(Part::Configure, config, axis).writes {
+    for (object, value) in dry_run(Part::Configure, config, axis).0.writes {
         last.retain(|(address, _)| *address != object);
         last.push((object, value));
     }
@@ -106,6 +107,28 @@ pub fn overwritten(config: &Config, axis: &Axis) -> Vec<ObjectAddress> {
         in_file.is_some_and(|download| !value.to_le_bytes().starts_with(&download.data))
     };
     last.into_iter().filter(is_other).map(|(address, _)| address).collect()
+}
+
+/// The values of configuration files (`dcf`) with which bring-up refuses the drive of an axis.
+pub fn refused_values(config: &Config, axis: &Axis) -> Vec<ProblemKind> {
+    // Without a file no value is known.
+    if config.axes.iter().all(|axis| axis.dcf.is_none()) {
+        return vec![];
+    }
+    let refused = dry_run(Part::Configure, config, axis).0.refused;
+    refused.into_iter().filter_map(|value| problem(axis, value)).collect()
+}
+
+fn problem(axis: &Axis, RefusedValue { file, cause, advice }: RefusedValue) -> Option<ProblemKind> {
+    let FailureCause::Value { object, expected, received, unit, .. } = cause else { return None };
+    Some(ProblemKind::RefusedValue {
+        file: printable_path(&file),
+        object: object.to_string(),
+        value: unit.map_or_else(|| object.show(received), |unit| unit.show(received)),
+        needed: expected.words(&object, unit),
+        axis: axis.name.clone(),
+        advice,
+    })
 }
 
 impl BringUp {
@@ -308,7 +331,7 @@ impl Group {
                     facts.get(index).cloned().unwrap_or_else(unknown)
                 })
                 .collect();
-            member.accesses = axes.map(|(_, axis)| dry_run(part, config, axis).accesses).sum();
+            member.accesses = axes.map(|(_, axis)| dry_run(part, config, axis).1).sum();
             member.session.begin_again();
             member.told.set(Told::Step(part, ""));
             // The progress shows it before the first poll.
@@ -547,19 +570,13 @@ fn end(axes: Vec<AxisSession<'_>>, failed: Option<FailedAxis>) -> Result<Vec<Axi
     ended.collect()
 }
 
-/// What a part does when the drive answers as expected.
-struct DryRun {
-    accesses: usize,
-    /// Every number that it writes, in order. Values of a configuration file are not listed.
-    writes: Vec<(ObjectAddress, i64)>,
-}
-
-fn dry_run(part: Part, config: &Config, axis: &Axis) -> DryRun {
+/// What a part does when the drive answers as expected, and the number of accesses.
+fn dry_run(part: Part, config: &Config, axis: &Axis) -> (DryRun, usize) {
     let timing = BringUpTiming::default();
     let session = session(axis, timing);
     let facts = AxisFacts { codec: axis.drive.codec, ..AxisFacts::default() };
     let c = AxisSession::new(session.clone(), config, axis, timing, part.on_failure(), facts).dry_run();
     // Nothing is waited for without a drive, so one poll is enough.
     let _ = part.of_family(&c).as_mut().poll(&mut Context::from_waker(Waker::noop()));
-    DryRun { accesses: session.done(), writes: c.dry_writes() }
+    (c.end_dry_run(), session.done())
 }

@@ -7,7 +7,7 @@ use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, Operati
 use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
 use crate::canopen::object::{DataType, Object, ObjectAddress};
 use crate::canopen::objects::{
-    CONSUMER_HEARTBEAT_TIME, CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MODES_OF_OPERATION,
+    CONSUMER_HEARTBEAT_TIME, CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MAX_MOTOR_SPEED, MODES_OF_OPERATION,
     POSITION_ACTUAL_VALUE, PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection,
     PdoParameters, STATUSWORD,
 };
@@ -302,6 +302,9 @@ impl Device {
             velocity_unit: self.velocity_unit(),
             profile_velocity_unit: self.unit_by_quirks(PROFILE_VELOCITY.address.index),
             acceleration_unit: self.unit_by_quirks(PROFILE_ACCELERATION.address.index),
+            motor_speed_unit: self
+                .unit_by_quirks(MAX_MOTOR_SPEED.address.index)
+                .unwrap_or(standard.motor_speed_unit),
             modes,
             usual_mode: usual
                 .into_iter()

@@ -18,6 +18,11 @@ pub static FACTS: DriveFacts = DriveFacts {
     // 19 bits on the output side.
     counts_per_turn: Some(524_288.0),
     velocity_unit: VelocityUnit::Counts(1.0),
+    // No manual gives the unit of 6080. Any smaller one makes the same number a lower speed: what is too slow in r/min is too slow in
+    // counts/s as well.
+    motor_speed_unit: VelocityUnit::RevolutionsPerMinute(1.0),
+    // The whole range of 32 bits is "no limit" (EDS); of 0 and 0 nothing is known.
+    empty_software_limits_are_off: false,
     modes: ModeSet::of(&[
         OperationMode::CyclicSynchronousPosition,
         OperationMode::CyclicSynchronousVelocity,

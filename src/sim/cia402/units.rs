@@ -17,7 +17,7 @@ pub struct Units {
     pub profile_velocity: f64,
     /// Accelerations: position units/s².
     pub acceleration: f64,
-    /// Object 6080, in revolutions of the motor per minute: position units/s.
+    /// Object 6080: position units/s. CiA 402: revolutions of the motor per minute.
     pub motor_speed: f64,
 }
 
@@ -73,7 +73,7 @@ impl Units {
             velocity,
             profile_velocity,
             acceleration: quirk(0x6083).unwrap_or(profile_velocity),
-            motor_speed: per_turn / 60.0,
+            motor_speed: quirk(0x6080).unwrap_or(per_turn / 60.0),
         }
     }
 }
