@@ -481,8 +481,11 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
             enter_services(table, place, own).map_err(taken)?;
         }
     }
-    for (bus, table) in parameters.buses.iter().zip(&mut dispatch) {
+    for ((number, bus), table) in (0..).zip(&parameters.buses).zip(&mut dispatch) {
         let Some(CanopenNetwork { sync_id }) = bus.canopen else { continue };
+        for (_, node) in nodes.iter().filter(|(of, _)| *of == number) {
+            table.foreign(Id::canopen(SDO_REQUEST, *node), FrameFormat::Classic);
+        }
         table.foreign(NMT, FrameFormat::Classic);
         table.foreign(sync_id, FrameFormat::Classic);
         if let Some(heartbeat) = parameters.heartbeat {
@@ -520,3 +523,5 @@ fn enter_process_data(table: &mut Dispatch, place: u8, own: &AxisParameters) -> 
 }
 
 const NMT: Id = Id::canopen(0x000, 0);
+/// The function code of SDO requests (CiA 301, 7.3.3).
+pub(super) const SDO_REQUEST: u16 = 0x600;

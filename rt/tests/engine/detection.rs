@@ -89,6 +89,28 @@ fn whoever_else_sends_sync_set_points_or_commands_stops_the_group_and_is_named_b
 }
 
 #[test]
+fn whoever_else_writes_to_a_drive_by_sdo_stops_the_group_and_may_read() {
+    // Upload of 6041; the drive of another controller; a controlword, a segment, the begin of a block.
+    let read = (1, [0x40, 0x41, 0x60, 0, 0, 0, 0, 0]);
+    let to_another_node = (99, [0x2B, 0x40, 0x60, 0, 6, 0, 0, 0]);
+    let mut rig = moving();
+    for (node, request) in [read, to_another_node] {
+        rig.buses[0].inject(Frame::of(Id::canopen(0x600, node), request));
+        rig.run(5);
+        assert!(rig.stops().is_empty(), "{request:02X?}");
+    }
+    for first in [0x2B, 0x00, 0xC2] {
+        let mut rig = moving();
+        let id = Id::canopen(0x600, 1);
+        rig.buses[0].inject(Frame::of(id, [first, 0x40, 0x60, 0, 6, 0, 0, 0]));
+        rig.run(2);
+        assert_eq!(reason(&rig), (Rule::ForeignMaster, Origin::Bus(0), id.value().into()));
+        rig.run_until(Phase::Disabled, 3_000);
+        rig.assert_limits_kept();
+    }
+}
+
+#[test]
 fn two_nodes_with_one_number_are_told_from_feedback_that_comes_late() {
     let twice = |rig: &mut Rig, every: usize| {
         for cycle in 0..300 {

@@ -88,6 +88,10 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "有两个节点使用 {0} 的节点 ID {1} 应答：其反馈出现两次",
     ),
     (
+        "another master writes to the drive of node {0} on <1>: an SDO request with identifier {2} is not from this controller",
+        "<1> 上有其他主站在写入节点 {0} 的驱动器：标识符为 {2} 的 SDO 请求不是本控制器发出的",
+    ),
+    (
         "another master sends on <0>: a frame with identifier {1} is not from this controller",
         "<0> 上有其他主站在发送：标识符为 {1} 的帧不是本控制器发出的",
     ),

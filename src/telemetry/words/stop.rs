@@ -1,11 +1,16 @@
 //! The texts of stops.
 
-use takt_rt::{Fault, StopCause, StopReason};
+use takt_rt::{Fault, Id, StopCause, StopReason};
 
 use super::cures::cure;
 use super::{category, mode, phase};
 use crate::printable::Shown;
 use crate::telemetry::machine::{Machine, Unit};
+
+/// Whether this is the identifier of an SDO request to a node (CiA 301, 7.3.3).
+fn is_sdo_request(id: Id) -> bool {
+    !id.is_extended() && (0x601..=0x67F).contains(&id.value())
+}
 
 /// The cause of a stop, without phase and category: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
 pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
@@ -176,6 +181,10 @@ pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
         Fault::DuplicateNode { node } => {
             format!("two nodes answer with the node ID of {axis}, {node}: its feedback comes twice")
         }
+        Fault::ForeignMaster { id } if is_sdo_request(id) => format!(
+            "another master writes to the drive of node {} on {bus}: an SDO request with identifier 0x{id:?} is not from this controller",
+            id.value() & 0x7F
+        ),
         Fault::ForeignMaster { id } => {
             format!(
                 "another master sends on {bus}: a frame with identifier 0x{id:?} is not from this controller"
@@ -462,6 +471,13 @@ mod tests {
                 0x080.into(),
                 0.0,
                 "another master sends on bus left: a frame with identifier 0x080 is not from this controller",
+            ),
+            (
+                Rule::ForeignMaster,
+                Origin::Bus(0),
+                0x605.into(),
+                0.0,
+                "another master writes to the drive of node 5 on bus left: an SDO request with identifier 0x605 is not from this controller",
             ),
             (
                 Rule::ForeignMaster,

@@ -26,7 +26,7 @@ fn assert_safe(fault: &str, played: &Played) {
 /// A fault that leads to a stop: its keys, the rule, the origin, and the longest detection time in milliseconds.
 struct Stops(&'static str, Rule, Origin, f64);
 
-const STOPS: [Stops; 38] = {
+const STOPS: [Stops; 39] = {
     use Origin::{Axis, Bus};
     use Rule::*;
     [
@@ -79,6 +79,13 @@ const STOPS: [Stops; 38] = {
         ),
         Stops(
             "kind = \"foreign-nmt\"\naxis = \"joint3\"\ncommand = \"reset-node\"",
+            ForeignMaster,
+            Bus(0),
+            2.0,
+        ),
+        // The controlword "disable voltage", by SDO.
+        Stops(
+            "kind = \"foreign-frame\"\nbus = \"base\"\nid = 0x601\ndata = [0x2B, 0x40, 0x60, 0, 0, 0, 0, 0]",
             ForeignMaster,
             Bus(0),
             2.0,
