@@ -32,6 +32,7 @@ pub fn scan(
     if finds_unconfigured && is_usable && !what.only_listens && !found.is_interrupted {
         find_unconfigured(port, clock, is_interrupted, see, &mut found);
     }
+    found.bus_state = port.health().state;
     found.remarks.extend(health_remarks(&port.health(), port.unconfirmed(clock.now_ns()), what.only_listens));
     found
 }

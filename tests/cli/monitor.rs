@@ -15,6 +15,7 @@ use takt::internals::sim::pseudo_terminal::PseudoTerminal;
 use tempfile::TempDir;
 
 use crate::printed::{ends_with, errors, said};
+use crate::simulated::Simulated;
 
 fn here(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -362,4 +363,18 @@ fn ctrl_c_ends_it_with_a_summary() {
     reader.join().unwrap();
     ends_with(130, &output);
     assert!(errors(&output).contains(" frame"), "{}", errors(&output));
+}
+
+#[test]
+fn a_bus_whose_interface_goes_is_named_at_the_end_and_the_monitor_fails() {
+    let simulated = Simulated::new(&["configs/first.toml"]);
+    let bus = format!("slcan:{}", simulated.path.display());
+    let mut command = takt();
+    command.args(["--bus", &bus, "--duration", "3"]).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let watching = command.spawn().unwrap();
+    thread::sleep(Duration::from_millis(1_000));
+    drop(simulated);
+    let output = watching.wait_with_output().unwrap();
+    ends_with(1, &output);
+    assert!(errors(&output).contains("went down, or has gone"), "{}", errors(&output));
 }

@@ -206,3 +206,16 @@ fn the_help_says_who_is_only_listened_for() {
     assert!(text.contains("nothing moves, and nothing is written to a drive"), "{text}");
     assert!(text.contains("motor commands on CAN: a motor that has torque loses it"), "{text}");
 }
+
+#[test]
+fn a_scan_on_an_interface_that_goes_fails_and_says_so() {
+    let simulated = Simulated::new(&["configs/first.toml"]);
+    let arguments = ["--bus", &adapter(&simulated), "--to", "2", "--listen-for", "4 s"];
+    let mut command = takt("scan");
+    let scan = command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    thread::sleep(Duration::from_millis(1_500));
+    drop(simulated);
+    let output = scan.wait_with_output().unwrap();
+    ends_with(1, &output);
+    assert!(said(&output).contains("the interface went down"), "{}", said(&output));
+}

@@ -259,6 +259,7 @@ fn an_interface_that_is_off_the_bus_or_acknowledged_by_nobody_is_said() {
         let mut port = Through { bus: played(|_| vec![]), change: |_, _: &mut ReceiveBatch| {}, health };
         let outcome = scan(&usual(), &mut port);
         assert!(outcome.found.remarks.iter().any(|remark| remark.contains(words)), "{:?}", outcome.found);
+        assert_eq!(outcome.found.bus_state, state);
         assert!(outcome.sent.iter().all(|frame| frame.id().value() != 0x7E5), "no search on a dead bus");
     }
 }

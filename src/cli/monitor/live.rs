@@ -154,6 +154,9 @@ pub fn watch(mut buses: Vec<OpenBus>, session: &mut Session, is_stopped: impl Fn
     }
     for bus in &mut buses {
         let health = bus.port.health();
+        if matches!(health.state, BusState::BusOff | BusState::Down) {
+            session.lose_bus(bus.number, health.state);
+        }
         let name = session.buses().get(bus.number).map_or("", |bus| &bus.name).to_owned();
         if health.rx_overruns > 0 {
             session.remark(format!(

@@ -64,6 +64,7 @@ pub struct Session {
     shown: u64,
     /// Whether a log could not be written.
     is_log_broken: bool,
+    is_bus_lost: bool,
     remarks: Vec<String>,
 }
 
@@ -83,6 +84,7 @@ impl Session {
             first_ns: None,
             shown: 0,
             is_log_broken: false,
+            is_bus_lost: false,
             remarks: vec![],
         }
     }
@@ -196,6 +198,19 @@ impl Session {
         self.remarks.push(remark);
     }
 
+    /// Takes that nothing more could be heard on a bus at the end.
+    pub fn lose_bus(&mut self, bus: usize, state: BusState) {
+        let name = self.buses.get(bus).map_or("", |bus| &bus.name);
+        self.remarks.push(match state {
+            BusState::BusOff => format!(
+                "bus `{name}` is off (bus-off): check wiring, termination and bit rate; the interface is heard again after a restart \
+                 (restart-ms)"
+            ),
+            _ => format!("the interface of bus `{name}` went down, or has gone: nothing more was heard"),
+        });
+        self.is_bus_lost = true;
+    }
+
     /// Prints what was collected.
     pub fn print(&mut self) {
         self.printed.print();
@@ -242,6 +257,7 @@ impl Session {
             Some(failed) => failed,
             None if self.is_log_broken => Exit::Stopped,
             None if is_interrupted && has_reader => Exit::Interrupted,
+            None if self.is_bus_lost => Exit::Stopped,
             None => Exit::Done,
         }
     }

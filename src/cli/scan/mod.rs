@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::Args;
-use takt_rt::Nanoseconds;
+use takt_rt::{BusState, Nanoseconds};
 
 use crate::config::{Config, Interface, Quantity};
 use crate::family::scan::{PlaceOfScan, Scanned, can_drive, starting_configuration};
@@ -187,6 +187,8 @@ fn real(arguments: &Arguments, bus: &Interface) -> Result<RealInterface, UsageEr
 fn finish(arguments: &Arguments, buses: Vec<ScannedBus>, wanted: usize) -> Exit {
     let is_interrupted = buses.len() < wanted || buses.iter().any(|bus| bus.found.is_interrupted);
     let exit = if is_interrupted { Exit::Interrupted } else { Exit::Done };
+    let is_lost = |bus: &ScannedBus| matches!(bus.found.bus_state, BusState::BusOff | BusState::Down);
+    let exit = if buses.iter().any(is_lost) { exit.and_failed() } else { exit };
     if arguments.json {
         return print::indented_json(&output::json(&buses, is_interrupted), exit);
     }

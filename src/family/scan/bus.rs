@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use takt_rt::{Frame, Id, Nanoseconds};
+use takt_rt::{BusState, Frame, Id, Nanoseconds};
 
 use super::Scanned;
 use super::canopen;
@@ -94,7 +94,7 @@ impl Scan {
             let is_news = self.scan.of_controller.is_none();
             remarks.extend(is_news.then(|| conclusion::active_master(heard)).flatten());
             remarks.extend(self.left_out.into_values());
-            Scanned { devices, remarks, is_interrupted }
+            Scanned { devices, remarks, is_interrupted, bus_state: BusState::default() }
         })
     }
 

@@ -28,6 +28,8 @@ mod reading;
 mod session;
 mod starting;
 
+use takt_rt::BusState;
+
 pub use bus::{BusScan, scan_bus};
 pub use canopen::{NodeIdentity, Recognised};
 pub use device::{Answered, FoundDevice};
@@ -46,4 +48,6 @@ pub struct Scanned {
     pub remarks: Vec<String>,
     /// Whether it was interrupted before everything was asked.
     pub is_interrupted: bool,
+    /// The state of the bus at the end.
+    pub bus_state: BusState,
 }
