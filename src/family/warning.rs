@@ -7,10 +7,12 @@ use std::fmt;
 use crate::canopen::object::ObjectAddress;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Short;
-use crate::config::{Axis, Config, Control, Plausible, ProgramTarget, Quantity, Travel};
+use crate::config::{Axis, Bus, Config, Control, Interface, Plausible, ProgramTarget, Quantity, Travel};
 use crate::family::{
     SignOfLife, Unwatched, adapter_warning, bring_up, registry, report_cycles, stops_by_itself_after,
 };
+#[cfg(target_os = "linux")]
+use crate::link::restart_command;
 
 /// A rotary axis that goes round more often than this is unusual.
 const USUAL_TURNS: f64 = 2.0;
@@ -125,6 +127,15 @@ pub enum WarningKind {
         /// What the drive gets, with its unit.
         rounded: String,
     },
+    /// The kernel does not restart the controller of an interface after bus-off, and the configuration wants it.
+    NoRestart {
+        /// The interface.
+        interface: String,
+        /// The time that the configuration wants, in ms.
+        wanted_ms: u32,
+        /// The command that sets it.
+        mend: String,
+    },
     /// The bus is behind an SLCAN adapter.
     Adapter {
         /// The interface.
@@ -235,6 +246,11 @@ impl fmt::Display for WarningKind {
                 f,
                 "its drive takes whole numbers of r/min only: the program's velocity of {commanded} becomes {rounded}"
             ),
+            Self::NoRestart { interface, wanted_ms, mend } => write!(
+                f,
+                "{interface} has restart-ms 0, and `restart_ms` is {wanted_ms}: after a bus-off it stays off the bus until somebody \
+                 restarts it: {mend}"
+            ),
             Self::Adapter { interface } => write!(
                 f,
                 "its adapter is on USB, and USB is not hard real time: SYNC and set-points may be late by milliseconds, and \
@@ -274,6 +290,7 @@ impl Config {
             let subject = WarningSubject::Bus(bus.name.clone());
             let kinds =
                 adapter_warning::of_bus(self, index).into_iter().chain(adapter_warning::of_line(self, index));
+            let kinds = kinds.chain(never_restarts(bus));
             warnings.extend(kinds.map(|kind| Warning { subject: subject.clone(), kind }));
         }
         warnings
@@ -388,4 +405,17 @@ fn of_axis(axis: &Axis) -> Vec<WarningKind> {
         kinds.push(WarningKind::VelocityInDegrees { velocity: limits.velocity });
     }
     kinds
+}
+
+/// The warning about an interface of this machine that is up, if its controller is not restarted as the configuration wants it.
+#[cfg(target_os = "linux")]
+fn never_restarts(bus: &Bus) -> Option<WarningKind> {
+    let Interface::SocketCan(interface) = &bus.interface else { return None };
+    let mend = restart_command(interface, bus)?;
+    Some(WarningKind::NoRestart { interface: interface.clone(), wanted_ms: bus.restart_ms, mend })
+}
+
+#[cfg(not(target_os = "linux"))]
+fn never_restarts(_: &Bus) -> Option<WarningKind> {
+    None
 }

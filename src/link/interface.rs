@@ -339,6 +339,18 @@ fn parameters(settings: &InterfaceSettings, unfit_modes: &[UnfitMode]) -> Interf
     }
 }
 
+/// The command after which the kernel restarts the controller of an interface as a bus of a configuration wants it; `None` if it does so,
+/// or the interface is not up: takt brings it up with the setting.
+pub fn restart_command(name: &str, bus: &Bus) -> Option<String> {
+    missing_restart(&interface_status(name).ok()?, &InterfaceSettings::of(bus))
+}
+
+fn missing_restart(status: &InterfaceStatus, settings: &InterfaceSettings) -> Option<String> {
+    let is_missing = status.is_up && status.restart_ms == Some(0) && settings.restart_ms > 0;
+    // The kernel does not change the time of an interface that is up.
+    is_missing.then(|| format!("sudo ip link set {} down && {}", status.name, command(status, settings)))
+}
+
 /// Compares an interface that is up with the settings. A virtual interface has no bit rate and accepts any.
 fn compare(status: &InterfaceStatus, settings: &InterfaceSettings) -> Result<(), InterfaceError> {
     if status.state == BusState::BusOff && status.restart_ms == Some(0) {
@@ -443,6 +455,23 @@ mod tests {
             error_counters: None,
             has_controller: timing.is_some(),
             unfit_modes: vec![],
+        }
+    }
+
+    #[test]
+    fn a_controller_that_stays_off_the_bus_where_the_configuration_wants_a_restart_is_found() {
+        let never = InterfaceStatus { restart_ms: Some(0), ..up(Some(1_000_000)) };
+        let command =
+            "sudo ip link set can0 down && sudo ip link set can0 up type can bitrate 1000000 restart-ms 100";
+        assert_eq!(missing_restart(&never, &CLASSIC).as_deref(), Some(command));
+        let as_configured = InterfaceSettings { restart_ms: 0, ..CLASSIC };
+        assert_eq!(missing_restart(&never, &as_configured), None);
+        for other in [
+            InterfaceStatus { is_up: false, ..never.clone() },
+            InterfaceStatus { restart_ms: Some(250), ..never.clone() },
+            up(None),
+        ] {
+            assert_eq!(missing_restart(&other, &CLASSIC), None);
         }
     }
 

@@ -33,7 +33,7 @@ pub(crate) use adapter_latency::{adapter_latency_ns, shortest_latency_command};
 pub use converter::ConverterError;
 #[cfg(target_os = "linux")]
 pub(crate) use interface::{
-    ControllerTiming, InterfaceSettings, InterfaceStatus, QUEUE_FRAMES, interface_status,
+    ControllerTiming, InterfaceSettings, InterfaceStatus, QUEUE_FRAMES, interface_status, restart_command,
     transmit_queue_length,
 };
 #[cfg(target_os = "linux")]
