@@ -2,14 +2,14 @@
 
 use takt_rt::Nanoseconds;
 
-use crate::config::Axis;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Quantity;
+use crate::config::{Axis, Travel};
 
 /// The unit of a number of a drive, for people: its size in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SiUnit {
-    quantity: Quantity,
+    quantity: &'static Quantity,
     /// rad, m or their rates for one unit.
     size: f64,
     /// The number of zero.
@@ -21,34 +21,34 @@ impl SiUnit {
     pub fn position(axis: &Axis) -> Self {
         let counting = Counting::of(axis);
         let direction = if axis.reversed { -1.0 } else { 1.0 };
-        let quantity = Quantities::of(axis.travel).position;
+        let quantity = &quantities(axis).position;
         Self { quantity, size: direction / counting.counts_per_unit(), zero: axis.zero_counts.into() }
     }
 
     /// The drive's units of profile velocities (6081).
     pub fn profile_velocity(axis: &Axis) -> Self {
         let per_velocity_unit = axis.drive.profile_velocity_units_per_velocity_unit(axis.counts_per_turn);
-        Self::rate(axis, Quantities::of(axis.travel).velocity, per_velocity_unit)
+        Self::rate(axis, &quantities(axis).velocity, per_velocity_unit)
     }
 
     /// The drive's units of the speed of its motor (6080).
     pub fn motor_speed(axis: &Axis) -> Self {
         let per_velocity_unit = axis.drive.motor_speed_units_per_velocity_unit(axis.counts_per_turn);
-        Self::rate(axis, Quantities::of(axis.travel).velocity, per_velocity_unit)
+        Self::rate(axis, &quantities(axis).velocity, per_velocity_unit)
     }
 
     /// The drive's units of accelerations (6083).
     pub fn acceleration(axis: &Axis) -> Self {
         let per_velocity_unit = axis.drive.acceleration_units_per_velocity_unit(axis.counts_per_turn);
-        Self::rate(axis, Quantities::of(axis.travel).acceleration, per_velocity_unit)
+        Self::rate(axis, &quantities(axis).acceleration, per_velocity_unit)
     }
 
     /// The drive's units of jerks (60A4): those of accelerations in a second.
     pub fn jerk(axis: &Axis) -> Self {
-        Self { quantity: Quantities::of(axis.travel).jerk, ..Self::acceleration(axis) }
+        Self { quantity: &quantities(axis).jerk, ..Self::acceleration(axis) }
     }
 
-    fn rate(axis: &Axis, quantity: Quantity, per_velocity_unit: f64) -> Self {
+    fn rate(axis: &Axis, quantity: &'static Quantity, per_velocity_unit: f64) -> Self {
         let per_turn = axis.drive.velocity_units_per_turn(axis.counts_per_turn) * per_velocity_unit;
         Self { quantity, size: 1.0 / (turns(axis, 1.0) * per_turn), zero: 0.0 }
     }
@@ -57,6 +57,13 @@ impl SiUnit {
     pub fn show(self, number: i64) -> String {
         let value = (number as f64 - self.zero) * self.size;
         format!("{number} = {}", self.quantity.show(value))
+    }
+}
+
+const fn quantities(axis: &Axis) -> &'static Quantities {
+    match axis.travel {
+        Travel::Rotary => &Quantities::ROTARY,
+        Travel::Linear { .. } => &Quantities::LINEAR,
     }
 }
 
