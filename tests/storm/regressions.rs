@@ -242,12 +242,9 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
 const FAILED_WITH_EVERYTHING: [(u64, &str); 27] = [
-    (34714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
-    (27432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
-    (11882, "The same in profile velocity"),
-const FAILED_WITH_EVERYTHING: [(u64, &str); 24] = [
-const FAILED_WITH_EVERYTHING: [(u64, &str); 24] = [
-const FAILED_WITH_EVERYTHING: [(u64, &str); 24] = [
+    (34_714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
+    (27_432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
+    (11_882, "The same in profile velocity"),
     (
         40_011_225_717,
         "A gentle move that began while a joint was about to turn round broke the velocity limit",
