@@ -333,6 +333,11 @@ const FAILED_OFF_CYCLE: [(u64, &str); 1] =
     [(2_000_080, "A bus that was behind for good kept the command to disable from the drive")];
 
 #[test]
+fn a_drive_on_a_serial_line_that_is_enabled_after_a_stop_is_not_taken_for_disabled() {
+    play(&Case::on_a_line(930_000_066)).unwrap();
+}
+
+#[test]
 fn storms_that_have_failed_with_off_cycle_drives_pass() {
     for (seed, what) in FAILED_OFF_CYCLE {
         let played = play(&Case::of_off_cycle(seed));

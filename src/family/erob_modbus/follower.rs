@@ -433,7 +433,14 @@ impl Follower {
             _ if shown != 0 => DriveState::Fault,
             Life::Following if !is_motor_off => DriveState::OperationEnabled,
             Life::Stopping { .. } if !is_motor_off => DriveState::QuickStopActive,
-            _ => DriveState::ReadyToSwitchOn,
+            // The request that enables it is under way, or the next one, or the one that disables it is not confirmed.
+            Life::Enabled { .. } | Life::Disabling => DriveState::SwitchedOn,
+            Life::Preparing { step, .. } if step > self.preparation().len() => DriveState::SwitchedOn,
+            Life::Off
+            | Life::Preparing { .. }
+            | Life::Following
+            | Life::Stopping { .. }
+            | Life::Disarming => DriveState::ReadyToSwitchOn,
         };
         let direction = 1f64.copysign(self.parameters.counts_per_unit);
         let per_milliampere = match (self.parameters.rated_torque, continuous_milliamperes) {
@@ -547,11 +554,27 @@ mod tests {
         let report = drive.run(100);
         assert_eq!((report.state, report.error_code), (DriveState::Fault, FaultCode::REFUSED.0));
         let mut drive = Drive { refuses: Some((0x00F0, ExceptionCode::BUSY)), ..Drive::new() };
-        assert_eq!(drive.run(300).state, DriveState::ReadyToSwitchOn);
+        assert_eq!(drive.run(300).state, DriveState::SwitchedOn);
         assert!(
             drive.written.iter().filter(|register| **register == 0x00F0).count() >= 3,
             "{:?}",
             drive.written
         );
+    }
+
+    #[test]
+    fn a_drive_is_not_shown_without_torque_from_its_enabling_until_it_has_confirmed_that_it_is_disabled() {
+        let mut drive = Drive::new();
+        let mut report = drive.run(10);
+        while !drive.was_enabled {
+            report = drive.run(1);
+        }
+        drive.wish = OffCycleWish::Stop;
+        let enabled = drive.written.len();
+        while drive.written[enabled..] != [registers::MOTOR_ENABLE.address] {
+            assert_eq!(report.state, DriveState::SwitchedOn);
+            report = drive.run(1);
+        }
+        assert_eq!(drive.run(10).state, DriveState::ReadyToSwitchOn);
     }
 }

@@ -5,7 +5,7 @@ use takt_rt::{DriveState, Event, EventKind, Phase, Rule};
 
 use super::{REST, Seen};
 use crate::bounds;
-use takt::sim::Observation;
+use takt::sim::{NodeState, Observation};
 
 /// Bit 7 of a controlword.
 const FAULT_RESET: u16 = 0x80;
@@ -144,11 +144,15 @@ impl Power {
     /// A disabled group has no drive with torque, or a latched fault says so.
     fn check_confirmed(&mut self, seen: &Seen<'_>, index: usize) -> Result<(), String> {
         let (concern, group) = (&seen.concerns[index], seen.group_of(index));
-        let is_heard = !(concern.is_misreported
-            || concern.is_crowded
-            || concern.has_paused
-            || concern.is_neglected
-            || concern.unreachable_since_ns.is_some());
+        // Outside of NMT operational it sends no PDOs, and on a bus that is too slow they are late in every cycle.
+        let is_reporting = seen.truth[index].nmt == NodeState::Operational
+            && !seen.overloaded_buses[seen.config.axes[index].bus];
+        let is_heard = is_reporting
+            && !(concern.is_misreported
+                || concern.is_crowded
+                || concern.has_paused
+                || concern.is_neglected
+                || concern.unreachable_since_ns.is_some());
         let is_explained = group.stop.is_some_and(|stop| stop.rule() != Rule::Requested);
         let has_torque = seen.truth[index].state == DriveState::OperationEnabled;
         let is_unexplained = is_heard && has_torque && group.phase == Phase::Disabled && !is_explained;
