@@ -14,9 +14,9 @@
 use super::Axis;
 use crate::control::{ControlLaw, TorqueDemand};
 use crate::fault::Fault;
-use crate::group_trajectory::fastest_stop;
+use crate::guard::braking_distance;
 use crate::plan::{PlanError, State};
-use crate::source::{AxisTarget, Follow, come_to_rest, follow, follow_velocity};
+use crate::source::{AxisTarget, Follow, follow, follow_velocity};
 
 impl Axis {
     /// The next set-point on the way to what a source wants at the end of this cycle. What it wants of the torque takes effect
@@ -57,12 +57,11 @@ impl Axis {
     /// # Errors
     /// As [`Axis::streamed`].
     pub fn resting(&mut self, period_s: f64) -> Result<State, Fault> {
-        come_to_rest(&self.set_point(), self.stream_rest, &self.parameters.limits, period_s)
-            .map_err(|error| fault_of(&error, self.stream_rest))
+        self.followed(&State::rest(self.stream_rest), period_s)
     }
 
-    /// A stream has run dry, with this as its last point. At a position the axis rests, or where its fastest stop ends if that is
-    /// behind it: it does not come back. Behind a velocity or a torque it rests where it can stop, held by the position
+    /// A stream has run dry, with this as its last point. At a position the axis rests, or where it can stop before if it cannot
+    /// stop so early: it does not come back. Behind a velocity or a torque it rests where it can stop, held by the position
     /// loop. The gains of an impedance, and the torque that is fed forward, stay.
     ///
     /// # Errors
@@ -77,16 +76,16 @@ impl Axis {
             AxisTarget::Velocity { .. } | AxisTarget::Torque(_) => (TorqueDemand::default(), None),
         };
         self.set_demand(demand, period_s)?;
-        let start = self.set_point();
-        let stop = fastest_stop(&start, &self.parameters.limits)
-            .map_err(|error| fault_of(&error, start.position))?
-            .end()
-            .position;
-        let wanted = last.unwrap_or(start.position);
-        self.stream_rest = if start.velocity > 0.0 {
-            wanted.max(stop)
-        } else if start.velocity < 0.0 {
-            wanted.min(stop)
+        let State { position, velocity, acceleration } = self.set_point();
+        // As `follow` stops it where no position limit asks for more.
+        let limits = &self.parameters.limits.both_ways();
+        let ahead = position + braking_distance(limits, velocity, acceleration);
+        let back = position - braking_distance(limits, -velocity, -acceleration);
+        let wanted = last.unwrap_or(position);
+        self.stream_rest = if velocity > 0.0 {
+            wanted.max(ahead)
+        } else if velocity < 0.0 {
+            wanted.min(back)
         } else {
             wanted
         };

@@ -133,6 +133,13 @@ impl AxisLimits {
         }
     }
 
+    /// The limits with the smaller one of acceleration and deceleration for both. Which of them holds changes where the joint turns
+    /// round, and what was possible to stop before must be so behind it.
+    pub(crate) fn both_ways(&self) -> Self {
+        let smaller = self.acceleration.min(self.deceleration);
+        Self { acceleration: smaller, deceleration: smaller, ..*self }
+    }
+
     /// Whether `position` may be a target.
     pub fn contain(&self, position: f64) -> bool {
         self.position_min <= position && position <= self.position_max

@@ -28,7 +28,7 @@ pub use callback::{
     CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, PositionSequence,
 };
 pub use delay::StreamDelay;
-pub use follower::{come_to_rest, follow};
+pub use follower::follow;
 pub use look_ahead::{LookAhead, LookAheadParameters, POINTS_AT_MOST, PointError};
 pub use target::{
     AxisPoint, AxisTarget, Follow, PointRole, PositionPoint, StreamCounts, StreamPoint, StreamReport,

@@ -2,7 +2,7 @@
 
 use takt::config::Axis;
 use takt::sim::Observation;
-use takt_rt::StopCategory;
+use takt_rt::{Rule, StopCategory};
 
 use super::Seen;
 use crate::heartbeat::MissedHeartbeat;
@@ -42,7 +42,12 @@ impl Releases {
             let slow =
                 SLOW * axis.limits.velocity + axis.limits.deceleration * elapsed_s + unseen_speed(seen, axis);
             // A drive that has missed the heartbeat stops by its own fault reaction, and is not enabled again after it.
-            let is_own_reaction = concern.missed_heartbeat == MissedHeartbeat::Shown;
+            let is_own_reaction = match concern.missed_heartbeat {
+                MissedHeartbeat::Shown => true,
+                // Its alarm has ended before anybody looked, and was reported.
+                MissedHeartbeat::Possibly => has_reported_fault(seen, number),
+                MissedHeartbeat::No => false,
+            };
             // `takt run` refuses a bus whose feedback comes too late. The speed of such a joint is not known.
             let is_unheard = seen.overloaded_buses[axis.bus]
                 && seen.snapshot.axes[number].feedback_age > axis.missed_feedback_cycles;
@@ -59,6 +64,12 @@ impl Releases {
         }
         Ok(())
     }
+}
+
+/// Returns `true` if a fault of the drive has stopped its group.
+fn has_reported_fault(seen: &Seen<'_>, axis: usize) -> bool {
+    let stop = seen.group_of(axis).stop;
+    stop.is_some_and(|stop| stop.rule() == Rule::DriveFault && stop.axis().map(usize::from) == Some(axis))
 }
 
 /// How fast a joint may be that turns round within one and a half counts of its drive's position, while it is watched: it is four times as
