@@ -188,7 +188,7 @@ fn the_manuals_writes_and_its_wait_come_before_the_first_velocity() {
     bench.run(400, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!(bench.written, [0x0040, 0x0042, 0x0049, 0x004B, 0x0051, 0x0002, 0x00F0]);
     assert!(bench.is_enabled());
-    assert_eq!(bench.state(), DriveState::ReadyToSwitchOn);
+    assert_eq!(bench.state(), DriveState::SwitchedOn);
     bench.run(700, |_| (OffCycleWish::Enable, 0.25, 0.0));
     assert_eq!((bench.written[7], bench.state()), (0x0051, DriveState::OperationEnabled));
     bench.run(100, |_| (OffCycleWish::Stop, 0.25, 0.0));

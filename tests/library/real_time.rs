@@ -295,7 +295,7 @@ fn a_callback_that_does_not_return_ends_the_run_and_every_wait_and_moves_nothing
 #[test]
 fn a_bring_up_that_is_asked_for_again_at_once_is_carried_out() {
     let config = config("arm6-erob.toml");
-    let stuck = "[[fault]]\nkind = \"stuck-sdo\"\naxis = \"joint2\"\nwhen = \"enabled\"\nat = \"100 ms\"\nfor = \"4 s\"\n";
+    let stuck = "[[fault]]\nkind = \"stuck-sdo\"\naxis = \"joint2\"\nwhen = \"enabled\"\nat = \"100 ms\"\nfor = \"8 s\"\n";
     let injector = FaultInjector::new(Scenario::parse("stuck", stuck, &config).unwrap());
     let options = SessionOptions { fault_injector: Some(Arc::new(injector)), ..SessionOptions::default() };
     let arm = Controller::start(config, options).unwrap();

@@ -54,6 +54,8 @@ fn a_thousand_clients_that_fight_for_the_lease_leave_one_that_commands() {
     });
     assert!(commanded.load(Ordering::Relaxed));
     let last = served.connect();
+    // The controller may not have seen yet that the one before is gone.
+    last.take_over().unwrap();
     let motion = last.move_to(&moved(&last, 0.05)).unwrap();
     assert_eq!(last.wait(motion, LONG), Ok(()));
 }
