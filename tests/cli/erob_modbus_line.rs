@@ -18,7 +18,7 @@ use takt::internals::family::erob::procedure::{self, End, MotionFailure, Run};
 use takt::internals::family::erob_modbus::drive::{AccessError, ErobDrive};
 use takt::internals::family::erob_modbus::registers;
 use takt::internals::link::modbus_line::ModbusLine;
-use takt::internals::link::serial_line::{SerialLine, SerialLineError, SerialSettings};
+use takt::internals::link::serial_line::{SerialLineError, SerialSettings};
 use takt::internals::modbus::exception::ExceptionCode;
 use takt::internals::modbus::frame::{RegisterRange, RegisterValues, Request, SlaveAddress};
 use takt::internals::modbus::line_timing::LineTiming;
