@@ -53,7 +53,7 @@ pub struct AxisSession<'a> {
     /// The timeouts.
     pub timing: BringUpTiming,
     pub(super) bus: CanopenSession,
-    /// Whether the drive has been brought up before, in the same run.
+    /// True if the drive has been brought up before, in the same run.
     pub(super) is_again: bool,
     on_failure: OnFailure,
     facts: RwLock<AxisFacts>,
@@ -64,7 +64,7 @@ pub struct AxisSession<'a> {
     dry_run: Option<Mutex<DryRun>>,
 }
 
-/// What has happened in a dry run.
+/// The result of a dry run.
 #[derive(Default)]
 pub(super) struct DryRun {
     /// Every number that was written, in order. Values of a configuration file are not listed.
@@ -160,7 +160,7 @@ impl<'a> AxisSession<'a> {
         self.dry_run.is_some()
     }
 
-    /// What has happened in a dry run.
+    /// Ends a dry run and returns its result.
     pub(super) fn end_dry_run(self) -> DryRun {
         self.dry_run.map(|dry_run| std::mem::take(&mut *lock(&dry_run))).unwrap_or_default()
     }

@@ -1,4 +1,5 @@
-//! What bounds the motion of a drive by itself: read back, since it is to move as commanded, and the way to stop relies on it.
+//! Objects by which a drive bounds its motion: read back, since a drive that keeps narrower bounds than the axis does not move or stop as
+//! planned.
 
 use super::axis_session::{AxisSession, StepResult};
 use super::axis_units::{
@@ -18,7 +19,7 @@ use crate::family;
 /// Object 6086: trapezoidal. Other profiles need a longer way to stop for the same deceleration.
 const LINEAR_RAMP: i64 = 0;
 
-/// What the limits of an axis need of one object.
+/// A condition for the value of an object, from the limits of an axis.
 struct Requirement {
     object: Object,
     needed: Check,
@@ -127,7 +128,7 @@ async fn bounds(c: &AxisSession<'_>) -> StepResult {
     Ok(())
 }
 
-/// Whether the drive may have one of these objects: its data sheet has it, or there is no data sheet.
+/// Returns `true` if the data sheet of the drive has one of these objects, or if there is no data sheet.
 fn may_have(axis: &Axis, objects: &[Object]) -> bool {
     let sheet = family::of(&axis.drive).data_sheet(&axis.drive);
     sheet.is_none_or(|sheet| objects.iter().any(|object| sheet.has(object.address)))

@@ -252,7 +252,7 @@ impl Shutdown {
 struct Group {
     axes: Vec<AxisName>,
     members: Vec<Member>,
-    /// Whether the drives have been brought up before, in the same run.
+    /// True if the drives have been brought up before, in the same run.
     is_again: bool,
     procedures: Parallel<CanopenClient, Vec<AxisFacts>, NodeFailure>,
 }
