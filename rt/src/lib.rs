@@ -46,6 +46,7 @@ mod dispatch;
 mod engine;
 mod fault;
 mod frame;
+pub mod function_code;
 mod group_trajectory;
 mod guard;
 mod host;

@@ -1,6 +1,7 @@
 //! The time of day that the controller tells its drives: the TIME message of CiA 301 (7.2.6).
 
 use crate::frame::{Frame, Id};
+use crate::function_code;
 use crate::time::Nanoseconds;
 
 const MILLISECOND_NS: u64 = 1_000_000;
@@ -9,7 +10,7 @@ const DAY_MS: u64 = 86_400_000;
 const MILLISECONDS_MASK: u32 = 0x0FFF_FFFF;
 
 /// The identifier of TIME in the pre-defined connection set.
-pub const TIME_ID: Id = Id::canopen(0x100, 0);
+pub const TIME_ID: Id = Id::canopen(function_code::TIME, 0);
 
 /// A time of day (TIME_OF_DAY of CiA 301, 7.1.6.5) in UTC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -4,12 +4,10 @@ use super::{Axis, CommandPdo, Exchange};
 use crate::bit_fields::{FieldTargets, LifeWish};
 use crate::cia402::{DriveState, controlword};
 use crate::frame::{Frame, Id};
+use crate::function_code;
 use crate::pdo::CommandSlot;
 use crate::watch::{NmtState, nmt_command, node_state};
 
-/// Function codes of an SDO request and of its answer (CiA 301, 7.3.3).
-const SDO_REQUEST: u16 = 0x600;
-const SDO_ANSWER: u16 = 0x580;
 /// Download of two bytes in one frame, and its confirmation (CiA 301, 7.2.4.3.3).
 const DOWNLOAD: u8 = 0x2B;
 const DOWNLOADED: u8 = 0x60;
@@ -41,7 +39,7 @@ pub(super) enum SdoFallback {
         word: u16,
         /// Slots until it is written, or written again.
         wait_slots: u32,
-        /// Whether the node has just been sent to pre-operational, where it has an SDO server.
+        /// True if the node has just been sent to pre-operational, where it has an SDO server.
         is_woken: bool,
     },
     /// The drive has confirmed the controlword.
@@ -91,13 +89,13 @@ impl SdoFallback {
         let [command, index_low, index_high, subindex] = controlword_of(node_axis, DOWNLOAD);
         let [low, high] = word.to_le_bytes();
         let request = [command, index_low, index_high, subindex, low, high, 0, 0];
-        Some(Frame::of(Id::canopen(SDO_REQUEST, node), request))
+        Some(Frame::of(Id::canopen(function_code::SDO_REQUEST, node), request))
     }
 
     /// Takes a frame that may be the confirmation. Returns the controlword that it confirms.
     fn receive(&mut self, from: Address, frame: &Frame) -> Option<u16> {
         let Self::Writing { word, .. } = *self else { return None };
-        let is_confirmed = frame.id() == Id::canopen(SDO_ANSWER, from.node)
+        let is_confirmed = frame.id() == Id::canopen(function_code::SDO_RESPONSE, from.node)
             && frame.payload().starts_with(&controlword_of(from.node_axis, DOWNLOADED));
         if !is_confirmed {
             return None;
@@ -106,12 +104,12 @@ impl SdoFallback {
         Some(word)
     }
 
-    /// Whether the node may still be about to answer: so many slots are left until the controlword is written again.
+    /// Returns `true` if the node may still be about to answer: so many slots are left until the controlword is written again.
     fn is_asked(self, left_slots: u32) -> bool {
         matches!(self, Self::Writing { wait_slots, .. } if wait_slots > left_slots)
     }
 
-    /// Whether the drive has confirmed that its power is to be off.
+    /// Returns `true` if the drive has confirmed that its power is to be off.
     fn is_switched_off(self) -> bool {
         self == Self::Confirmed { word: controlword::DISABLE_VOLTAGE }
     }
@@ -129,7 +127,7 @@ impl Axis {
         self.node_monitor.note_pdo_reachability(self.reception.age_cycles());
     }
 
-    /// Whether the node takes no process data any more: its NMT state is another one than operational, and its feedback stays
+    /// Returns `true` if the node takes no process data any more: its NMT state is another one than operational, and its feedback stays
     /// away. That remains so until the node is watched anew.
     pub fn is_pdo_unreachable(&self) -> bool {
         self.node_monitor.is_pdo_unreachable()
@@ -181,7 +179,7 @@ impl Axis {
         }
     }
 
-    /// Whether the node may still be about to answer such a frame, of which so many slots are left until it is sent again.
+    /// Returns `true` if the node may still be about to answer such a frame, of which so many slots are left until it is sent again.
     pub fn is_asked_by_service(&self, left_slots: u32) -> bool {
         self.sdo_fallback.is_asked(left_slots)
     }
@@ -190,17 +188,17 @@ impl Axis {
         Address { node: self.parameters.node, node_axis: self.parameters.node_axis }
     }
 
-    /// Whether the drive has torque, as far as it can be known: an SDO confirmation is newer than the last statusword.
+    /// Returns `true` if the drive has torque, as far as it can be known: an SDO confirmation is newer than the last statusword.
     pub fn has_torque(&self) -> bool {
         self.may_have_torque() && !self.has_confirmed_by_service()
     }
 
-    /// Whether the drive has confirmed by SDO that its power is to be off.
+    /// Returns `true` if the drive has confirmed by SDO that its power is to be off.
     pub(super) fn has_confirmed_by_service(&self) -> bool {
         self.sdo_fallback.is_switched_off()
     }
 
-    /// Whether the drive has torque by its last report, or may have got it since: what a drive of bit fields was told is newer than its
+    /// Returns `true` if the drive has torque by its last report, or may have got it since: what a drive of bit fields was told is newer than its
     /// last reply, and one that is spoken to outside of the cycle is being enabled or disabled for a long time.
     pub fn may_have_torque(&self) -> bool {
         let state = self.drive_state();
@@ -228,7 +226,7 @@ mod tests {
     const NODE: Address = Address { node: 5, node_axis: 1 };
 
     fn confirmation() -> Frame {
-        Frame::of(Id::canopen(SDO_ANSWER, NODE.node), [0x60, 0x40, 0x60, 0, 0, 0, 0, 0])
+        Frame::of(Id::canopen(function_code::SDO_RESPONSE, NODE.node), [0x60, 0x40, 0x60, 0, 0, 0, 0, 0])
     }
 
     #[test]
@@ -261,7 +259,8 @@ mod tests {
         assert_eq!(frame.payload()[..4], [0x2B, 0x40, 0x68, 0]);
         fallback.receive(second, &confirmation());
         assert!(!fallback.is_switched_off(), "that was the first axis");
-        let confirmation = Frame::of(Id::canopen(SDO_ANSWER, NODE.node), [0x60, 0x40, 0x68, 0, 0, 0, 0, 0]);
+        let confirmation =
+            Frame::of(Id::canopen(function_code::SDO_RESPONSE, NODE.node), [0x60, 0x40, 0x68, 0, 0, 0, 0, 0]);
         fallback.receive(second, &confirmation);
         assert!(fallback.is_switched_off());
     }

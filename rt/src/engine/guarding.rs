@@ -11,10 +11,9 @@ use super::Engine;
 use super::parameters::EngineParameters;
 use crate::axis::{Axis, Supervision};
 use crate::frame::{Frame, Id};
+use crate::function_code;
 use crate::watch::node_state;
 
-/// Function code of error control.
-const ERROR_CONTROL: u16 = 0x700;
 /// The bit of a reply that changes from one to the next.
 const TOGGLE: u8 = 0x80;
 
@@ -98,10 +97,10 @@ impl<const AXES: usize> NodeGuards<AXES> {
             Exchange::Answered { toggle } => Exchange::Asked { before: Some(toggle) },
         };
         // The reply has one byte.
-        Frame::remote(Id::canopen(ERROR_CONTROL, guard.node), 1).ok()
+        Frame::remote(Id::canopen(function_code::ERROR_CONTROL, guard.node), 1).ok()
     }
 
-    /// Whether an error control message of a node counts: the reply of a node that is asked must have toggled its bit.
+    /// Returns `true` if an error control message of a node counts: the reply of a node that is asked must have toggled its bit.
     pub(super) fn accepts(&mut self, bus: u8, node: u8, message: u8) -> bool {
         let Some(guard) = self.of(bus, node) else { return true };
         if message == node_state::BOOT_UP {
@@ -125,7 +124,7 @@ impl<const AXES: usize> NodeGuards<AXES> {
         self.nodes.iter_mut().find(|guard| (guard.bus, guard.node) == (bus, node))
     }
 
-    /// Whether a node is not asked at all, or has replied: then it watches the controller.
+    /// Returns `true` if a node is not asked at all, or has replied: then it watches the controller.
     pub(super) fn allows_enabling(&self, bus: u8, node: u8) -> bool {
         let guard = self.nodes.iter().find(|guard| (guard.bus, guard.node) == (bus, node));
         let has_replied = |guard: &NodeGuard| {

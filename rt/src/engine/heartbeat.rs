@@ -4,6 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::parameters::{BusParameters, Heartbeat};
 use crate::frame::{Frame, Id};
+use crate::function_code;
 
 /// Cycles of the slowest bus for which the heartbeat waits after the controller was away for more than its period.
 /// A drive that has stopped for want of it may go on to its old target once the heartbeat is back: until then its report
@@ -63,7 +64,7 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
         }
     }
 
-    /// Whether enough heartbeats have left on a bus, or leave with this cycle, for its drives to be enabled.
+    /// Returns `true` if enough heartbeats have left on a bus, or leave with this cycle, for its drives to be enabled.
     pub(super) fn allows_enabling(&self, bus: usize) -> bool {
         self.buses.get(bus).copied().flatten().is_none_or(|bus| bus.awaited <= u32::from(bus.due == 0))
     }
@@ -86,6 +87,6 @@ impl<const BUSES: usize> HeartbeatProducer<BUSES> {
         } else {
             self.heartbeat.cycles
         };
-        Some(Frame::of(Id::canopen(0x700, self.heartbeat.node), [NMT_OPERATIONAL]))
+        Some(Frame::of(Id::canopen(function_code::ERROR_CONTROL, self.heartbeat.node), [NMT_OPERATIONAL]))
     }
 }

@@ -8,6 +8,7 @@ use crate::bit_fields::FieldDriveParameters;
 use crate::bit_set::BitSet;
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::{FrameFormat, Id};
+use crate::function_code;
 use crate::record::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::stop::StopCategories;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
@@ -484,12 +485,12 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
     for ((number, bus), table) in (0..).zip(&parameters.buses).zip(&mut dispatch) {
         let Some(CanopenNetwork { sync_id }) = bus.canopen else { continue };
         for (_, node) in nodes.iter().filter(|(of, _)| *of == number) {
-            table.foreign(Id::canopen(SDO_REQUEST, *node), FrameFormat::Classic);
+            table.foreign(Id::canopen(function_code::SDO_REQUEST, *node), FrameFormat::Classic);
         }
         table.foreign(NMT, FrameFormat::Classic);
         table.foreign(sync_id, FrameFormat::Classic);
         if let Some(heartbeat) = parameters.heartbeat {
-            table.foreign(Id::canopen(0x700, heartbeat.node), FrameFormat::Classic);
+            table.foreign(Id::canopen(function_code::ERROR_CONTROL, heartbeat.node), FrameFormat::Classic);
         }
     }
     Ok(dispatch)
@@ -497,8 +498,8 @@ pub(super) fn dispatch_of<const AXES: usize, const BUSES: usize>(
 
 /// What a CANopen node sends beside process data.
 fn enter_services(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
-    table.emergency(Id::canopen(0x080, own.node), place)?;
-    table.error_control(Id::canopen(0x700, own.node), place)
+    table.emergency(Id::canopen(function_code::EMERGENCY, own.node), place)?;
+    table.error_control(Id::canopen(function_code::ERROR_CONTROL, own.node), place)
 }
 
 fn enter_process_data(table: &mut Dispatch, place: u8, own: &AxisParameters) -> Result<(), IdTaken> {
@@ -522,6 +523,4 @@ fn enter_process_data(table: &mut Dispatch, place: u8, own: &AxisParameters) -> 
     }
 }
 
-const NMT: Id = Id::canopen(0x000, 0);
-/// The function code of SDO requests (CiA 301, 7.3.3).
-pub(super) const SDO_REQUEST: u16 = 0x600;
+const NMT: Id = Id::canopen(function_code::NMT, 0);

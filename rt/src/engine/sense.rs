@@ -1,13 +1,13 @@
 //! What the cycle begins with: the slot, the frames that have arrived, and what the drives report by them.
 
 use super::group::Group;
-use super::parameters::SDO_REQUEST;
 use super::state::GroupState;
 use super::{CycleInput, Deadline, Engine};
 use crate::axis::{Axis, FeedbackSince};
 use crate::bit_set::BitSet;
 use crate::dispatch::Destination;
 use crate::frame::{Frame, Id};
+use crate::function_code;
 use crate::host::HostInterface;
 use crate::port::Received;
 use crate::record::{Event, EventKind};
@@ -91,12 +91,13 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.axes_of(bus.into()).filter(move |axis| axis.parameters().node == node)
     }
 
-    /// Whether a frame asks a node for the value of an object, which changes nothing.
+    /// Returns `true` if a frame asks a node for the value of an object, which changes nothing.
     fn is_read_request(&mut self, bus: usize, frame: &Frame) -> bool {
         if !self.shared.is_canopen(bus) || is_sdo_download(frame) {
             return false;
         }
-        self.axes_of(bus).any(|axis| frame.id() == Id::canopen(SDO_REQUEST, axis.parameters().node))
+        self.axes_of(bus)
+            .any(|axis| frame.id() == Id::canopen(function_code::SDO_REQUEST, axis.parameters().node))
     }
 
     /// Takes what another master has told the nodes of a bus.
@@ -203,7 +204,7 @@ fn group_at<const AXES: usize, const BUSES: usize>(
     groups.iter().find(|group| group.places.contains(place)).map(|group| group.number)
 }
 
-/// Whether an SDO request writes (CiA 301, 7.2.4.3): client command specifier 0 and 1 (download), 6 (block download).
+/// Returns `true` if an SDO request writes (CiA 301, 7.2.4.3): client command specifier 0 and 1 (download), 6 (block download).
 fn is_sdo_download(frame: &Frame) -> bool {
     frame.payload().first().is_some_and(|byte| matches!(byte >> 5, 0 | 1 | 6))
 }
