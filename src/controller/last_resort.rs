@@ -3,6 +3,7 @@
 //!
 //! What it tells is what was sent. Nobody is left to see what the drives make of it.
 
+use std::collections::BTreeSet;
 use std::io;
 
 use socketcan::{CanFrame, CanInterface, CanSocket, Frame, Socket, SocketOptions};
@@ -18,7 +19,7 @@ pub(super) struct LastResort {
 
 struct Bus {
     name: String,
-    nodes: Vec<u8>,
+    nodes: BTreeSet<u8>,
     way: Way,
 }
 
@@ -39,8 +40,7 @@ impl LastResort {
     pub(super) fn prepare(config: &Config) -> Self {
         let buses = config.buses.iter().enumerate().map(|(index, bus)| {
             let of_bus = config.axes.iter().filter(|axis| axis.bus == index);
-            let mut nodes: Vec<u8> = of_bus.map(|axis| axis.node).collect();
-            nodes.dedup();
+            let nodes: BTreeSet<u8> = of_bus.map(|axis| axis.node).collect();
             let way = match &bus.interface {
                 Interface::Simulated => Way::Simulated,
                 Interface::SocketCan(name) if is_canopen(config, index) => {
@@ -67,7 +67,9 @@ impl Bus {
             Way::Simulated => return format!("the drives of {name} are simulated"),
             Way::None => return format!("the drives of {name} cannot be reached beside the loop"),
         };
-        let not_sent = match self.send_stops(socket) {
+        // An interface that was removed and is there again is not that of the socket.
+        let sent = self.send_stops(socket).or_else(|_| self.send_stops(&sending_socket(interface)));
+        let not_sent = match sent {
             Ok(()) => return format!("NMT stop was sent to the drives of {name}"),
             Err(error) => error,
         };
