@@ -6,6 +6,8 @@ pub mod assemble;
 mod buses;
 mod handle;
 #[cfg(target_os = "linux")]
+mod interfaces;
+#[cfg(target_os = "linux")]
 mod last_resort;
 mod lines;
 mod off_cycle;

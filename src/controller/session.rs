@@ -11,6 +11,7 @@ use takt_rt::{Clock, Request, SlotPlan, Snapshot, StopCategory};
 use tracing::{info, warn};
 
 use super::assemble::{self, AssembleError};
+use super::interfaces::Interfaces;
 use super::last_resort::LastResort;
 use super::lines::Lines;
 use super::outcome::{Interrupt, Outcome, Progress};
@@ -213,7 +214,7 @@ fn lead_as_owner(
     notify: Box<dyn FnMut(&Notice) + Send>,
     mut watch: impl FnMut(&Snapshot, Progress) -> Option<Interrupt>,
     remote: Option<Remote>,
-    mut ownership: Ownership,
+    ownership: Ownership,
 ) -> Result<Session, SessionError> {
     let mut clock = MonotonicClock::default();
     let engine = assemble::engine(config)?;
@@ -222,7 +223,9 @@ fn lead_as_owner(
     let has_black_box = config.telemetry.black_box_ns.is_some();
     let is_traced =
         is_recorded || has_black_box || options.frames.is_some() || config.telemetry.is_candump_written;
-    let (ports, traces) = open_ports(config, &lines, options.fault_injector.as_deref(), is_traced)?;
+    let mut interfaces = Interfaces::of(ownership);
+    let (ports, traces) =
+        open_ports(config, &lines, options.fault_injector.as_deref(), is_traced, &mut interfaces)?;
     let (mut rt, mut host, log) = channels(&ChannelSizes::of(config));
     let (clock_answers, journal) = match is_recorded || has_black_box {
         true => {
@@ -315,7 +318,8 @@ fn lead_as_owner(
         if let Some(fault_injector) = &options.fault_injector {
             fault_injector.observe(&host.snapshot());
         }
-        if let Some(process) = ownership.poll_release_request() {
+        interfaces.attach_removed(now_ns);
+        if let Some(process) = interfaces.poll_release_request() {
             taken_over_by = Some(process);
             supervisor.interrupt(Interrupt::Controlled);
         }
@@ -348,7 +352,7 @@ fn lead_as_owner(
     let ended = if stalled.is_none() { running.join() } else { None };
     supervisor.close_lines();
     // The ports are closed with the thread. What is left to be done here does not concern the buses.
-    drop(ownership);
+    drop(interfaces);
     let broken = match (stalled, &ended) {
         (Some(Stalled { after, told }), _) => {
             logger.incident(Incident::Stalled);
@@ -395,6 +399,7 @@ fn open_ports(
     lines: &Lines,
     fault_injector: Option<&FaultInjector>,
     is_traced: bool,
+    interfaces: &mut Interfaces,
 ) -> Result<(Vec<Port>, Vec<Trace>), OpenError> {
     let mut ports = Vec::with_capacity(config.buses.len());
     let mut traces = Vec::new();
@@ -403,6 +408,7 @@ fn open_ports(
             Some(line) => Port::Line(Box::new(line)),
             None => Port::open(config, index)?,
         };
+        interfaces.keep_attached(config, index, &port);
         let (name, interface, bit_rate) = (bus.name.as_str(), bus.interface.to_string(), bus.bit_rate);
         info!(target: "takt::bus", bus = name, interface, bit_rate, "{name}: opened on {interface}");
         let port = match fault_injector {

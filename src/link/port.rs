@@ -1,7 +1,7 @@
 //! The port of a real interface, of any kind.
 
 use arrayvec::ArrayVec;
-use takt_rt::linux::{SlcanPort, SocketCanPort, TransparentPort};
+use takt_rt::linux::{Attachment, SlcanPort, SocketCanPort, TransparentPort};
 use takt_rt::{BusHealth, BusPort, Frame, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 #[cfg(feature = "cli")]
@@ -16,6 +16,16 @@ pub enum LinkPort {
     Slcan(Box<SlcanPort>),
     /// A transparent converter between RS-485 and CAN FD on a serial line.
     Converter(Box<TransparentPort>),
+}
+
+impl LinkPort {
+    /// Returns what binds it to its interface anew; `None` for an adapter on a serial line.
+    pub fn attachment(&self) -> Option<Attachment> {
+        match self {
+            Self::SocketCan(port) => port.attachment().ok(),
+            Self::Slcan(_) | Self::Converter(_) => None,
+        }
+    }
 }
 
 #[cfg(feature = "cli")]

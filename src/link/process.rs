@@ -11,6 +11,13 @@ pub struct Process {
     pub user: u32,
 }
 
+impl Process {
+    /// Returns `true` for the calling process.
+    pub(super) fn is_this(&self) -> bool {
+        u32::try_from(self.pid) == Ok(std::process::id())
+    }
+}
+
 impl fmt::Display for Process {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.pid {

@@ -1,6 +1,9 @@
 //! An interface that other programs of this machine can open, too: every one but a simulated bus.
 
 use std::fmt;
+use std::io;
+
+use takt_rt::linux::Attachment;
 
 use super::converter::open_converter;
 use super::interface::{InterfaceSettings, interface_index, prepare_interface};
@@ -8,7 +11,7 @@ use super::open::OpenError;
 use super::port::LinkPort;
 use super::serial_line::device_number;
 use super::slcan::open_slcan;
-use super::socketcan::{SocketCanOptions, open_socketcan};
+use super::socketcan::{SocketCanError, SocketCanOptions, open_socketcan};
 use crate::config::{CanLine, Interface, SerialDevice};
 
 /// An interface of this machine.
@@ -92,6 +95,19 @@ impl RealInterface {
             },
             Self::Serial(_) => Err(OpenError::NotCan { bus: bus.to_owned(), interface: self.to_string() }),
         }
+    }
+
+    /// Binds the port of a removed interface to the one that has its name now, which is prepared.
+    pub(crate) fn attach(&self, bus: &str, attachment: &Attachment) -> Result<(), OpenError> {
+        let Self::SocketCan(name) = self else { return Ok(()) };
+        let index =
+            interface_index(name).map_err(|error| OpenError::Interface { bus: bus.to_owned(), error })?;
+        let bound = i32::try_from(index).map_err(|_| libc::ENODEV).and_then(|index| attachment.renew(index));
+        bound.map_err(|errno| {
+            let error = io::Error::from_raw_os_error(errno);
+            let error = SocketCanError { interface: name.clone(), action: "binding the socket anew", error };
+            OpenError::Socket { bus: bus.to_owned(), error }
+        })
     }
 
     /// Whether it carries CAN frames, by which another master can be recognised.

@@ -1,16 +1,16 @@
 //! The SocketCAN port on a kernel's own interfaces. Needs root and vcan: `tests/vm/all` runs this in an emulated
 //! machine, `tests/vm/all --host` on this one.
 
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use takt::Port;
 use takt::config::{Config, Interface};
 use takt::internals::link::{
     InterfaceSettings, SocketCanOptions, interface_status, open_socketcan, prepare_interface,
 };
 use takt::link::InterfaceError;
+use takt::{Controller, Outcome, Phase, Port, RunningController, SessionOptions, Snapshot};
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
 use takt_rt::{BusPort, BusState, Clock, Frame, Id, Outgoing, ReceiveBatch, Received};
 
@@ -237,7 +237,7 @@ fn an_interface_that_goes_down_is_a_state_and_comes_back() {
 
 #[test]
 #[ignore = "needs root and a kernel with vcan: tests/vm/all"]
-fn an_interface_that_is_removed_is_down_for_good() {
+fn an_interface_that_is_removed_is_down() {
     let bus = VirtualCan::new("takt-gone");
     let mut port = bus.port(&[]);
     assert_eq!(port.send(0, &[frame(1)]), 1);
@@ -246,6 +246,112 @@ fn an_interface_that_is_removed_is_down_for_good() {
     assert_eq!(port.health().state, BusState::Down);
     assert_eq!(port.send(0, &[frame(2)]), 0);
     assert_eq!((port.health().state, port.unconfirmed(0)), (BusState::Down, 0));
+}
+
+#[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
+fn a_port_finds_the_interface_that_takes_the_place_of_a_removed_one() {
+    let bus = VirtualCan::new("takt-anew");
+    let mut port = bus.port(&[id(1), id(2)]);
+    let attachment = port.attachment().unwrap();
+    assert!(!attachment.is_removed());
+    drop(bus);
+    frames(&mut port);
+    assert!(attachment.is_removed());
+    assert_eq!(attachment.renew(i32::MAX), Err(libc::ENODEV));
+
+    let bus = VirtualCan::new("takt-anew");
+    let mut other = bus.port(&[]);
+    assert_eq!((port.send(0, &[frame(1)]), port.health().state), (0, BusState::Down));
+    attachment.renew(interface_index(bus.0)).unwrap();
+    assert!(!attachment.is_removed());
+    other.send(0, &[frame(2), frame(3)]);
+    assert_eq!(frames(&mut port), [frame(2)], "the filters are those of before");
+    // Not the index that the port began with.
+    let beside = VirtualCan::new("takt-beside");
+    let mut third = beside.port(&[]);
+    port.unconfirmed(0);
+    let sent: &[Frame] = &[frame(1)];
+    let mut taken = [0; 2];
+    let [first, second] = &mut taken;
+    SocketCanPort::send_together(
+        0,
+        &mut [
+            Outgoing { port: &mut port, frames: sent, taken: first },
+            Outgoing { port: &mut third, frames: sent, taken: second },
+        ],
+    );
+    assert_eq!(taken, [1, 1]);
+    assert_eq!(
+        (frames(&mut port), port.unconfirmed(0), port.health().state),
+        (vec![], 0, BusState::ErrorActive)
+    );
+    assert_eq!(frames(&mut other).last(), Some(&frame(1)));
+}
+
+fn interface_index(name: &str) -> i32 {
+    std::fs::read_to_string(format!("/sys/class/net/{name}/ifindex")).unwrap().trim().parse().unwrap()
+}
+
+/// The drive of configs/single-erob.toml, simulated by a program of its own.
+struct Drive(Child);
+
+impl Drive {
+    fn on(bus: &VirtualCan) -> Self {
+        // A drive is not kept waiting by programs.
+        let mut program = Command::new("chrt");
+        program.args([
+            "--fifo",
+            "70",
+            env!("CARGO_BIN_EXE_takt"),
+            "sim",
+            SINGLE,
+            "--bus",
+            &format!("can={}", bus.0),
+        ]);
+        Self(program.stderr(Stdio::null()).spawn().unwrap())
+    }
+}
+
+impl Drop for Drive {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+const SINGLE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/configs/single-erob.toml");
+
+#[test]
+#[ignore = "needs root and a kernel with vcan: tests/vm/all"]
+fn a_drive_recovers_and_moves_when_its_adapter_was_plugged_in_again() {
+    const PATIENCE: Duration = Duration::from_secs(30);
+    let bus = VirtualCan::new("takt-again");
+    let drive = Drive::on(&bus);
+    let mut config = Config::load(SINGLE.as_ref()).unwrap();
+    config.override_interface("can", bus.0).unwrap();
+    // The emulated machine is too slow for 1 ms.
+    (config.cycle.period_ns, config.simulation.longest_gap_ns) = (10_000_000, 20_000_000);
+    config.axes[0].missed_feedback_cycles = 50;
+    let arm = Controller::start(config, SessionOptions::default()).unwrap();
+    let moves_to = |target| {
+        let motion = arm.move_to(&[target]).unwrap();
+        assert_eq!(arm.wait(motion, PATIENCE), Ok(()));
+        let is_there = |state: &Snapshot| (state.axes()[0].position - target).abs() < 0.01;
+        arm.wait_until_seen(PATIENCE, &mut |state| is_there(state)).unwrap();
+    };
+    moves_to(0.2);
+    drop((drive, bus));
+    arm.wait_until_seen(PATIENCE, &mut |state| state.groups()[0].phase == Phase::Disabled).unwrap();
+    assert_eq!(arm.state().buses()[0].state, BusState::Down);
+    assert!(arm.fault().is_some());
+
+    let bus = VirtualCan::new("takt-again");
+    let _drive = Drive::on(&bus);
+    arm.wait_until_seen(PATIENCE, &mut |state| state.buses()[0].state == BusState::ErrorActive).unwrap();
+    arm.recover(PATIENCE).unwrap();
+    moves_to(0.4);
+    assert_eq!(arm.finish().unwrap().outcome, Outcome::Finished);
 }
 
 #[test]

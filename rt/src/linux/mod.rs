@@ -22,7 +22,7 @@ mod step;
 mod thread;
 mod wire_time;
 
-pub use can::{DescriptorError, SocketCanPort};
+pub use can::{Attachment, DescriptorError, SocketCanPort};
 pub use can_line::{Arrival, LineCodec, LinePort, SlcanCodec, SlcanPort, TransparentCodec, TransparentPort};
 pub use clock::MonotonicClock;
 pub use kernel::{is_preempt_rt, is_preempt_rt_version};

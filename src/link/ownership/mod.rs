@@ -172,6 +172,21 @@ impl Ownership {
         }
     }
 
+    /// Takes the lock of an interface that has taken the place of a claimed one, and prepares it.
+    ///
+    /// # Errors
+    /// See [`ClaimError`].
+    pub fn claim_successor(&mut self, claim: &BusClaim) -> Result<(), ClaimError> {
+        let name = claim.interface.lock_name(&claim.bus)?;
+        match take(Role::Master, &name, &claim.bus, &claim.interface, IfOwned::Refuse) {
+            Ok(lock) => self.locks.push(lock),
+            Err(ClaimError::Held { holder, .. }) if holder.is_this() => {}
+            Err(error) => return Err(error),
+        }
+        claim.interface.prepare(&claim.bus, &claim.settings)?;
+        Ok(())
+    }
+
     /// With these locks, whatever they are of.
     #[cfg(test)]
     pub(crate) const fn of_locks(locks: Vec<InterfaceLock>) -> Self {

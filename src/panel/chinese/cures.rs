@@ -52,8 +52,8 @@ pub const PHRASES: &[ChinesePhrase] = &[
         "检查短路、终端电阻和波特率；总线恢复后清除故障",
     ),
     (
-        "set the interface up and bring the drives up again; where it was removed, as with an adapter that was unplugged, end this run and start another one",
-        "启用接口并重新启动驱动器；若接口已被移除（如适配器被拔出），请结束本次运行并重新开始",
+        "set the interface up, or plug the adapter in again, and bring the drives up again; an adapter on a serial line needs another run",
+        "启用接口或重新插上适配器，然后重新启动驱动器；若适配器接在串行线路上，请重新开始运行",
     ),
     (
         "the bus is blocked by other frames or errors; look at its load and its cable",

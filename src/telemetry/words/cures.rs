@@ -37,7 +37,7 @@ pub(super) const fn cure(fault: &Fault) -> &'static str {
             "look for a short circuit, the termination and the bit rate; clear the fault when the bus works again"
         }
         Fault::BusDown => {
-            "set the interface up and bring the drives up again; where it was removed, as with an adapter that was unplugged, end this run and start another one"
+            "set the interface up, or plug the adapter in again, and bring the drives up again; an adapter on a serial line needs another run"
         }
         Fault::NotTransmitted { .. } => {
             "the bus is blocked by other frames or errors; look at its load and its cable"

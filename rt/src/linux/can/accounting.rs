@@ -22,7 +22,7 @@ pub(super) struct TxRxAccounting {
     /// Frames that the kernel took and that have not come back from the wire. The kernel does not mark those that another socket of
     /// this process sent as our own when they come back: they are recognised by their content.
     in_flight: InFlight,
-    /// Whether a frame was still unconfirmed when the socket was last read empty.
+    /// True if a frame was still unconfirmed when the socket was last read empty.
     is_behind: bool,
     /// The overflow counter of the socket at its last reading.
     lost: u32,
@@ -55,6 +55,11 @@ impl TxRxAccounting {
         BusHealth { busy_ns: self.wire_time.busy_ns(), ..self.health }
     }
 
+    /// Returns `true` if the interface does not send.
+    pub(super) fn is_down(&self) -> bool {
+        self.health.state == BusState::Down
+    }
+
     /// How many own frames have not come back from the wire.
     pub(super) fn unconfirmed(&self) -> usize {
         self.in_flight.count()
@@ -67,7 +72,7 @@ impl TxRxAccounting {
         self.is_behind = self.unconfirmed() > 0;
     }
 
-    /// Whether own frames still waited for the wire when the socket was last read empty.
+    /// Returns `true` if own frames still waited for the wire when the socket was last read empty.
     pub(super) const fn is_behind(&self) -> bool {
         self.is_behind
     }
@@ -95,7 +100,7 @@ impl TxRxAccounting {
                 _ => self.in_flight.add(*frame, sender),
             }
         }
-        if self.health.state == BusState::Down && !frames.is_empty() {
+        if self.is_down() && !frames.is_empty() {
             self.health.state = BusState::ErrorActive;
         }
     }

@@ -21,8 +21,9 @@ impl BusPort for SocketCanPort {
     }
 
     fn unconfirmed(&mut self, _now_ns: Nanoseconds) -> usize {
-        // An interface that is being taken down drops frames. Those never come back.
-        if self.accounting.unconfirmed() > 0 && self.link.is_lost() {
+        // An interface that is being taken down drops frames. Those never come back. One that is down may be another one by now.
+        let is_doubtful = self.accounting.unconfirmed() > 0 || self.accounting.is_down();
+        if is_doubtful && self.link.is_lost() {
             self.accounting.link_lost();
         }
         self.accounting.unconfirmed()

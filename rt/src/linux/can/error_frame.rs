@@ -7,11 +7,11 @@ use crate::port::BusState;
 pub(super) struct Report {
     /// The state that the controller has entered; `None` if the frame does not say.
     pub(super) state: Option<BusState>,
-    /// Whether the driver has dropped the frames that it still had to send. It does so at bus-off and at the restart.
+    /// True if the driver has dropped the frames that it still had to send. It does so at bus-off and at the restart.
     pub(super) has_dropped_transmissions: bool,
-    /// Whether this is an error. A controller that recovers sends a report too, which is not an error.
+    /// True if this is an error. A controller that recovers sends a report too, which is not an error.
     pub(super) is_error: bool,
-    /// Whether the controller has lost a received frame.
+    /// True if the controller has lost a received frame.
     pub(super) has_lost_received: bool,
 }
 

@@ -2,7 +2,7 @@
 //!
 //! While an interface is taken down, the kernel takes frames and silently drops them for some milliseconds. Only then the socket
 //! gets an error (`ENETDOWN`). The flags of the interface show it earlier: `IFF_RUNNING` is gone as soon as the queue is
-//! closed. An interface that is removed unbinds the socket.
+//! closed. An interface that is removed unbinds the socket; an [`Attachment`](super::Attachment) binds it anew.
 
 /// The interface that a socket is bound to.
 #[derive(Clone, Copy)]
@@ -36,13 +36,20 @@ impl Link {
         self.interface.map(|interface| interface.index)
     }
 
-    /// Whether the interface is down, going down or removed. An unknown interface counts as present.
-    pub(super) fn is_lost(&self) -> bool {
-        let Some(interface) = self.interface else { return false };
-        // This check comes first: for the name of a removed interface, the kernel would look for a module of that name.
-        if bound_interface(self.descriptor) == Some(0) {
-            return true;
-        }
+    /// Returns `true` if the interface is down, going down or removed. An unknown interface counts as present.
+    ///
+    /// The socket may have been bound to another interface since the last call.
+    pub(super) fn is_lost(&mut self) -> bool {
+        let Some(known) = self.interface else { return false };
+        let interface = match bound_interface(self.descriptor) {
+            // This check comes first: for the name of a removed interface, the kernel would look for a module of that name.
+            Some(0) => return true,
+            Some(index) if index != known.index => {
+                *self = Self::of(self.descriptor);
+                self.interface.unwrap_or(known)
+            }
+            _ => known,
+        };
         let mut request = libc::ifreq { ifr_name: interface.name, ..NO_REQUEST };
         // SAFETY: the call reads the name from the request and writes the flags into it.
         let answered = unsafe { libc::ioctl(self.descriptor, libc::SIOCGIFFLAGS as _, &raw mut request) };
@@ -51,14 +58,14 @@ impl Link {
     }
 }
 
-/// Whether an interface with these flags sends the frames that it takes.
+/// Returns `true` if an interface with these flags sends the frames that it takes.
 const fn is_running(flags: libc::c_short) -> bool {
     let needed = libc::IFF_UP | libc::IFF_RUNNING;
     flags as libc::c_int & needed == needed
 }
 
 /// The index of the interface that a CAN socket is bound to; 0 for none, `None` for a socket that is not a CAN socket.
-fn bound_interface(descriptor: libc::c_int) -> Option<libc::c_int> {
+pub(super) fn bound_interface(descriptor: libc::c_int) -> Option<libc::c_int> {
     // SAFETY: it holds numbers only, for which zero is valid.
     let mut address: libc::sockaddr_can = unsafe { core::mem::zeroed() };
     let mut length = size_of::<libc::sockaddr_can>() as libc::socklen_t;

@@ -7,12 +7,14 @@
 //!   `arrival_time`: its time of arrival on the monotonic clock.
 //! - `accounting`: the counters and the state of the bus; `in_flight`: the own frames that have not come back;
 //!   `error_frame`: what the driver reports; `link`: whether the interface can send at all.
+//! - `attachment`: binds the socket anew when its interface was removed and is there again.
 //!
-//! No call here waits or allocates, except [`SocketCanPort::wait`], which waits on request.
+//! No call of the cycle waits or allocates. [`SocketCanPort::wait`] waits on request; [`Attachment`] is for another thread.
 
 mod accounting;
 mod arrival;
 mod arrival_time;
+mod attachment;
 mod batch;
 mod bus_port;
 mod error_frame;
@@ -23,4 +25,5 @@ mod reading;
 mod together;
 mod wire_format;
 
+pub use attachment::Attachment;
 pub use port::{DescriptorError, SocketCanPort};

@@ -3,6 +3,7 @@
 use super::super::clock::timespec_of;
 use super::super::errno;
 use super::accounting::TxRxAccounting;
+use super::attachment::Attachment;
 use super::batch::{self, Destination, SEND_BATCH, SocketSource};
 use super::link::Link;
 use crate::frame::Frame;
@@ -22,7 +23,7 @@ use crate::time::Nanoseconds;
 ///
 /// # State of the interface
 /// An interface that goes down is [`BusState::Down`] from the first frame that it has dropped. It comes back by itself. An interface
-/// that is removed (an adapter is unplugged) unbinds the socket for good: make a new port.
+/// that is removed (an adapter is unplugged) unbinds the socket; an [`Attachment`] binds it to the interface that takes its place.
 ///
 /// An error-passive controller is error-active when its driver says so. Some drivers do not: then it is, after 10,000 own frames and a
 /// received one without an error.
@@ -35,7 +36,7 @@ pub struct SocketCanPort {
     pub(super) link: Link,
     pub(super) source: SocketSource,
     pub(super) accounting: TxRxAccounting,
-    /// Whether the bus is set up for CAN FD frames.
+    /// True if the bus is set up for CAN FD frames.
     takes_fd: bool,
 }
 
@@ -56,6 +57,13 @@ impl core::fmt::Display for DescriptorError {
 
 impl core::error::Error for DescriptorError {}
 
+/// Duplicates a descriptor.
+pub(super) fn duplicate(descriptor: libc::c_int) -> Result<libc::c_int, DescriptorError> {
+    // SAFETY: the call takes numbers only, and refuses a number that is no descriptor.
+    let own = unsafe { libc::fcntl(descriptor, libc::F_DUPFD_CLOEXEC, 0) };
+    if own < 0 { Err(DescriptorError { descriptor, errno: errno() }) } else { Ok(own) }
+}
+
 impl SocketCanPort {
     /// Makes a port on the socket `descriptor`. The descriptor is duplicated: the caller keeps and closes its own.
     ///
@@ -66,11 +74,7 @@ impl SocketCanPort {
     /// # Errors
     /// [`DescriptorError`] where the descriptor is not an open one, or the process has no more descriptors.
     pub fn new(descriptor: i32, bit_rate: u32, data_bit_rate: Option<u32>) -> Result<Self, DescriptorError> {
-        // SAFETY: the call takes numbers only, and refuses a number that is no descriptor.
-        let own = unsafe { libc::fcntl(descriptor, libc::F_DUPFD_CLOEXEC, 0) };
-        if own < 0 {
-            return Err(DescriptorError { descriptor, errno: errno() });
-        }
+        let own = duplicate(descriptor)?;
         Ok(Self {
             descriptor: own,
             link: Link::of(own),
@@ -86,6 +90,14 @@ impl SocketCanPort {
     pub fn begun_in(mut self, state: BusState) -> Self {
         self.accounting.begin_in(state);
         self
+    }
+
+    /// Returns the attachment of the socket, by which another thread binds it to an interface anew.
+    ///
+    /// # Errors
+    /// [`DescriptorError`] where the process has no more descriptors.
+    pub fn attachment(&self) -> Result<Attachment, DescriptorError> {
+        Attachment::of(self.descriptor)
     }
 
     /// Waits until a message has arrived, but not longer than `timeout_ns`.
