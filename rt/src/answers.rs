@@ -67,7 +67,7 @@ impl Answers {
         }
     }
 
-    /// Whether a request was so long ago that nothing is known of it any more.
+    /// Returns `true` if a request was so long ago that nothing is known of it any more.
     pub fn have_forgotten(&self, id: RequestId) -> bool {
         self.newest > id && self.behind(id).is_none()
     }

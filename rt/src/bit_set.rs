@@ -31,7 +31,7 @@ impl BitSet {
         was_there
     }
 
-    /// Whether a number is in the set.
+    /// Returns `true` if a number is in the set.
     pub const fn contains(self, number: usize) -> bool {
         self.0 >> (number & 31) & 1 == 1
     }
@@ -52,7 +52,7 @@ impl BitSet {
         Self(self.0 | other.0)
     }
 
-    /// Whether no number is in the set.
+    /// Returns `true` if no number is in the set.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
@@ -72,7 +72,7 @@ impl BitSet {
         })
     }
 
-    /// Whether all of these numbers, at least one, are in another set too.
+    /// Returns `true` if all of these numbers, at least one, are in another set too.
     pub const fn is_within(self, other: Self) -> bool {
         self.0 != 0 && self.0 & !other.0 == 0
     }

@@ -86,12 +86,12 @@ impl DriveState {
         }
     }
 
-    /// Whether the drive's power stage drives the motor.
+    /// Returns `true` if the drive's power stage drives the motor.
     pub const fn has_torque(self) -> bool {
         matches!(self, Self::OperationEnabled | Self::QuickStopActive | Self::FaultReactionActive)
     }
 
-    /// Whether a fault is present or being reacted to.
+    /// Returns `true` if a fault is present or being reacted to.
     pub const fn is_faulted(self) -> bool {
         matches!(self, Self::Fault | Self::FaultReactionActive)
     }

@@ -118,12 +118,12 @@ impl Cia402Codec {
         }
     }
 
-    /// Whether the drive acknowledges set-points of profile position by bit 12 of the statusword.
+    /// Returns `true` if the drive acknowledges set-points of profile position by bit 12 of the statusword.
     pub const fn acknowledges_set_points(&self) -> bool {
         matches!(self.set_points, SetPointTransfer::Acknowledged)
     }
 
-    /// Whether the drive has a quick stop.
+    /// Returns `true` if the drive has a quick stop.
     pub const fn has_quick_stop(&self) -> bool {
         matches!(self.stop, StopCommand::QuickStop)
     }
@@ -136,7 +136,7 @@ impl Cia402Codec {
         }
     }
 
-    /// Whether a heartbeat with the NMT state "stopped" says that the node is stopped.
+    /// Returns `true` if a heartbeat with the NMT state "stopped" says that the node is stopped.
     pub const fn is_stopped_by_heartbeat(&self) -> bool {
         matches!(self.stopped_heartbeat, StoppedHeartbeat::Stopped)
     }

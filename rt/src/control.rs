@@ -169,12 +169,12 @@ impl ControlLaw {
         }
     }
 
-    /// Whether the drive makes its own way to a target, instead of following a set-point of every cycle.
+    /// Returns `true` if the drive makes its own way to a target, instead of following a set-point of every cycle.
     pub const fn is_profile(&self) -> bool {
         matches!(self, Self::ProfilePosition | Self::ProfileVelocity | Self::ProfileTorque)
     }
 
-    /// Whether it is for one of the cyclic synchronous modes: CSP, CSV or CST.
+    /// Returns `true` if it is for one of the cyclic synchronous modes: CSP, CSV or CST.
     pub const fn is_cyclic_synchronous(&self) -> bool {
         matches!(self, Self::Position | Self::Velocity { .. } | Self::Torque { .. })
     }

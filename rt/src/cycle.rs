@@ -59,7 +59,7 @@ impl SlotPlan {
     }
 }
 
-/// Whether the loop is to go on.
+/// What follows a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
     /// There is a next cycle.

@@ -44,7 +44,7 @@ impl Id {
         self.0 & EXTENDED_MASK
     }
 
-    /// Whether this is a 29-bit identifier.
+    /// Returns `true` if this is a 29-bit identifier.
     pub const fn is_extended(self) -> bool {
         self.0 & EXTENDED != 0
     }
@@ -237,7 +237,7 @@ impl Frame {
         self.kind
     }
 
-    /// Whether this is a CAN FD frame, with or without bit-rate switching.
+    /// Returns `true` if this is a CAN FD frame, with or without bit-rate switching.
     pub const fn is_fd(&self) -> bool {
         matches!(self.kind, FrameKind::Fd | FrameKind::FdBitRateSwitch)
     }

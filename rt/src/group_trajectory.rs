@@ -145,7 +145,7 @@ impl GroupTrajectory {
         })
     }
 
-    /// Whether the end has been reached.
+    /// Returns `true` if the end has been reached.
     pub fn is_finished(&self) -> bool {
         self.time_s >= self.duration_s
     }

@@ -239,7 +239,7 @@ pub struct AxisSnapshot {
     pub drive_state: cia402::DriveState,
     /// Object 603F or the code of the last emergency message.
     pub error_code: u16,
-    /// Whether the drive has reported since the controller became active.
+    /// True if the drive has reported since the controller became active.
     pub is_heard: bool,
     /// True if the drive has confirmed that it has no torque since it was told to have none: by a report that is not old, or by SDO.
     pub is_confirmed_off: bool,
@@ -255,7 +255,7 @@ pub struct AxisSnapshot {
 }
 
 impl AxisSnapshot {
-    /// Whether what the drive reports is not from its last cycle: it has not reported yet, or has left out a cycle.
+    /// Returns `true` if what the drive reports is not from its last cycle: it has not reported yet, or has left out a cycle.
     pub const fn is_stale(&self) -> bool {
         !self.is_heard || self.feedback_age > 0
     }

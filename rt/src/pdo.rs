@@ -53,7 +53,7 @@ impl MappedObject {
         Self { index: (value >> 16) as u16, subindex: (value >> 8) as u8, bits: value as u8 }
     }
 
-    /// Whether this is no object but a gap in a mapping: data types map as dummies (CiA 301, 7.4.7.1).
+    /// Returns `true` if this is no object but a gap in a mapping: data types map as dummies (CiA 301, 7.4.7.1).
     pub const fn is_dummy(self) -> bool {
         matches!(self.index, 0x0001..=0x001F)
     }
@@ -205,7 +205,7 @@ impl FeedbackSlots {
         Self(slots.into_iter().fold(0, |set, slot| set | 1 << (slot as u8 & 7)))
     }
 
-    /// Whether a number is in the set.
+    /// Returns `true` if a number is in the set.
     pub(crate) const fn contains(self, slot: FeedbackSlot) -> bool {
         self.0 >> slot as u8 & 1 == 1
     }
@@ -353,7 +353,7 @@ impl Mapping {
         Ok(Self { fields, bytes: (shift / 8) as u8 })
     }
 
-    /// Whether it carries a number to a drive, where it is a mapping of commands.
+    /// Returns `true` if it carries a number to a drive, where it is a mapping of commands.
     pub fn sends(&self, slot: CommandSlot) -> bool {
         self.fields.iter().any(|field| field.slot == slot as u8)
     }

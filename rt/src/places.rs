@@ -18,7 +18,7 @@ impl Places {
         self.first..self.end
     }
 
-    /// Whether this is one of them.
+    /// Returns `true` if this is one of them.
     pub const fn contains(self, place: usize) -> bool {
         self.first <= place && place < self.end
     }

@@ -106,7 +106,7 @@ impl ProfileCommand {
         if self.handshake == Handshake::Idle { 0 } else { 2 * STALE_CYCLES }
     }
 
-    /// Whether the drive has the target and says that it has reached it.
+    /// Returns `true` if the drive has the target and says that it has reached it.
     pub fn is_reached(&self, word: u16) -> bool {
         let is_shown = word & statusword::TARGET_REACHED != 0;
         self.handshake == Handshake::Idle && self.cycles >= STALE_CYCLES && is_shown

@@ -116,7 +116,7 @@ pub struct CycleRecord<const AXES: usize = MAX_AXES> {
     pub group_count: u8,
     /// Every group, in the order of the configuration.
     pub groups: [GroupRecord; MAX_GROUPS],
-    /// Whether set-points were sent in this cycle; if not, the drives hold the last ones.
+    /// True if set-points were sent in this cycle; if not, the drives hold the last ones.
     pub is_commanded: bool,
     /// How many of `axes` count.
     pub axis_count: u8,

@@ -159,7 +159,7 @@ pub enum ExecutionStart {
         trajectory: TrajectoryId,
         /// So many cycles of the present trajectory are carried out before.
         cycles: u64,
-        /// Whether it is the same motion, at another speed along its path. Otherwise it replaces that motion.
+        /// True if it is the same motion, at another speed along its path. Otherwise it replaces that motion.
         is_same_motion: bool,
     },
 }

@@ -141,9 +141,9 @@ pub struct StopReason {
 pub(crate) struct MergedStop {
     /// The reason and the category of both.
     pub(crate) reason: StopReason,
-    /// Whether the second one is the reason.
+    /// True if the second one is the reason.
     pub(crate) is_new_reason: bool,
-    /// Whether the second one asks for a harder category than the first one.
+    /// True if the second one asks for a harder category than the first one.
     pub(crate) is_harder: bool,
 }
 
@@ -168,7 +168,7 @@ impl StopReason {
         self.cause.rule()
     }
 
-    /// Whether the stop was asked for: then nothing has to be reset.
+    /// Returns `true` if the stop was asked for: then nothing has to be reset.
     pub const fn is_requested(&self) -> bool {
         matches!(self.cause, StopCause::Requested)
     }

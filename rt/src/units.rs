@@ -17,7 +17,7 @@ pub struct ScaleParameters {
     pub gear_ratio: f64,
     /// What the joint moves in one turn: 2π rad, or metres for a linear axis.
     pub travel_per_turn: f64,
-    /// Whether positive counts are negative travel.
+    /// True if positive counts are negative travel.
     pub reversed: bool,
     /// The count at which the joint's position is zero.
     pub zero_counts: f64,

@@ -156,7 +156,7 @@ pub struct NodeMonitor {
     silent_cycles: u32,
     error_control: ErrorControl,
     nmt_state: NmtState,
-    /// Whether the node has taken no process data at some time since it is watched.
+    /// True if the node has taken no process data at some time since it is watched.
     is_pdo_unreachable: bool,
 }
 
@@ -239,7 +239,7 @@ impl NodeMonitor {
             self.nmt_state != NmtState::Operational && feedback_age_cycles >= UNREACHABLE_CYCLES;
     }
 
-    /// Whether the node takes no process data any more. That remains so until the node is watched anew.
+    /// Returns `true` if the node takes no process data any more. That remains so until the node is watched anew.
     pub const fn is_pdo_unreachable(&self) -> bool {
         self.is_pdo_unreachable
     }
@@ -290,7 +290,7 @@ impl DuplicateNodeDetector {
         self.filled = self.filled.saturating_sub(1);
     }
 
-    /// Whether it has gone on for too long to be lateness.
+    /// Returns `true` if it has gone on for too long to be lateness.
     pub const fn is_found(&self) -> bool {
         self.filled >= DUPLICATE_LIMIT
     }

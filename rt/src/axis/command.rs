@@ -141,12 +141,12 @@ impl Axis {
         }
     }
 
-    /// Whether an enabling controlword may still be under way, whatever the drive shows.
+    /// Returns `true` if an enabling controlword may still be under way, whatever the drive shows.
     pub fn may_be_switching_on(&self) -> bool {
         self.controlwords.may_be_switching_on()
     }
 
-    /// Whether the drive has been told to leave operation enabled since it was told to go there, if it can be told so by process
+    /// Returns `true` if the drive has been told to leave operation enabled since it was told to go there, if it can be told so by process
     /// data.
     pub fn is_told_to_switch_off(&self) -> bool {
         self.controlwords.leads_away() || self.is_pdo_unreachable()

@@ -11,7 +11,7 @@ pub(super) struct ControlwordSender {
     last: u16,
     /// Cycles since it was sent, or sent again.
     age_cycles: u32,
-    /// Whether a PDO that is sent with controlwords only is due in this cycle.
+    /// True if a PDO that is sent with controlwords only is due in this cycle.
     is_due: bool,
     /// Cycles since a controlword that leads to operation enabled; `None` when the drive has shown torque since, or when
     /// there was none.
@@ -48,28 +48,28 @@ impl ControlwordSender {
         self.last
     }
 
-    /// Whether a PDO that is sent with controlwords only is due in this cycle.
+    /// Returns `true` if a PDO that is sent with controlwords only is due in this cycle.
     pub(super) const fn is_due(&self) -> bool {
         self.is_due
     }
 
-    /// Whether the next step towards operation enabled must wait, because the drive does not show how far it has come.
+    /// Returns `true` if the next step towards operation enabled must wait, because the drive does not show how far it has come.
     pub(super) const fn must_wait(&self, spacing_cycles: u32) -> bool {
         self.last != 0 && self.age_cycles < spacing_cycles
     }
 
-    /// Whether the drive has been disabled for so long that no older controlword is under way, and no older statusword.
+    /// Returns `true` if the drive has been disabled for so long that no older controlword is under way, and no older statusword.
     pub(super) const fn is_disabled_for_long(&self) -> bool {
         self.last == controlword::SHUTDOWN && self.age_cycles >= SETTLED_CYCLES
     }
 
-    /// Whether the last controlword leads away from operation enabled, or none has been sent. It is one that has left: late ones are
+    /// Returns `true` if the last controlword leads away from operation enabled, or none has been sent. It is one that has left: late ones are
     /// not made.
     pub(super) const fn leads_away(&self) -> bool {
         !matches!(self.last, controlword::SWITCH_ON | controlword::ENABLE_OPERATION)
     }
 
-    /// Whether a controlword that leads to operation enabled may still be on its way to the drive, or the drive's answer on
+    /// Returns `true` if a controlword that leads to operation enabled may still be on its way to the drive, or the drive's answer on
     /// its way back.
     pub(super) fn may_be_switching_on(&self) -> bool {
         self.since_enabling_cycles.is_some_and(|cycles| cycles <= SETTLED_CYCLES)

@@ -18,7 +18,7 @@ pub(super) struct DriveReport {
     emergency_code: u16,
     /// Slots since that message, while no fault has to be expected for it otherwise.
     since_emergency_cycles: Option<u8>,
-    /// Whether a fault that was there when the last reset began has been there ever since.
+    /// True if a fault that was there when the last reset began has been there ever since.
     is_being_reset: bool,
     /// Reports in a row without statusword bit 9 (remote) of a drive that has set it since it was enabled; `None` if it has not.
     without_remote: Option<u8>,
@@ -89,7 +89,7 @@ impl DriveReport {
         }
     }
 
-    /// Whether a fault that was there when the last reset began has been there ever since.
+    /// Returns `true` if a fault that was there when the last reset began has been there ever since.
     pub(super) const fn is_being_reset(&self) -> bool {
         self.is_being_reset
     }

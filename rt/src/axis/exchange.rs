@@ -70,7 +70,7 @@ impl Exchange {
         }
     }
 
-    /// Whether the drive is sent a number.
+    /// Returns `true` if the drive is sent a number.
     pub fn sends(&self, slot: CommandSlot) -> bool {
         let fields = match self {
             Self::Pdos(pdos) => return pdos.commands.iter().any(|command| command.pdo.mapping.sends(slot)),
@@ -177,7 +177,7 @@ impl SenderByte {
         Self { at, mask: 0xFF, value }
     }
 
-    /// Whether a payload is of this drive.
+    /// Returns `true` if a payload is of this drive.
     pub fn has_sent(self, payload: &[u8]) -> bool {
         payload.get(usize::from(self.at)).is_some_and(|byte| byte & self.mask == self.value)
     }

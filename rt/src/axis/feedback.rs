@@ -66,7 +66,7 @@ impl Axis {
         self.late_reply.late_cycles()
     }
 
-    /// Whether only a skipped SYNC or set-point can tell if the drive reports in time.
+    /// Returns `true` if only a skipped SYNC or set-point can tell if the drive reports in time.
     pub fn is_reply_unverified(&self) -> bool {
         self.late_reply.is_reply_unverified()
     }
@@ -161,12 +161,12 @@ impl Axis {
         (self.is_heard() && self.reported_slots.contains(slot)).then(|| self.feedback.feedback(slot))
     }
 
-    /// Whether the process data of the drive carry a number that it reports.
+    /// Returns `true` if the process data of the drive carry a number that it reports.
     pub fn reports(&self, slot: FeedbackSlot) -> bool {
         self.reported_slots.contains(slot)
     }
 
-    /// Whether the drive has reported at all.
+    /// Returns `true` if the drive has reported at all.
     pub fn is_heard(&self) -> bool {
         self.joint.is_heard()
     }
@@ -253,7 +253,7 @@ impl Axis {
         self.node_monitor.fault(self.parameters.supervision.timeout_cycles())
     }
 
-    /// Whether another node answers with the same node ID.
+    /// Returns `true` if another node answers with the same node ID.
     pub fn is_duplicate(&self) -> bool {
         self.duplicate_node.is_found()
     }
@@ -269,7 +269,7 @@ impl Axis {
         self.report.unexplained_emergency()
     }
 
-    /// Whether the feedback is that of a drive with the conditions that enabling has: it comes in its own cycle and shows no
+    /// Returns `true` if the feedback is that of a drive with the conditions that enabling has: it comes in its own cycle and shows no
     /// torque, and the joint has stood for some cycles.
     pub(super) fn shows_rest_without_torque(&self) -> bool {
         self.feedback_age() == 0
@@ -278,7 +278,7 @@ impl Axis {
             && self.joint.is_settled()
     }
 
-    /// Whether the drive may have reported in this cycle. One that answers set-points, and was sent none, has missed no answer; one
+    /// Returns `true` if the drive may have reported in this cycle. One that answers set-points, and was sent none, has missed no answer; one
     /// that is late may still have come.
     #[inline]
     pub fn is_due_to_report(&mut self) -> bool {
@@ -286,7 +286,7 @@ impl Axis {
         !self.answers_set_points() || is_asked || self.reception.has_any()
     }
 
-    /// Whether the drive answers set-points.
+    /// Returns `true` if the drive answers set-points.
     pub(super) fn answers_set_points(&self) -> bool {
         self.parameters.feedback_since == FeedbackSince::SetPoint
     }

@@ -70,7 +70,7 @@ pub(super) struct JointEstimate {
     by_positions: VelocityEstimate,
     /// The last report, if the joint cannot have got there.
     jump: Option<Jump>,
-    /// Whether it has come to rest since the last stop began.
+    /// True if it has come to rest since the last stop began.
     standstill: Standstill,
 }
 
@@ -160,12 +160,12 @@ impl JointEstimate {
         self.standstill = Standstill::default();
     }
 
-    /// Whether the position is known.
+    /// Returns `true` if the position is known.
     pub(super) fn is_known(&self) -> bool {
         self.source != Source::Unknown
     }
 
-    /// Whether the drive has reported by process data.
+    /// Returns `true` if the drive has reported by process data.
     pub(super) fn is_heard(&self) -> bool {
         self.source == Source::ProcessData
     }
@@ -195,7 +195,7 @@ impl JointEstimate {
         self.velocity_uncertainty
     }
 
-    /// Whether the joint is reported to be slow, if only for a moment.
+    /// Returns `true` if the joint is reported to be slow, if only for a moment.
     pub(super) fn is_standing(&self, velocity_limit: f64) -> bool {
         self.velocity.abs() <= AT_REST * velocity_limit
     }
@@ -205,7 +205,7 @@ impl JointEstimate {
         self.standstill.motion(velocity_limit)
     }
 
-    /// Whether the joint has been reported in one place for some cycles, since the last stop began.
+    /// Returns `true` if the joint has been reported in one place for some cycles, since the last stop began.
     pub(super) const fn is_settled(&self) -> bool {
         self.standstill.is_at_rest()
     }

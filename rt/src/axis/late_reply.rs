@@ -63,18 +63,18 @@ impl LateReplyDetector {
         self.late_cycles
     }
 
-    /// Whether every request has been answered in its own cycle.
+    /// Returns `true` if every request has been answered in its own cycle.
     pub(super) const fn is_punctual(&self) -> bool {
         self.unanswered == 0 && self.since_skip_cycles.is_none()
     }
 
-    /// Whether only a request that is skipped can tell.
+    /// Returns `true` if only a request that is skipped can tell.
     pub(super) const fn is_reply_unverified(&self) -> bool {
         self.unanswered > 0 && self.since_skip_cycles.is_none() && self.late_cycles == 0
     }
 }
 
-/// Whether a set-point is skipped, for a drive that answers set-points.
+/// The set-point that a drive which answers set-points is not sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum SetPointSkip {

@@ -125,7 +125,7 @@ pub struct Axis {
     reception: Reception,
     late_reply: LateReplyDetector,
     set_point_skip: SetPointSkip,
-    /// Whether a set-point, which requests the feedback, has been made since the last cycle of the bus.
+    /// True if a set-point, which requests the feedback, has been made since the last cycle of the bus.
     is_asked_by_set_point: bool,
     report: DriveReport,
     power: Power,
@@ -234,12 +234,12 @@ impl Axis {
         }
     }
 
-    /// Whether the drive has PDOs.
+    /// Returns `true` if the drive has PDOs.
     pub const fn has_pdos(&self) -> bool {
         matches!(self.parameters.exchange, Exchange::Pdos(_))
     }
 
-    /// Whether the drive is spoken to outside of the cycle.
+    /// Returns `true` if the drive is spoken to outside of the cycle.
     pub const fn is_off_cycle(&self) -> bool {
         matches!(self.parameters.exchange, Exchange::OffCycle { .. })
     }
@@ -281,7 +281,7 @@ impl Axis {
         self.node_monitor.pass();
     }
 
-    /// Whether a fault that was there when the last reset began has been there ever since.
+    /// Returns `true` if a fault that was there when the last reset began has been there ever since.
     pub fn is_being_reset(&self) -> bool {
         self.report.is_being_reset()
     }

@@ -17,7 +17,7 @@ use crate::cia402::OperationMode;
 use crate::control::{ControlLaw, TorqueDemand};
 use crate::pdo::CommandSlot;
 
-/// Whether the drive is in the mode of the axis' law.
+/// How the mode of the drive and that of the axis' law stand to each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) enum Mode {
@@ -52,7 +52,7 @@ impl Axis {
         }
     }
 
-    /// Whether the process data of the drive carry a number to it.
+    /// Returns `true` if the process data of the drive carry a number to it.
     pub fn sends(&self, slot: CommandSlot) -> bool {
         self.parameters.exchange.sends(slot)
     }
@@ -62,12 +62,12 @@ impl Axis {
         self.command.command(CommandSlot::OperationMode) as i8
     }
 
-    /// Whether the drive is told another mode and has not shown it yet.
+    /// Returns `true` if the drive is told another mode and has not shown it yet.
     pub fn is_changing_mode(&self) -> bool {
         self.mode != Mode::Settled
     }
 
-    /// Whether the drive shows the mode that it is told.
+    /// Returns `true` if the drive shows the mode that it is told.
     pub fn shows_commanded_mode(&self) -> bool {
         self.mode() == Some(self.mode_set())
     }

@@ -61,12 +61,12 @@ pub enum FeedForward {
 }
 
 impl FeedForward {
-    /// Whether the velocity of the set-point is sent.
+    /// Returns `true` if the velocity of the set-point is sent.
     pub const fn has_velocity(self) -> bool {
         matches!(self, Self::Velocity | Self::VelocityAndTorque)
     }
 
-    /// Whether a torque that is fed forward is sent.
+    /// Returns `true` if a torque that is fed forward is sent.
     pub const fn has_torque(self) -> bool {
         matches!(self, Self::Torque | Self::VelocityAndTorque)
     }

@@ -59,7 +59,7 @@ impl PositionCounter {
         i64::from(reported) + laps * self.lap()
     }
 
-    /// Whether the drive reports a count as it is.
+    /// Returns `true` if the drive reports a count as it is.
     pub(super) const fn contains(self, count: i64) -> bool {
         self.lowest as i64 <= count && count <= self.highest as i64
     }

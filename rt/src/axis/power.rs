@@ -183,32 +183,32 @@ impl Axis {
         }
     }
 
-    /// Whether the drive may be led to operation enabled and kept there.
+    /// Returns `true` if the drive may be led to operation enabled and kept there.
     pub fn is_power_granted(&self) -> bool {
         self.power == Power::On
     }
 
-    /// Whether the drive has been taken out of operation enabled for good.
+    /// Returns `true` if the drive has been taken out of operation enabled for good.
     pub(super) fn is_latched_off(&self) -> bool {
         self.power == Power::Releasing(SetPoint::Kept)
     }
 
-    /// Whether the drive is known to have no torque.
+    /// Returns `true` if the drive is known to have no torque.
     pub const fn is_power_off(&self) -> bool {
         matches!(self.power, Power::Off { .. })
     }
 
-    /// Whether the drive has not given up its torque in time.
+    /// Returns `true` if the drive has not given up its torque in time.
     pub const fn is_not_released(&self) -> bool {
         matches!(self.power, Power::NotReleased(_))
     }
 
-    /// Whether the drive follows set-points.
+    /// Returns `true` if the drive follows set-points.
     pub fn is_enabled(&self) -> bool {
         self.drive_state() == DriveState::OperationEnabled && !self.is_latched_off()
     }
 
-    /// Whether the drive has confirmed that it has no torque since it was told to have none: by a report, or by SDO.
+    /// Returns `true` if the drive has confirmed that it has no torque since it was told to have none: by a report, or by SDO.
     pub(super) fn confirms_off(&self) -> bool {
         let is_told = self.is_told_to_switch_off() && !self.may_be_switching_on();
         is_told && !self.has_torque() && (self.is_reporting() || self.has_confirmed_by_service())
@@ -218,7 +218,7 @@ impl Axis {
         self.is_heard() && self.feedback_age() <= self.parameters.missed_feedback_cycles
     }
 
-    /// Whether the last report shows torque that the drive was not told to have. The reaction to a fault is none.
+    /// Returns `true` if the last report shows torque that the drive was not told to have. The reaction to a fault is none.
     fn shows_torque(&self) -> bool {
         match &self.parameters.exchange {
             super::Exchange::BitFields(by) => {

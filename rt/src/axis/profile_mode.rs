@@ -90,7 +90,7 @@ impl ProfileMode {
         self.stalled_cycles = if is_stalled { self.stalled_cycles.saturating_add(1) } else { 0 };
     }
 
-    /// Whether the drive has stood before its target for too long, where a following error may last for so many slots.
+    /// Returns `true` if the drive has stood before its target for too long, where a following error may last for so many slots.
     const fn is_stalled(&self, following_error_cycles: u32) -> bool {
         let allowed = if following_error_cycles == 0 { 1 } else { following_error_cycles };
         self.stalled_cycles > STALL_PATIENCE.saturating_mul(allowed)
@@ -98,18 +98,18 @@ impl ProfileMode {
 }
 
 impl Axis {
-    /// Whether the drive makes its own way to a target.
+    /// Returns `true` if the drive makes its own way to a target.
     pub fn is_profile(&self) -> bool {
         self.parameters.law.is_profile()
     }
 
-    /// Whether the drive must bring the joint to rest by its own quick stop (object 6085). In profile torque a torque of 0 lets
+    /// Returns `true` if the drive must bring the joint to rest by its own quick stop (object 6085). In profile torque a torque of 0 lets
     /// the joint coast: nothing but friction slows it.
     pub fn stops_by_itself(&self) -> bool {
         self.parameters.law == ControlLaw::ProfileTorque
     }
 
-    /// Whether a target is of the kind that the axis' mode takes, and within its limits.
+    /// Returns `true` if a target is of the kind that the axis' mode takes, and within its limits.
     pub fn accepts(&self, target: ProfileTarget) -> bool {
         let limits = &self.parameters.limits;
         match (self.parameters.law, target) {
@@ -193,21 +193,21 @@ impl Axis {
         rest.max(position - nearest).min(position + nearest)
     }
 
-    /// Whether the drive has its target and says that it has reached it; an axis that follows set-points always has. A joint
+    /// Returns `true` if the drive has its target and says that it has reached it; an axis that follows set-points always has. A joint
     /// that coasts has reached its target when it stands.
     pub fn is_target_reached(&self) -> bool {
         let is_there = || self.profile.command.is_reached(self.statusword());
         !self.is_profile() || !self.is_coasting() && is_there()
     }
 
-    /// Whether the joint moves and its drive does not drive it: with a profile torque of zero it coasts, or a load pulls it.
+    /// Returns `true` if the joint moves and its drive does not drive it: with a profile torque of zero it coasts, or a load pulls it.
     pub fn is_coasting(&self) -> bool {
         self.parameters.law == ControlLaw::ProfileTorque
             && !self.is_moving_on_command()
             && !self.is_standing()
     }
 
-    /// Whether the drive is commanded to go on moving without end: by a velocity or a torque that is not zero.
+    /// Returns `true` if the drive is commanded to go on moving without end: by a velocity or a torque that is not zero.
     pub fn is_moving_on_command(&self) -> bool {
         self.profile.is_moving_on_command()
     }

@@ -37,7 +37,7 @@ pub(super) struct ReportSpan {
     pub(super) longest_s: f64,
     /// The time within which a report is expected: the period of the bus, for most drives.
     pub(super) cycle_s: f64,
-    /// Whether no slot was missed, so that the time is known.
+    /// True if no slot was missed, so that the time is known.
     pub(super) is_known: bool,
 }
 
@@ -73,7 +73,7 @@ impl Reception {
         (self.arrived, self.age_cycles, self.waited_cycles) = (0, 0, 0);
     }
 
-    /// Whether a PDO that arrived then belongs to the present cycle.
+    /// Returns `true` if a PDO that arrived then belongs to the present cycle.
     pub(super) const fn is_in_time(&self, at_ns: Nanoseconds) -> bool {
         at_ns >= self.expected_since_ns
     }
@@ -86,7 +86,7 @@ impl Reception {
         was_there
     }
 
-    /// Whether any feedback PDO has arrived in this cycle.
+    /// Returns `true` if any feedback PDO has arrived in this cycle.
     pub(super) const fn has_any(&self) -> bool {
         self.arrived != 0
     }

@@ -12,7 +12,7 @@ impl Axis {
         self.joint.begin_stop();
     }
 
-    /// Whether a stop of the joint is over. It has stood for several times what its drive may take to act on its last command, and
+    /// Returns `true` if a stop of the joint is over. It has stood for several times what its drive may take to act on its last command, and
     /// in profile position it is at its target: a joint that swings back stands for a moment on its way, and so does one before it
     /// begins to move. A joint that follows set-points but does not obey is not waited for.
     pub fn has_stopped(&self) -> bool {
@@ -23,12 +23,12 @@ impl Axis {
         self.joint.is_settled() && (!is_on_its_way || self.is_target_reached())
     }
 
-    /// Whether the joint follows set-points that stand, and has not come to rest on them yet.
+    /// Returns `true` if the joint follows set-points that stand, and has not come to rest on them yet.
     pub fn is_catching_up(&self) -> bool {
         !self.is_profile() && self.is_obeying() && !self.joint.is_settled()
     }
 
-    /// Whether the drive must bring its joint to rest by its own quick stop (object 6085) before its power is taken. The
+    /// Returns `true` if the drive must bring its joint to rest by its own quick stop (object 6085) before its power is taken. The
     /// set-points stand, and the joint still moves: a loop that is closed over the bus makes it swing, and another set-point
     /// would not help.
     pub fn must_quick_stop(&self) -> bool {
@@ -44,14 +44,14 @@ impl Axis {
             && !self.joint.is_settled()
     }
 
-    /// Whether the drive reports and is enabled, and the joint is near its set-point, as far as a following error is allowed.
+    /// Returns `true` if the drive reports and is enabled, and the joint is near its set-point, as far as a following error is allowed.
     fn is_obeying(&self) -> bool {
         self.is_enabled()
             && self.feedback_age() <= self.parameters.missed_feedback_cycles
             && self.following.error().abs() <= self.parameters.following_error_limit
     }
 
-    /// Whether the joint has been reported to stand for some cycles.
+    /// Returns `true` if the joint has been reported to stand for some cycles.
     pub fn is_at_rest(&self) -> bool {
         self.joint.is_settled()
     }
@@ -62,7 +62,7 @@ impl Axis {
         Some(Fault::NotAtRest { velocity, limit })
     }
 
-    /// Whether the joint is reported to be slow, if only for a moment.
+    /// Returns `true` if the joint is reported to be slow, if only for a moment.
     pub(super) fn is_standing(&self) -> bool {
         self.joint.is_standing(self.parameters.limits.velocity)
     }

@@ -221,7 +221,7 @@ impl Axis {
         State { position: last + velocity * period_s, velocity, acceleration: change / period_s }
     }
 
-    /// Whether the set-point is where the joint is, but for one step within the limits.
+    /// Returns `true` if the set-point is where the joint is, but for one step within the limits.
     pub fn is_on_joint(&self, period_s: f64) -> bool {
         (self.joint.position() - self.set_point().position).abs()
             <= self.parameters.limits.velocity * period_s

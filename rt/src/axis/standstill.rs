@@ -22,7 +22,7 @@ pub(super) struct Standstill {
     place: Option<(f64, f64)>,
     /// Reports from there, after the first one.
     reports: u32,
-    /// Whether enough reports in a row came from one place, and none since then from elsewhere.
+    /// True if enough reports in a row came from one place, and none since then from elsewhere.
     is_at_rest: bool,
     /// Mean speed from end to end of the place that the joint left last: rad/s (m/s).
     left_at: f64,
@@ -56,7 +56,7 @@ impl Standstill {
         (!self.is_at_rest && self.left_at > 0.0).then_some((self.left_at, PLACE * velocity_limit))
     }
 
-    /// Whether the joint has been in one place for as long as is needed.
+    /// Returns `true` if the joint has been in one place for as long as is needed.
     pub(super) const fn is_at_rest(&self) -> bool {
         self.is_at_rest
     }

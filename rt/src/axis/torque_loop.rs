@@ -16,9 +16,9 @@ pub(super) struct TorqueLoop {
     offset: f64,
     /// The torque of the last command: N·m (N).
     torque: f64,
-    /// Whether the set-point has begun anew since: the torque goes on from where it was.
+    /// True if the set-point has begun anew since: the torque goes on from where it was.
     is_resumed: bool,
-    /// Whether what was to be the last command was not a number.
+    /// True if what was to be the last command was not a number.
     is_undefined: bool,
 }
 
@@ -27,12 +27,12 @@ impl TorqueLoop {
         &self.demand
     }
 
-    /// Whether the joint need not be where its set-point is.
+    /// Returns `true` if the joint need not be where its set-point is.
     pub(super) const fn is_compliant(&self) -> bool {
         !matches!(self.demand, TorqueDemand::Law { .. })
     }
 
-    /// Whether the set-point follows the joint, and not the joint the set-point.
+    /// Returns `true` if the set-point follows the joint, and not the joint the set-point.
     pub(super) const fn is_torque(&self) -> bool {
         matches!(self.demand, TorqueDemand::Torque(_))
     }
@@ -52,7 +52,7 @@ impl TorqueLoop {
         self.is_resumed = true;
     }
 
-    /// Whether what the last command was made of gave no number: gains so large that their products are infinite.
+    /// Returns `true` if what the last command was made of gave no number: gains so large that their products are infinite.
     pub(super) const fn is_undefined(&self) -> bool {
         self.is_undefined
     }

@@ -291,7 +291,7 @@ impl FieldDrive {
         }
     }
 
-    /// Whether the last reply shows that the drive has torque; `None` for a drive that does not show it.
+    /// Returns `true` if the last reply shows that the drive has torque; `None` for a drive that does not show it.
     fn shows_torque(&self, by: &FieldDriveParameters) -> Option<bool> {
         self.reported(by, ReplyValue::Run).map(|run| run != 0.0)
     }
@@ -322,7 +322,7 @@ impl FieldDrive {
         self.life.state()
     }
 
-    /// Whether it may have torque, whatever its last reply shows: it is told to start, or is told to stop and has not shown for long enough
+    /// Returns `true` if it may have torque, whatever its last reply shows: it is told to start, or is told to stop and has not shown for long enough
     /// that it has.
     pub const fn may_have_torque(&self) -> bool {
         matches!(

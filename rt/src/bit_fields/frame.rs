@@ -97,7 +97,7 @@ impl<V: FieldValue> FieldFrame<V> {
         self.format
     }
 
-    /// Whether it has a field for a value.
+    /// Returns `true` if it has a field for a value.
     pub fn carries(&self, value: V) -> bool {
         let is_of_state = |shown: ReplyValue| self.states.is_some() && shown.slot() == value.slot();
         self.layout.carries(value.slot()) || is_of_state(ReplyValue::Run) || is_of_state(ReplyValue::Error)

@@ -276,7 +276,7 @@ impl FrameLayout {
         self.bytes.into()
     }
 
-    /// Whether a field has this slot.
+    /// Returns `true` if a field has this slot.
     pub(super) fn carries(&self, slot: u8) -> bool {
         self.fields.iter().any(|field| field.slot == slot)
     }

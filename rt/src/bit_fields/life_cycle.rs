@@ -51,7 +51,7 @@ pub struct ModeCodes {
 }
 
 impl LifeCycle {
-    /// Whether the drive is told its mode.
+    /// Returns `true` if the drive is told its mode.
     pub(crate) fn has_modes(&self) -> bool {
         match self {
             Self::ByFields { modes } => modes.torque != modes.position || modes.velocity != modes.position,

@@ -56,7 +56,7 @@ pub enum ReplyValue {
 pub trait FieldValue: Copy {
     /// Its place among the values of its direction, below 10.
     fn slot(self) -> u8;
-    /// Whether a frame may have several fields with it.
+    /// Returns `true` if a frame may have several fields with it.
     fn may_repeat(self) -> bool;
 }
 

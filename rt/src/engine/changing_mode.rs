@@ -20,7 +20,7 @@ use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Whether every axis that is to change its mode can.
+    /// Returns `true` if every axis that is to change its mode can.
     pub(super) fn check_mode_change(&self, change: &ModeChange<AXES>) -> Handled {
         if self.shared.requested.ending >= Ending::EnableInhibited {
             return Err(RejectReason::EnableInhibited.into());

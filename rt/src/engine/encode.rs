@@ -218,7 +218,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         if may_be_enabled { Goal::Enabled } else { Goal::Disabled }
     }
 
-    /// Whether a drive may be led to operation enabled, or is there already. One that has been told to switch on has watched the
+    /// Returns `true` if a drive may be led to operation enabled, or is there already. One that has been told to switch on has watched the
     /// heartbeat before, or has replied to node guarding: what another group on its bus begins does not concern it.
     fn may_switch_on(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> bool {
         let watches_controller = || {

@@ -67,7 +67,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         self.take_power_if_cut_off();
     }
 
-    /// Whether slots are missed too often. A thread that is late in every cycle cannot go on, however many slots may be missed.
+    /// Returns `true` if slots are missed too often. A thread that is late in every cycle cannot go on, however many slots may be missed.
     fn check_timing(&mut self, suspended_ns: Nanoseconds) {
         if suspended_ns > 0 {
             self.fail(Origin::Group, Fault::Suspended { suspended_ns });
@@ -113,7 +113,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
-    /// Whether own frames get onto the wire.
+    /// Returns `true` if own frames get onto the wire.
     fn check_transmission(&mut self) {
         let limit = self.shared.not_transmitted_cycles;
         let (bus, cycles) = self.shared.backlog.longest_blocked(self.group.buses);
@@ -251,14 +251,14 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
-    /// Whether joints have yet to come to rest before their power is taken: all of them when the group moves, and in one that
+    /// Returns `true` if joints have yet to come to rest before their power is taken: all of them when the group moves, and in one that
     /// holds those that are still behind their set-points.
     pub(super) fn must_come_to_rest(&self) -> bool {
         self.is_under_way()
             || matches!(self.group.state, GroupState::Holding) && self.axes.iter().any(Axis::is_catching_up)
     }
 
-    /// Whether a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
+    /// Returns `true` if a stop has something to bring to rest. A joint in profile torque may begin to move by itself.
     pub(super) fn is_under_way(&self) -> bool {
         match self.group.state {
             GroupState::Moving { .. }
@@ -336,15 +336,15 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
 
 /// What is expected of the axes in the present state of their group.
 struct Expectation {
-    /// Whether the drives may be out of operation enabled.
+    /// True if the drives may be out of operation enabled.
     may_be_disabled: bool,
     /// The same of those that stop by their own quick stop, which ends without torque.
     may_have_quick_stopped: bool,
-    /// Whether faults are being reset.
+    /// True if faults are being reset.
     is_resetting: bool,
-    /// Whether the modes of operation may be any.
+    /// True if the modes of operation may be any.
     is_mode_free: bool,
-    /// Whether the axes are held or moved.
+    /// True if the axes are held or moved.
     is_in_operation: bool,
 }
 

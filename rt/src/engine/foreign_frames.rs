@@ -27,7 +27,7 @@ impl<const BUSES: usize> ForeignFrames<BUSES> {
         }
     }
 
-    /// Whether none was seen.
+    /// Returns `true` if none was seen.
     pub(super) const fn is_empty(&self) -> bool {
         self.buses.is_empty()
     }

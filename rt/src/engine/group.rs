@@ -30,7 +30,7 @@ pub(super) struct Group<const AXES: usize, const BUSES: usize> {
     pub(super) buses: BitSet,
     /// Those of them on which set-points are sent in the cycle.
     pub(super) set_point_buses: BitSet,
-    /// Whether the mode of any of its axes may be changed.
+    /// True if the mode of any of its axes may be changed.
     pub(super) has_other_modes: bool,
     pub(super) state: GroupState<AXES>,
     /// What its stream wants in this slot, while it streams.

@@ -22,7 +22,7 @@ use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
 
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Whether the group can do now what was asked of it. What its numbers say is checked when it is carried out.
+    /// Returns `true` if the group can do now what was asked of it. What its numbers say is checked when it is carried out.
     pub(super) fn check_request(&self, request: &Request<AXES>) -> Handled {
         match request {
             Request::Activate => self.require_phase(&[Phase::Passive]),

@@ -92,7 +92,7 @@ pub struct CycleInput<'a> {
     pub behind: BitSet,
 }
 
-/// Whether the set-points of a cycle were ready in time.
+/// The deadline of the set-points of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum Deadline {
@@ -296,7 +296,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         &self.axes
     }
 
-    /// Whether the loop is to end after this cycle.
+    /// Returns `true` if the loop is to end after this cycle.
     pub fn is_shutting_down(&self) -> bool {
         self.shared.requested.ending == Ending::Shutdown
     }
@@ -393,7 +393,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     }
 }
 
-/// Whether a bus has SYNC, feedback and set-points in this slot. Most have them in each, which takes no division to see.
+/// Returns `true` if a bus has SYNC, feedback and set-points in this slot. Most have them in each, which takes no division to see.
 const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
     bus.divider == 1 || slot.is_multiple_of(bus.divider as u64)
 }

@@ -96,7 +96,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         None
     }
 
-    /// Whether another axis of the node at this place has been asked and may still be about to answer.
+    /// Returns `true` if another axis of the node at this place has been asked and may still be about to answer.
     fn is_node_asked(&self, place: usize, left_slots: u32) -> bool {
         let node = |axis: &Axis| (axis.parameters().bus, axis.parameters().node);
         let own = self.axes.get(place).map(node);

@@ -32,10 +32,10 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) buses: ArrayVec<BusParameters, BUSES>,
     /// The axes on each bus.
     places_on: [BitSet; BUSES],
-    /// Whether there are drives that are spoken to outside of the cycle.
+    /// True if there are drives that are spoken to outside of the cycle.
     pub(super) has_off_cycle: bool,
     pub(super) requested: Requested,
-    /// Whether the commands of this cycle were ready in time, as far as is known.
+    /// True if the commands of this cycle were ready in time, as far as is known.
     pub(super) deadline: Deadline,
 
     /// The time of the present cycle.
@@ -69,7 +69,7 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct Requested {
-    /// Whether SYNC is sent.
+    /// True if SYNC is sent.
     pub(super) sync: bool,
     /// How the run is to end.
     pub(super) ending: Ending,
@@ -148,7 +148,7 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         self.places_on.get(bus).copied().unwrap_or_default()
     }
 
-    /// Whether a bus is a CANopen network.
+    /// Returns `true` if a bus is a CANopen network.
     pub(super) fn is_canopen(&self, bus: usize) -> bool {
         self.buses.get(bus).is_some_and(|bus| bus.canopen.is_some())
     }

@@ -57,7 +57,7 @@ impl<const AXES: usize, const BUSES: usize> EngineParameters<AXES, BUSES> {
         Ok(())
     }
 
-    /// Whether there are as many axes with this command as it says, all of one group and bus, and none writes the part of another. All
+    /// Returns `true` if there are as many axes with this command as it says, all of one group and bus, and none writes the part of another. All
     /// of them get it in every cycle: a drive that answers set-points may have one left out.
     fn can_share(&self, axis: usize, own: &AxisParameters, command: &CommandPdo) -> bool {
         let group_of = |axis: usize| {

@@ -46,7 +46,7 @@ pub(super) enum GroupState<const AXES: usize> {
     /// Drives are told another mode of operation and have not shown it yet.
     ChangingMode(AtRest),
     Moving {
-        /// Whether the end of the motion has been reported; a velocity or a torque goes on after that.
+        /// True if the end of the motion has been reported; a velocity or a torque goes on after that.
         is_reported: bool,
     },
     /// On a trajectory of the host.
@@ -134,7 +134,7 @@ impl<const AXES: usize> GroupState<AXES> {
         }
     }
 
-    /// Whether a drive may have torque.
+    /// Returns `true` if a drive may have torque.
     pub(super) const fn has_power(&self) -> bool {
         !matches!(self, Self::Passive | Self::Disabled | Self::ChangingMode(AtRest::Disabled))
     }

@@ -18,7 +18,7 @@ impl<const BUSES: usize> Default for UnsentSteps<BUSES> {
 }
 
 impl<const BUSES: usize> UnsentSteps<BUSES> {
-    /// Whether one of those that are on time has yet to send the way of one of its cycles. The others do not wait for a bus
+    /// Returns `true` if one of those that are on time has yet to send the way of one of its cycles. The others do not wait for a bus
     /// that is behind.
     pub(super) fn are_enough(&self, buses: &[BusParameters], on_time: BitSet) -> bool {
         let mut unsent = buses.iter().zip(&self.0).enumerate().filter(|(bus, _)| on_time.contains(*bus));

@@ -40,7 +40,7 @@ impl FollowingErrorGuard {
         self.cycles = if self.error.abs() > self.limit { self.cycles.saturating_add(1) } else { 0 };
     }
 
-    /// Whether the error has been too large for too long.
+    /// Returns `true` if the error has been too large for too long.
     pub fn check(&self) -> Result<(), Fault> {
         if self.cycles > self.allowed_cycles {
             return Err(Fault::FollowingError { error: self.error, limit: self.limit });

@@ -140,7 +140,7 @@ impl AxisLimits {
         Self { acceleration: smaller, deceleration: smaller, ..*self }
     }
 
-    /// Whether `position` may be a target.
+    /// Returns `true` if `position` may be a target.
     pub fn contain(&self, position: f64) -> bool {
         self.position_min <= position && position <= self.position_max
     }

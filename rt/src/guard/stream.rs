@@ -122,7 +122,7 @@ impl<'a> Direction<'a> {
             .map(move |(steps, sign, farthest)| Self { steps, sign, farthest, limits })
     }
 
-    /// Whether the limits are kept to the last bit. From outside those of the position the joint may come back.
+    /// Returns `true` if the limits are kept to the last bit. From outside those of the position the joint may come back.
     fn is_kept(&self, bound: &StoppingBound) -> bool {
         bound.velocity <= self.limits.velocity && bound.position <= self.farthest.max(self.steps.next)
     }

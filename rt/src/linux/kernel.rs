@@ -1,6 +1,6 @@
 //! What kind of kernel this is.
 
-/// Whether the running kernel is fully preemptible (PREEMPT_RT).
+/// Returns `true` if the running kernel is fully preemptible (PREEMPT_RT).
 pub fn is_preempt_rt() -> bool {
     // SAFETY: all-zero bytes are a valid `utsname`.
     let mut name: libc::utsname = unsafe { core::mem::zeroed() };
@@ -14,7 +14,7 @@ pub fn is_preempt_rt() -> bool {
     is_preempt_rt_version(version)
 }
 
-/// Whether the version string of a kernel (`uname -v`) names PREEMPT_RT.
+/// Returns `true` if the version string of a kernel (`uname -v`) names PREEMPT_RT.
 ///
 /// Every such kernel has it in its version; not every one has `/sys/kernel/realtime`. Patched kernels before 5.3 wrote
 /// "PREEMPT RT" in two words. PREEMPT_DYNAMIC and plain PREEMPT are other preemption models.

@@ -48,7 +48,7 @@ pub struct Scheduling {
     pub policy: Policy,
     /// The real-time priority, 1 to 99; 0 under a time-sharing policy.
     pub priority: u8,
-    /// Whether threads and processes that this thread starts fall back to the time-sharing policy.
+    /// True if threads and processes that this thread starts fall back to the time-sharing policy.
     pub reset_on_fork: bool,
 }
 

@@ -16,9 +16,9 @@ pub struct ThreadConfig {
     pub priority: Option<u8>,
     /// The CPU to stay on, counted from 0; `None` leaves the choice to the kernel.
     pub cpu: Option<usize>,
-    /// Whether to lock all memory of the process.
+    /// True to lock all memory of the process.
     pub lock_memory: bool,
-    /// Whether to keep the CPUs out of idle states that take long to leave.
+    /// True to keep the CPUs out of idle states that take long to leave.
     pub hold_dma_latency: bool,
     /// How much stack to touch in advance, in bytes; 0 for none, and at most
     /// [`PREFAULT_LIMIT_BYTES`](super::PREFAULT_LIMIT_BYTES).
@@ -34,15 +34,15 @@ pub struct ThreadReport {
     pub scheduling: Scheduling,
     /// The CPU that the thread is bound to; `None` if it may run on several.
     pub cpu: Option<usize>,
-    /// Whether all memory of the process is locked.
+    /// True if all memory of the process is locked.
     pub memory_locked: bool,
     /// How much stack was touched in advance, in bytes.
     pub stack_bytes: usize,
     /// The timer slack as read back from the kernel, in ns. A FIFO thread has none, whatever this says.
     pub timer_slack_ns: u64,
-    /// Whether the CPUs are kept out of idle states that take long to leave.
+    /// True if the CPUs are kept out of idle states that take long to leave.
     pub dma_latency_held: bool,
-    /// Whether the kernel is fully preemptible (PREEMPT_RT).
+    /// True if the kernel is fully preemptible (PREEMPT_RT).
     pub preempt_rt: bool,
 }
 

@@ -88,7 +88,7 @@ impl Limits {
         self
     }
 
-    /// Whether the jerk is unlimited.
+    /// Returns `true` if the jerk is unlimited.
     pub(super) fn is_second_order(&self) -> bool {
         self.jerk_max == f64::INFINITY
     }
@@ -101,7 +101,7 @@ impl Limits {
         smaller(smaller(velocity, acceleration), self.jerk_max)
     }
 
-    /// Whether no limit is too large, apart from an infinite jerk limit.
+    /// Returns `true` if no limit is too large, apart from an infinite jerk limit.
     #[inline]
     fn is_moderate(&self) -> bool {
         let widths =

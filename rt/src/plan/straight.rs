@@ -118,7 +118,7 @@ impl Line {
         }
     }
 
-    /// Whether every axis keeps its limits when it follows this profile of the reference axis.
+    /// Returns `true` if every axis keeps its limits when it follows this profile of the reference axis.
     pub(super) fn keeps_limits(&self, reference: &Profile, problems: &[Problem]) -> bool {
         let within = |value: f64, min: f64, max: f64| {
             value >= min * (1.0 + ROUNDING) && value <= max * (1.0 + ROUNDING)

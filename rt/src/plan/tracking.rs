@@ -96,7 +96,7 @@ impl Problem {
         })
     }
 
-    /// Whether the position changes in the cycle by no more than the velocity limits allow.
+    /// Returns `true` if the position changes in the cycle by no more than the velocity limits allow.
     ///
     /// In the frame of an accelerating target the velocity may rise and fall again within the cycle. On the axis it must
     /// not exceed its limit meanwhile.
@@ -109,7 +109,7 @@ impl Problem {
             && step >= cycle_s * limits.velocity_min.min(start.velocity) - rounding
     }
 
-    /// Whether the axis can still keep its limits after this state.
+    /// Returns `true` if the axis can still keep its limits after this state.
     fn can_go_on(&self, next: &State) -> Result<bool, PlanError> {
         let Self { start, limits, .. } = self;
         let excess_ahead = |state: &State| {
@@ -135,7 +135,7 @@ impl Problem {
         State { velocity: state.velocity.clamp(velocity_min, velocity_max), ..*state }
     }
 
-    /// Whether the state is within the position limits, or not further out than the start.
+    /// Returns `true` if the state is within the position limits, or not further out than the start.
     fn within_travel(&self, state: &State) -> bool {
         let Self { start, limits, .. } = self;
         state.position <= limits.position_max.max(start.position)

@@ -139,7 +139,7 @@ pub fn decode_frame(line: &[u8]) -> Result<Frame, LineError> {
     frame.map_err(|_| LineError::LengthCode { code })
 }
 
-/// Whether a line that begins with this letter is a frame.
+/// Returns `true` if a line that begins with this letter is a frame.
 pub(super) const fn is_frame(letter: u8) -> bool {
     kind(letter).is_some()
 }

@@ -82,7 +82,7 @@ fn corrected(start: &State, target: &State, limits: &AxisLimits, period_s: f64) 
     is_safe(start, &next, limits, h).then_some(next)
 }
 
-/// Whether a set-point keeps the limits, and can be stopped within them.
+/// Returns `true` if a set-point keeps the limits, and can be stopped within them.
 pub(super) fn is_safe(start: &State, next: &State, limits: &AxisLimits, period_s: f64) -> bool {
     let State { position, velocity, acceleration } = *next;
     let steepest = limits.acceleration.max(limits.deceleration);

@@ -298,7 +298,7 @@ impl<'a> Differences<'a> {
         Some((behind - before) / span_s)
     }
 
-    /// Whether the accelerations around a point change evenly, as those of a smooth motion do that is sampled often enough.
+    /// Returns `true` if the accelerations around a point change evenly, as those of a smooth motion do that is sampled often enough.
     fn is_smooth(&self, place: usize) -> bool {
         let middle = if self.second(place + 1).is_some() { place } else { place - 1 };
         let (Some(before), Some(here), Some(behind)) =

@@ -138,7 +138,7 @@ impl AxisPoint {
         }
     }
 
-    /// Whether every number of it is one.
+    /// Returns `true` if every number of it is one.
     pub fn is_finite(&self) -> bool {
         match self {
             Self::Position { motion, torque } => motion.is_finite() && torque.is_finite(),
@@ -183,9 +183,9 @@ pub enum PointRole {
     /// As part of a chunk, whose points come in the order of their stamps. A chunk takes the place of every earlier point from
     /// its own first stamp on.
     Chunk {
-        /// Whether the chunk begins with it.
+        /// True if the chunk begins with it.
         is_first: bool,
-        /// Whether the chunk ends with it.
+        /// True if the chunk ends with it.
         is_last: bool,
     },
 }

@@ -206,7 +206,7 @@ struct Rig {
     host: PlainHost<2>,
     motors: [Motor; 2],
     is_hollow: bool,
-    /// Whether every cycle misses its deadline.
+    /// True if every cycle misses its deadline.
     is_late: bool,
     slot: u64,
     /// The frames of the last cycle.

@@ -116,7 +116,7 @@ fn arrives(
     check(second_order || miss.abs() <= tolerance.acceleration, || format!("acceleration missed by {miss:e}"))
 }
 
-/// Whether the motion has entered the limits. From then on it must keep them.
+/// True if the motion has entered the limits. From then on it must keep them.
 struct Inside {
     now: bool,
     velocity_matters: bool,

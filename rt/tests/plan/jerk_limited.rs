@@ -89,7 +89,7 @@ pub fn scaled(problem: &Problem, factor: f64) -> Problem {
     }
 }
 
-/// Whether the start is within the limits and can stay there.
+/// Returns `true` if the start is within the limits and can stay there.
 pub fn starts_inside(problem: &Problem) -> bool {
     let Problem { start, limits, .. } = problem;
     let bound_for = start.velocity + start.acceleration * start.acceleration.abs() / (2.0 * limits.jerk_max);

@@ -36,7 +36,7 @@ fn problems(line: &Value) -> Vec<Problem> {
         .collect()
 }
 
-/// Whether the duration is that of the oracle, or shorter. For a shorter one, the checker has accepted the trajectory, and the
+/// Returns `true` if the duration is that of the oracle, or shorter. For a shorter one, the checker has accepted the trajectory, and the
 /// oracle has missed it. The oracle does so for equal start and target states, and at the ends of its brake.
 fn agrees(own_s: f64, oracle_s: f64) -> bool {
     own_s <= oracle_s + 1e-6 * oracle_s + 1e-9

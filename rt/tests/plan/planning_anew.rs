@@ -36,7 +36,7 @@ fn follow(problem: &Problem, cycles: u32) -> Result<(), String> {
     Ok(())
 }
 
-/// Whether no state on the way leads beyond a velocity limit. Planned alone, such a state would have to brake.
+/// Returns `true` if no state on the way leads beyond a velocity limit. Planned alone, such a state would have to brake.
 fn can_stay(problem: &Problem) -> bool {
     starts_inside(problem) && starts_inside(&Problem { start: problem.target, ..*problem })
 }

@@ -25,7 +25,7 @@ fn limits(largest: i32) -> Vec<Limits> {
     all
 }
 
-/// Whether the target keeps the limits, and can be reached within them.
+/// Returns `true` if the target keeps the limits, and can be reached within them.
 fn is_target(limits: &Limits, (velocity, acceleration): (f64, f64)) -> bool {
     let before = velocity - acceleration * acceleration.abs() / (2.0 * limits.jerk_max);
     velocity.abs() <= limits.velocity_max

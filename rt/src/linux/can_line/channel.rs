@@ -48,7 +48,7 @@ impl<L: ByteLine, C: LineCodec> Channel<L, C> {
         &self.line
     }
 
-    /// Whether bytes that were read still wait.
+    /// Returns `true` if bytes that were read still wait.
     pub(super) const fn has_input(&self) -> bool {
         self.done < self.input.len()
     }

@@ -11,7 +11,7 @@ pub(super) type FrameBytes = ArrayVec<u8, LINE_BYTES>;
 
 /// Frames to the bytes of a line and back.
 pub trait LineCodec {
-    /// Whether the line carries such a frame.
+    /// Returns `true` if the line carries such a frame.
     #[doc(hidden)]
     fn carries(&self, frame: &Frame) -> bool;
     /// The bytes of a frame that it carries.

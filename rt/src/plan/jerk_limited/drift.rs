@@ -38,7 +38,7 @@ impl Drift {
 /// A two-step motion: up to an acceleration, which is held if it is the limit, and down from it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TwoStep {
-    /// Whether this is the mirror image: down, hold, up. Then all other fields are mirrored too.
+    /// True if this is the mirror image: down, hold, up. Then all other fields are mirrored too.
     mirrored: bool,
     /// The acceleration between both steps. It is negative where a deceleration becomes less and then more again.
     peak: f64,

@@ -25,7 +25,7 @@ pub(super) fn excess(distance: f64, size: f64, wanted: f64) -> f64 {
 #[derive(Clone, Copy)]
 struct End {
     at: f64,
-    /// Whether the function has been evaluated there.
+    /// True if the function has been evaluated there.
     seen: bool,
 }
 
