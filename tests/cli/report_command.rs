@@ -349,45 +349,6 @@ fn the_svg_shows_position_velocity_following_error_and_timing_and_marks_the_stop
     assert!(text(&unwritable).contains("joint3 was"), "the text is printed all the same");
 }
 
-#[cfg(feature = "png")]
-#[test]
-fn the_picture_is_the_drawing_and_the_same_bytes_each_time() {
-    let left = stopped_run();
-    let [first, second] = ["first.png", "second.png"].map(|name| {
-        let path = left.folder.path().join(name);
-        let output = report(&left.black_box, &["--axis", "joint6", "--png", path.to_str().unwrap()]);
-        assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
-        fs::read(path).unwrap()
-    });
-    assert!(first == second, "the same recording is the same picture");
-    // The signature, the length and name of the first chunk, then width and height.
-    assert!(first.starts_with(b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR"), "{:?}", &first[..24]);
-    let size = |at: usize| u32::from_be_bytes(first[at..at + 4].try_into().unwrap());
-    // A title of two lines, six panels, and the room below them.
-    assert_eq!((size(16), size(20)), (1800, 2 * (58 + 6 * 220 + 20)));
-    let other = left.folder.path().join("other.png");
-    report(&left.black_box, &["--axis", "joint3", "--png", other.to_str().unwrap()]);
-    assert!(fs::read(other).unwrap() != first, "another axis is another picture");
-    let unwritable = report(&left.black_box, &["--png", left.black_box.join("stop.png").to_str().unwrap()]);
-    assert_eq!(unwritable.status.code(), Some(1));
-}
-
-#[cfg(not(feature = "png"))]
-#[test]
-fn a_picture_of_a_takt_without_them_is_refused_with_the_feature_and_nothing_is_written() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("stop.png");
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("fuzz/seeds/recording/of_an_earlier_version");
-    let output = report(&file, &["--png", path.to_str().unwrap()]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(
-        errors(&output).contains("feature png") && errors(&output).contains("--svg"),
-        "{}",
-        errors(&output)
-    );
-    assert!(!path.exists() && output.stdout.is_empty());
-}
-
 #[test]
 fn the_page_shows_every_axis_the_events_and_the_buses_and_takes_nothing_from_elsewhere() {
     let left = stopped_run();

@@ -3,7 +3,6 @@
 mod curves;
 mod histogram;
 mod page;
-mod png;
 mod svg;
 mod timeline;
 
@@ -41,9 +40,6 @@ pub struct Arguments {
     /// --to say
     #[arg(long, value_name = "FILE.svg")]
     svg: Option<PathBuf>,
-    /// The same drawing as a picture, 1800 pixels wide; its letters are built in. takt needs the cargo feature `png` for it
-    #[arg(long, value_name = "FILE.png")]
-    png: Option<PathBuf>,
     /// Print the report as one JSON object
     #[arg(long)]
     json: bool,
@@ -59,9 +55,6 @@ pub fn run(arguments: &Arguments) -> Exit {
 }
 
 fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
-    if arguments.png.is_some() && !png::IS_BUILT_IN {
-        return Err(png::ABSENT.to_owned().into());
-    }
     let words = |error: RecordedError| error.to_string();
     let recorded = read(arguments)?;
     let axis = recorded.axis(arguments.axis.as_deref());
@@ -74,15 +67,10 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
     if let Some(path) = &arguments.html {
         is_written &= write(path, page::render(&recorded, &report).map_err(words)?.as_bytes());
     }
-    if arguments.svg.is_some() || arguments.png.is_some() {
+    if let Some(path) = &arguments.svg {
         let is_whole = arguments.from.is_some() || arguments.to.is_some();
         let drawing = svg::render(&recorded, axis, is_whole).map_err(words)?;
-        if let Some(path) = &arguments.svg {
-            is_written &= write(path, drawing.as_bytes());
-        }
-        if let Some(path) = &arguments.png {
-            is_written &= write(path, &png::render(&drawing)?);
-        }
+        is_written &= write(path, drawing.as_bytes());
     }
     let exit = if is_written { Exit::Done } else { Exit::Stopped };
     Ok(if arguments.json {
