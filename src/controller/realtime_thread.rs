@@ -3,9 +3,9 @@
 use std::sync::{Arc, mpsc};
 use std::thread::{Builder, JoinHandle};
 
-use nix::sched::{CpuSet, sched_getaffinity};
-use nix::unistd::Pid;
-use takt_rt::linux::{PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
+use core_affinity::CoreId;
+use nix::errno::Errno;
+use takt_rt::linux::{Outcome, PacedClock, PageFaults, RealtimeThread, ThreadConfig, ThreadReport};
 use takt_rt::{BusPort, Clock, Cycle, Engine, Flow, Grid, HostInterface, SlotPlan};
 
 use super::watchdog::LoopWatch;
@@ -22,20 +22,46 @@ const MEASURED_SLEEP_NS: u64 = 250_000;
 /// From the end of the set-up to the first slot.
 const LEAD_IN_NS: u64 = 2_000_000;
 
-/// The real-time set-up that a configuration asks for. Without a configured CPU, it is the last one that this process may
-/// use, since the first one serves most interrupts.
-pub fn thread_config(realtime: &Realtime) -> ThreadConfig {
-    let last = || {
-        let allowed = sched_getaffinity(Pid::from_raw(0)).ok()?;
-        (0..CpuSet::count()).rev().find(|cpu| allowed.is_set(*cpu) == Ok(true))
-    };
-    ThreadConfig {
-        priority: realtime.priority,
+/// The real-time set-up of a thread.
+#[derive(Clone, Copy, Debug)]
+pub struct ThreadSetup {
+    /// The CPU to stay on, counted from 0; `None` leaves the choice to the kernel.
+    pub cpu: Option<usize>,
+    /// The rest of it.
+    pub realtime: Realtime,
+}
+
+impl ThreadSetup {
+    /// Returns the set-up that a configuration asks for. Without a configured CPU, it is the last one that this process may use, since
+    /// the first one serves most interrupts.
+    pub fn of(realtime: &Realtime) -> Self {
+        let last = || Some(core_affinity::get_core_ids()?.last()?.id);
         // Without SCHED_FIFO, a pinned thread would have to share a busy CPU.
-        cpu: realtime.cpu.or_else(|| realtime.priority.and_then(|_| last())),
-        lock_memory: realtime.lock_memory,
-        hold_dma_latency: realtime.hold_dma_latency,
-        stack_bytes: STACK_BYTES,
+        let cpu = realtime.cpu.or_else(|| realtime.priority.and_then(|_| last()));
+        Self { cpu, realtime: *realtime }
+    }
+
+    /// Sets the calling thread up, as far as the system allows.
+    pub fn enter(&self) -> RealtimeThread {
+        let Realtime { priority, lock_memory, hold_dma_latency, .. } = self.realtime;
+        RealtimeThread::enter(&ThreadConfig {
+            priority,
+            affinity: self.cpu.map_or(Outcome::NotAsked, bind_to),
+            lock_memory,
+            hold_dma_latency,
+            stack_bytes: STACK_BYTES,
+        })
+    }
+}
+
+/// Binds the calling thread to a CPU, whether or not it is one of those that the process was given: an isolated one is not.
+fn bind_to(cpu: usize) -> Outcome {
+    if cpu >= libc::CPU_SETSIZE as usize {
+        return Outcome::Refused { errno: libc::EINVAL };
+    }
+    match core_affinity::set_for_current(CoreId { id: cpu }) {
+        true => Outcome::Granted,
+        false => Outcome::Refused { errno: Errno::last_raw() },
     }
 }
 
@@ -100,13 +126,13 @@ pub enum StartError {
 ///
 /// # Errors
 /// See [`StartError`].
-pub fn start<P, H>(config: ThreadConfig, parts: LoopParts<P, H>) -> Result<Running, StartError>
+pub fn start<P, H>(setup: ThreadSetup, parts: LoopParts<P, H>) -> Result<Running, StartError>
 where
     P: BusPort + Send + 'static,
     H: HostInterface + Send + 'static,
 {
     let (begun_in, begun_out) = mpsc::sync_channel(1);
-    let body = move || loop_body(&config, parts, &begun_in);
+    let body = move || loop_body(&setup, parts, &begun_in);
     let thread = Builder::new().name("takt-rt".into()).spawn(body).map_err(StartError::Spawn)?;
     let begun = begun_out.recv().map_err(|_| StartError::Died)?.map_err(StartError::Refused)?;
     Ok(Running { thread, begun })
@@ -130,11 +156,11 @@ impl Running {
 }
 
 fn loop_body<P: BusPort, H: HostInterface>(
-    config: &ThreadConfig,
+    setup: &ThreadSetup,
     mut parts: LoopParts<P, H>,
     begun: &mpsc::SyncSender<Result<Begun, Box<ThreadReport>>>,
 ) -> Option<Ended> {
-    let realtime = RealtimeThread::enter(config);
+    let realtime = setup.enter();
     let report = *realtime.report();
     if parts.is_realtime_required && report.refused().next().is_some() {
         // The starting thread waits for exactly one message.
@@ -171,4 +197,35 @@ fn measured_clock(cap_ns: u64) -> PacedClock {
         clock.wait_to_send(deadline_ns);
     }
     clock
+}
+
+#[cfg(test)]
+mod tests {
+    use takt_rt::linux::Step;
+
+    use super::*;
+
+    #[test]
+    fn a_thread_is_bound_to_its_cpu_and_one_that_does_not_exist_is_refused() {
+        let of_cpu = |cpu| {
+            let set_up = move || {
+                let realtime = Realtime {
+                    priority: None,
+                    cpu: Some(cpu),
+                    lock_memory: false,
+                    hold_dma_latency: false,
+                    spin_guard_ns: None,
+                };
+                *ThreadSetup::of(&realtime).enter().report()
+            };
+            std::thread::spawn(set_up).join().unwrap()
+        };
+        let last = core_affinity::get_core_ids().unwrap().last().unwrap().id;
+        let report = of_cpu(last);
+        assert_eq!((report.outcome(Step::CpuAffinity), report.cpu), (Outcome::Granted, Some(last)));
+        for cpu in [1_023, 5_000, usize::MAX] {
+            let refused = Outcome::Refused { errno: libc::EINVAL };
+            assert_eq!(of_cpu(cpu).outcome(Step::CpuAffinity), refused, "CPU {cpu}");
+        }
+    }
 }

@@ -16,7 +16,7 @@ use super::last_resort::LastResort;
 use super::lines::Lines;
 use super::outcome::{Interrupt, Outcome, Progress};
 use super::port::Port;
-use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError};
+use super::realtime_thread::{self, Begun, Ended, LoopParts, StartError, ThreadSetup};
 use super::supervisor::{AfterBringUp, Supervisor};
 use super::time_of_day::TimeOfDayKeeper;
 use super::watchdog::{LoopWatch, Stalled, Watchdog};
@@ -286,7 +286,7 @@ fn lead_as_owner(
                 return Err(SessionError::Watchdog(error));
             }
         };
-    let running = match realtime_thread::start(realtime_thread::thread_config(&config.realtime), parts) {
+    let running = match realtime_thread::start(ThreadSetup::of(&config.realtime), parts) {
         Ok(running) => running,
         Err(error) => {
             watchdog.end();

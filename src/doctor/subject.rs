@@ -1,7 +1,7 @@
 //! What the machine is to be fit for.
 
 use crate::config::{Config, Interface, Realtime};
-use crate::controller::realtime_thread;
+use crate::controller::realtime_thread::ThreadSetup;
 use crate::jitter::JitterOptions;
 
 /// The loop that is to run.
@@ -50,7 +50,7 @@ impl Subject {
         };
         Self {
             period_ns: config.map_or(usual.period_ns, |config| config.cycle.period_ns),
-            cpu: realtime_thread::thread_config(&realtime).cpu.unwrap_or(0),
+            cpu: ThreadSetup::of(&realtime).cpu.unwrap_or(0),
             realtime,
             buses: config.iter().flat_map(|config| &config.buses).filter_map(wanted).collect(),
             is_configured: config.is_some(),

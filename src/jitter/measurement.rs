@@ -9,7 +9,7 @@ use crate::channels::{ChannelSizes, LogSide, channels};
 use crate::config::{Config, ConfigError, Interface, Realtime};
 use crate::controller::assemble::{self, AssembleError};
 use crate::controller::port::Port;
-use crate::controller::realtime_thread::{self, Begun, LoopParts, StartError};
+use crate::controller::realtime_thread::{self, Begun, LoopParts, StartError, ThreadSetup};
 use crate::family;
 use crate::link::OpenError;
 use crate::link::interface_status;
@@ -161,7 +161,7 @@ pub fn measure(
     };
     // The ring of requests is empty: there is room for this request, and later for the one to shut down.
     let _ = host.request(Request::Sync(has_bus));
-    let running = realtime_thread::start(realtime_thread::thread_config(&options.realtime), work)?;
+    let running = realtime_thread::start(ThreadSetup::of(&options.realtime), work)?;
     let begun = running.begun();
     let mut statistics = Statistics::new(vec![]);
     while !running.is_finished() {

@@ -10,7 +10,7 @@ use takt::Outcome;
 use takt::Port;
 use takt::config::Config;
 use takt::internals::channels::{ChannelSizes, channels};
-use takt::internals::controller::realtime_thread::{self, LoopParts};
+use takt::internals::controller::realtime_thread::{self, LoopParts, ThreadSetup};
 use takt::internals::controller::{Supervisor, assemble};
 use takt::internals::telemetry::LoggerThread;
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingOptions, WallClock};
@@ -102,7 +102,7 @@ fn the_loop_allocates_nothing_from_bring_up_to_the_last_cycle() {
         traces,
     };
     let logger = LoggerThread::start(Logger::new(log, options, Box::new(|_| {}))).unwrap();
-    let running = realtime_thread::start(realtime_thread::thread_config(&config.realtime), work).unwrap();
+    let running = realtime_thread::start(ThreadSetup::of(&config.realtime), work).unwrap();
     let memory_locked = running.begun().report.memory_locked;
 
     let moved_before = moved_pages();

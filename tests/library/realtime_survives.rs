@@ -13,7 +13,7 @@ use takt::Outcome;
 use takt::Port;
 use takt::config::Config;
 use takt::internals::channels::{ChannelSizes, HostSide, LogSide, channels};
-use takt::internals::controller::realtime_thread::{self, LoopParts};
+use takt::internals::controller::realtime_thread::{self, LoopParts, ThreadSetup};
 use takt::internals::controller::session::{self};
 use takt::internals::controller::{Supervisor, assemble};
 use takt::internals::link::trace::Trace;
@@ -70,7 +70,7 @@ fn run<P: BusPort + Send + 'static>(
         clock_journal: None,
         watch: Default::default(),
     };
-    let running = realtime_thread::start(realtime_thread::thread_config(&config.realtime), work).unwrap();
+    let running = realtime_thread::start(ThreadSetup::of(&config.realtime), work).unwrap();
     let mut supervisor = Supervisor::new(config, None);
     while !running.is_finished() {
         supervisor.poll(clock.now_ns(), &mut host);

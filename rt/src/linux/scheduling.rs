@@ -105,19 +105,6 @@ pub fn set_nice(nice: i8) -> Outcome {
     Outcome::of(unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, nice.into()) })
 }
 
-/// Binds the calling thread to `cpu`, counted from 0.
-pub(super) fn pin_to(cpu: usize) -> Outcome {
-    if cpu >= libc::CPU_SETSIZE as usize {
-        return Outcome::Refused { errno: libc::EINVAL };
-    }
-    // SAFETY: all-zero bytes are the empty set.
-    let mut set: libc::cpu_set_t = unsafe { core::mem::zeroed() };
-    // SAFETY: `cpu` lies within the set, as checked above.
-    unsafe { libc::CPU_SET(cpu, &mut set) };
-    // SAFETY: `set` is valid for reading and has the stated size. Thread 0 is the caller.
-    Outcome::of(unsafe { libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set) })
-}
-
 /// The CPU that the calling thread is bound to; `None` if it may run on several.
 pub(super) fn pinned_cpu() -> Option<usize> {
     // SAFETY: all-zero bytes are the empty set.

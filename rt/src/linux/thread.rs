@@ -5,7 +5,7 @@ use core::marker::PhantomData;
 use super::kernel::is_preempt_rt;
 use super::latency::{DmaLatencyHold, remove_timer_slack, timer_slack_ns};
 use super::memory::{PageFaults, lock_all, prefault_stack};
-use super::scheduling::{Scheduling, pin_to, pinned_cpu, set_fifo};
+use super::scheduling::{Scheduling, pinned_cpu, set_fifo};
 use super::step::{Outcome, STEP_COUNT, Step, StepResult};
 
 /// The settings that a real-time thread asks for.
@@ -14,8 +14,8 @@ pub struct ThreadConfig {
     /// The FIFO priority, 1 to 99; `None` leaves the scheduling policy as it is. The threaded interrupt handlers of the kernel run
     /// at 50: above that the loop preempts the CAN driver, below it the driver preempts the loop.
     pub priority: Option<u8>,
-    /// The CPU to stay on, counted from 0; `None` leaves the choice to the kernel.
-    pub cpu: Option<usize>,
+    /// The outcome of binding the thread to a CPU, which its owner has done before.
+    pub affinity: Outcome,
     /// True to lock all memory of the process.
     pub lock_memory: bool,
     /// True to keep the CPUs out of idle states that take long to leave.
@@ -101,7 +101,6 @@ impl RealtimeThread {
     /// FIFO scheduling is the last step. Locking and touching memory can take long, and must not hold up the rest of the system.
     pub fn enter(config: &ThreadConfig) -> Self {
         let timer_slack = remove_timer_slack();
-        let affinity = config.cpu.map_or(Outcome::NotAsked, pin_to);
         let lock = if config.lock_memory { lock_all() } else { Outcome::NotAsked };
         let stack_bytes = prefault_stack(config.stack_bytes);
         let prefault = if stack_bytes == 0 { Outcome::NotAsked } else { Outcome::Granted };
@@ -113,7 +112,7 @@ impl RealtimeThread {
         let fifo = config.priority.map_or(Outcome::NotAsked, set_fifo);
         let steps = [
             StepResult { step: Step::TimerSlack, outcome: timer_slack },
-            StepResult { step: Step::CpuAffinity, outcome: affinity },
+            StepResult { step: Step::CpuAffinity, outcome: config.affinity },
             StepResult { step: Step::LockMemory, outcome: lock },
             StepResult { step: Step::PrefaultStack, outcome: prefault },
             StepResult { step: Step::DmaLatency, outcome: dma_latency },
