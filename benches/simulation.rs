@@ -3,11 +3,11 @@
 #![allow(missing_docs, reason = "made by the macros of the framework")]
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use takt::internals::sim::WireLength;
 use takt::internals::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
+use takt_wire::wire_length::WireLength;
 
 fn drive(node: u8) -> Box<dyn Drive> {
     Box::new(ErobJoint::new(ErobParameters {

@@ -15,29 +15,6 @@ pub mod bit_fields {
     pub use crate::config::bit_fields::*;
 }
 
-pub mod bus_log {
-    pub use crate::bus_log::*;
-}
-
-pub mod canopen {
-    pub mod lss {
-        pub use crate::canopen::lss::*;
-    }
-    pub mod pdo_reader {
-        pub use crate::canopen::pdo_reader::*;
-    }
-    pub mod sdo {
-        pub use crate::canopen::sdo::client::*;
-        pub use crate::canopen::sdo::request::*;
-        pub use crate::canopen::sdo::response::*;
-        pub use crate::canopen::sdo::transfer::*;
-        pub use crate::canopen::sdo::wire::*;
-    }
-    pub mod time {
-        pub use crate::canopen::time::*;
-    }
-}
-
 pub mod channels {
     pub use crate::channels::*;
 }
@@ -80,9 +57,6 @@ pub mod doctor {
     pub use crate::doctor::*;
 }
 
-pub mod erob_can {
-    pub use crate::erob_can::*;
-}
 pub mod family {
     pub mod erob {
         pub use crate::family::erob::*;
@@ -107,10 +81,6 @@ pub mod hollow {
     }
 }
 
-pub mod hollow_lines {
-    pub use crate::hollow_lines::*;
-}
-
 pub mod journal {
     pub use crate::journal::*;
 }
@@ -133,10 +103,6 @@ pub mod link {
     }
 }
 
-pub mod modbus {
-    pub use crate::modbus::*;
-}
-
 pub mod monitor {
     pub use crate::monitor::*;
 }
@@ -157,7 +123,6 @@ pub mod replay {
 }
 
 pub mod schedule {
-    pub use crate::frame_time::*;
     pub use crate::schedule::response_time::*;
 }
 
@@ -184,7 +149,6 @@ pub mod sim {
     pub mod pseudo_terminal {
         pub use crate::sim::pseudo_terminal::*;
     }
-    pub use crate::sim::wire_length::*;
     pub mod erob {
         pub use crate::sim::erob::*;
     }

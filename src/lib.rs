@@ -79,12 +79,11 @@
 //! link sim                            sockets; simulated buses and drives
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
-//! canopen erob_can modbus             CiA 301, 305 and 306; eRob's own protocol; Modbus-RTU; all without I/O
-//! hollow_lines                        the serial lines of the hollow-shaft motors, without I/O
 //! channels                            the lock-free channels to the real-time thread
-//! bus_log                             logs of frames, as other programs write and read them
-//! trajectory packet frame_time sleep_alignment monotonic_clock source_text printable text_file
+//! trajectory packet sleep_alignment monotonic_clock
 //! ```
+//!
+//! Below all of them are the crates [`takt_wire`] (protocols without I/O, times of frames on the wire, logs of frames) and [`takt_rt`].
 //!
 //! A run meets the parts in this order: `config` reads the file, `link` opens the buses, `schedule` says whether everything fits,
 //! `controller` assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its life (bring-up by
@@ -99,8 +98,6 @@
 #[cfg(feature = "browser")]
 #[doc(hidden)]
 pub mod browser;
-mod bus_log;
-pub mod canopen;
 mod channels;
 #[cfg(feature = "cli")]
 mod cli;
@@ -111,23 +108,9 @@ pub mod config;
 mod controller;
 #[cfg(feature = "cli")]
 mod doctor;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(
-        unnameable_types,
-        reason = "sessions of procedures name its types, and nobody outside names those sessions"
-    )
-)]
-mod erob_can;
 pub mod error;
 pub mod family;
 pub mod faults;
-mod frame_time;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "tasks on a line name its types, and nobody outside names those tasks")
-)]
-mod hollow_lines;
 #[cfg(feature = "internals")]
 #[doc(hidden)]
 pub mod internals;
@@ -135,14 +118,6 @@ pub mod internals;
 mod jitter;
 mod journal;
 pub mod link;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(
-        unnameable_types,
-        reason = "sessions on a line name its types, and nobody outside names those sessions"
-    )
-)]
-mod modbus;
 #[cfg(any(feature = "cli", feature = "internals"))]
 mod monitor;
 mod monotonic_clock;
@@ -151,7 +126,6 @@ mod packet;
 mod panel;
 #[cfg(feature = "cli")]
 mod play;
-mod printable;
 mod procedure;
 #[cfg(target_os = "linux")]
 mod remote;
@@ -163,9 +137,7 @@ mod serve;
 pub mod sim;
 #[cfg(target_os = "linux")]
 mod sleep_alignment;
-mod source_text;
 pub mod telemetry;
-mod text_file;
 pub mod trajectory;
 
 #[cfg(feature = "cli")]
@@ -201,6 +173,9 @@ pub use remote::{Client, ClientEvents, ClientGroup, ClientStream, ConnectError, 
 pub use serve::{ServeError, ServeOptions, Server, serve};
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Interpolation, Trajectory, TrajectoryError, TrajectoryPoint};
+
+/// The CANopen services, device descriptions and configuration files that configurations and families name.
+pub use takt_wire::canopen;
 
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use takt::Config;
-use takt::internals::bus_log::{self, Direction, LogFormat, LogWriter, LoggedFrame};
 use takt::internals::monitor::{BusDecoder, BusStatistics};
 use takt_rt::Frame;
+use takt_wire::bus_log::{self, Direction, LogFormat, LogWriter, LoggedFrame};
 
 use super::input::Input;
 

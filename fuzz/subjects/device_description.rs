@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use takt::canopen::dcf::{DeviceConfiguration, decode_concise, encode_concise};
-use takt::canopen::eds::{self, Findings, Severity};
+use takt_wire::canopen::dcf::{DeviceConfiguration, decode_concise, encode_concise};
+use takt_wire::canopen::eds::{self, Findings, Severity};
 
 /// Reads bytes as a device description. An error says what is wrong and where. A description without errors has values that
 /// can be written, and only warnings.

@@ -5,11 +5,11 @@ use std::sync::OnceLock;
 
 use takt::config::Config;
 use takt::family::{OffCycleDrive, OffCycleTarget, OffCycleWish};
-use takt::internals::erob_can::entries;
-use takt::internals::erob_can::frame::ReceivedRequest;
 use takt::internals::family::erob_can::follower::Follower;
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, DriveState, Frame, ReceiveBatch};
+use takt_wire::erob_can::entries;
+use takt_wire::erob_can::frame::ReceivedRequest;
 
 use super::input::Input;
 

@@ -1,11 +1,11 @@
 //! Fuzzes every decoder of a serial line with arbitrary bytes.
 
-use takt::internals::hollow_lines::console::{ConsoleCommand, ConsoleReader, TERMINATOR};
-use takt::internals::hollow_lines::encoder::EncoderReading;
-use takt::internals::hollow_lines::motor_data::{MotorCommand, MotorReply};
-use takt::internals::hollow_lines::pulse_module::StiffnessSetting;
-use takt::internals::hollow_lines::transparent::{FrameReader, TransparentFrame};
 use takt_rt::slcan::{AdapterLine, HostLine, LineReader, encode_frame};
+use takt_wire::hollow_lines::console::{ConsoleCommand, ConsoleReader, TERMINATOR};
+use takt_wire::hollow_lines::encoder::EncoderReading;
+use takt_wire::hollow_lines::motor_data::{MotorCommand, MotorReply};
+use takt_wire::hollow_lines::pulse_module::StiffnessSetting;
+use takt_wire::hollow_lines::transparent::{FrameReader, TransparentFrame};
 
 /// What is decoded can be encoded, and gives the same again. After any bytes, the next line is read.
 pub fn run(bytes: &[u8]) {

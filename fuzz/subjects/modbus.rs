@@ -1,15 +1,15 @@
 //! Fuzzes both sides of a Modbus line with arbitrary bytes.
 
-use takt::internals::modbus::exception::ExceptionCode;
-use takt::internals::modbus::frame::{
-    Received, ReceivedRequest, RegisterRange, RegisterValues, Request, SlaveAddress, evaluate, reply_frame,
-};
-use takt::internals::modbus::line_timing::LineTiming;
-use takt::internals::modbus::master::{Master, MasterTiming, Repeat};
 use takt::internals::sim::commanded_module::ModuleParameters;
 use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::internals::sim::serial_line::DevicesOnLine;
 use takt::sim::plant::{Encoder, JointParameters};
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{
+    Received, ReceivedRequest, RegisterRange, RegisterValues, Request, SlaveAddress, evaluate, reply_frame,
+};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::{Master, MasterTiming, Repeat};
 
 use super::input::Input;
 

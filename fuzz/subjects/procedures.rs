@@ -2,15 +2,15 @@
 
 use std::sync::OnceLock;
 
-use takt::canopen::sdo;
 use takt::config::Config;
 use takt::family::bring_up::BringUpTiming;
-use takt::internals::canopen::lss::{
-    BitTiming, Inquiry, LssAddress, LssMaster, LssMode, LssRequest, LssTask, LssTiming,
-};
 use takt::internals::family::bring_up::{BringUp, Shutdown};
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
+use takt_wire::canopen::lss::{
+    BitTiming, Inquiry, LssAddress, LssMaster, LssMode, LssRequest, LssTask, LssTiming,
+};
+use takt_wire::canopen::sdo;
 
 use super::input::Input;
 

@@ -2,19 +2,18 @@
 
 use std::sync::OnceLock;
 
-use takt::canopen::emcy::Emergency;
-use takt::canopen::nmt::{ErrorControl, NmtCommand};
-use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::{SdoTiming, Transfer};
 use takt::config::Config;
-use takt::internals::canopen::lss::{LssRequest, LssResponse};
-use takt::internals::canopen::sdo::{SdoClient, SdoRequest, SdoResponse};
-use takt::internals::canopen::time::TimeOfDay;
-use takt::internals::erob_can::frame::{ReceivedRequest, Reply, Request};
 use takt::sim::SimulatedBus;
 use takt_rt::{
     BusPort, DriveState, Frame, Id, MAX_OBJECTS, MappedObject, Mapping, ProcessImage, ReceiveBatch,
 };
+use takt_wire::canopen::emcy::Emergency;
+use takt_wire::canopen::lss::{LssRequest, LssResponse};
+use takt_wire::canopen::nmt::{ErrorControl, NmtCommand};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::sdo::{SdoClient, SdoRequest, SdoResponse, SdoTiming, Transfer};
+use takt_wire::canopen::time::TimeOfDay;
+use takt_wire::erob_can::frame::{ReceivedRequest, Reply, Request};
 
 use super::input::Input;
 use super::procedures;

@@ -5,10 +5,10 @@ mod view;
 
 use std::path::PathBuf;
 
-use crate::canopen::eds::{self, Findings, Severity};
 use crate::family::cia402;
 use clap::Args;
 use serde::Serialize;
+use takt_wire::canopen::eds::{self, Findings, Severity};
 
 use super::exit::Exit;
 use super::print;

@@ -5,7 +5,7 @@
 use std::fmt;
 use std::io::{Write, stderr};
 
-use crate::printable::printable;
+use takt_wire::printable::printable;
 
 /// Writes a line, as `eprintln!` does.
 macro_rules! say {

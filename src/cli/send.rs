@@ -8,14 +8,14 @@ use std::time::Duration;
 use clap::Args;
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, BusState, Clock, Frame, Nanoseconds, ReceiveBatch, Received};
+use takt_wire::bus_log::Direction;
+use takt_wire::bus_log::frame_text::{self, FrameTextError};
+use takt_wire::printable::printable;
 
-use crate::bus_log::Direction;
-use crate::bus_log::frame_text::{self, FrameTextError};
 use crate::config::{Config, Interface, Quantity};
 use crate::link::ownership::{BusClaim, ClaimError, IfOwned, MasterTraffic, Ownership};
 use crate::link::{InterfaceSettings, LinkPort, RealInterface, SocketCanOptions, open_interface};
 use crate::monitor::{BusDecoder, Decoded};
-use crate::printable::printable;
 use crate::telemetry::WallClock;
 
 use super::configuration;

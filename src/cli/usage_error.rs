@@ -4,8 +4,8 @@ use std::env;
 use std::ffi::OsStr;
 
 use crate::config::ConfigError;
-use crate::printable::printable;
 use serde::Serialize;
+use takt_wire::printable::printable;
 
 use super::exit::Exit;
 use super::print;

@@ -4,10 +4,10 @@ use std::fmt;
 use std::time::Duration;
 
 use takt_rt::{RequestError, StopReason};
+use takt_wire::printable::Shown;
 
 use super::point_check::PointRefusal;
 use super::question::QuestionError;
-use crate::printable::Shown;
 use crate::telemetry::{Machine, words};
 use crate::trajectory::{RateError, TrajectoryError, axis_name};
 

@@ -2,10 +2,10 @@
 //! of the interface tells.
 
 use takt_rt::{BusHealth, BusPort, BusState, Clock, Nanoseconds};
+use takt_wire::canopen::lss::{LssAddress, LssError};
 
 use super::bus_session::{self, SessionEvent};
 use super::layer_settings::{LayerSettingFailure, LayerSettings};
-use crate::canopen::lss::{LssAddress, LssError};
 use crate::family::scan::{Answered, BusScan, FoundDevice, NodeIdentity, Scanned, scan_bus};
 
 /// How long each reply of a fastscan is awaited at the second attempt, for slow adapters. Without replies that come late, the usual time

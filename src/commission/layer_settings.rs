@@ -4,12 +4,12 @@
 use std::collections::VecDeque;
 
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
-
-use super::bus_session::SessionEvent;
-use crate::canopen::lss::{
+use takt_wire::canopen::lss::{
     Inquiry, LssAddress, LssError, LssMaster, LssMode, LssOutcome, LssResponse, LssTask, LssTiming,
 };
-use crate::canopen::nmt::{ErrorControl, NmtState};
+use takt_wire::canopen::nmt::{ErrorControl, NmtState};
+
+use super::bus_session::SessionEvent;
 
 /// Interval between two polls of the bus.
 const POLL_NS: Nanoseconds = 500_000;

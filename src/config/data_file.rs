@@ -3,11 +3,12 @@
 
 use std::path::Path;
 
+use takt_wire::printable::printable_path;
+
 use super::ConfigError;
 use super::read::entry::Entry;
 use super::read::section::Section;
 use super::spot::Problems;
-use crate::printable::printable_path;
 
 /// Whether anybody has tried what a file says of a drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,7 +58,7 @@ pub(super) fn load<T>(
     parse: impl FnOnce(&str, &str) -> Result<T, ConfigError>,
 ) -> Result<T, ConfigError> {
     let name = printable_path(path);
-    match crate::text_file::read(path) {
+    match takt_wire::text_file::read(path) {
         Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?),
         Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
     }

@@ -3,14 +3,13 @@
 use std::fmt;
 use std::ops::Range;
 
+use takt_wire::canopen::dcf::DcfError;
+use takt_wire::canopen::eds::Findings;
+use takt_wire::printable::{letter_start, printable};
+use takt_wire::source_text::{LineStarts, SourceText};
 use thiserror::Error;
 
-use crate::canopen::dcf::DcfError;
-use crate::canopen::eds::Findings;
-
 use super::problem_kind::ProblemKind;
-use crate::printable::{letter_start, printable};
-use crate::source_text::{LineStarts, SourceText};
 
 /// The most problems that are shown of one configuration; the rest are counted. Whoever gets more of them has given another
 /// file, or will see the rest after the first are mended.

@@ -4,10 +4,10 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use takt_wire::printable::excerpt;
 use thiserror::Error;
 
 use super::model::{CanLine, Interface, SerialDevice};
-use crate::printable::excerpt;
 
 /// The longest name of a network interface of Linux (IFNAMSIZ less the final zero).
 const LONGEST_NAME: usize = 15;

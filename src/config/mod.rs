@@ -51,14 +51,13 @@ pub use sources::{ConfigSources, SourcesError};
 pub use supervision::{ErrorControl, Supervision};
 pub use urdf::{LimitOrigin, Urdf, UrdfError, UrdfJoint, UrdfLimits};
 
+use takt_wire::printable::printable_path;
 use thiserror::Error;
-
-use crate::printable::printable_path;
 
 /// Reads a file and checks it, as [`read::parse`] does its text.
 pub(crate) fn load(path: &Path, knowledge: &Knowledge<'_>) -> Result<Config, ConfigError> {
     let name = printable_path(path);
-    match crate::text_file::read(path) {
+    match takt_wire::text_file::read(path) {
         Ok(bytes) => parse(&name, &ConfigError::text_of(&name, bytes)?, knowledge),
         Err(error) => Err(ConfigError::unreadable(&name, error.to_string())),
     }

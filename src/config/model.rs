@@ -13,10 +13,11 @@ pub use takt_rt::AxisLimits as Limits;
 pub use takt_rt::ControlLaw as Control;
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
+use takt_wire::canopen::dcf::DeviceConfiguration;
+
 use super::drive_family::DriveFamily;
 use super::position_unit::PositionUnit;
 use super::urdf::UrdfLimits;
-use crate::canopen::dcf::DeviceConfiguration;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
 #[derive(Clone, Debug, PartialEq)]

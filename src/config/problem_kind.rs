@@ -2,9 +2,8 @@
 
 use std::borrow::Cow;
 
+use takt_wire::canopen::dcf::DcfError;
 use thiserror::Error;
-
-use crate::canopen::dcf::DcfError;
 
 use super::interface::InterfaceError;
 use super::quantity::{self, Quantity};

@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use takt_wire::text_file;
+
 use super::{Config, ConfigError, OverrideError};
-use crate::text_file;
 
 /// The files that a configuration was made of, with their contents: the file itself, and what it names (EDS, DCF, descriptions).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

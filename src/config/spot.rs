@@ -8,11 +8,12 @@ use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
+use takt_wire::source_text::LineStarts;
+
 use super::bounds::Bounds;
 use super::error::{Location, Problem};
 use super::problem_kind::ProblemKind;
 use super::quantity::Quantity;
-use crate::source_text::LineStarts;
 
 /// The problems found so far. Reading goes on after a problem, so that all of them are shown at once.
 pub struct Problems {

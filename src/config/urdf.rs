@@ -6,6 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
+use takt_wire::printable::{excerpt, printable_path};
 use thiserror::Error;
 use urdf_rs::{Joint, JointType, Robot};
 
@@ -13,7 +14,6 @@ use super::model::{Axis, Config, Travel};
 use super::quantities::Quantities;
 use super::quantity::Quantity;
 use super::spelling;
-use crate::printable::{excerpt, printable_path};
 
 /// Deepest nesting of elements. A URDF needs five levels, extensions of simulators some more. `urdf-rs` needs time that grows with the
 /// square of the depth.
@@ -205,7 +205,7 @@ impl Urdf {
     pub fn load(path: &Path) -> Result<Self, UrdfError> {
         let unreadable =
             |reason: String| UrdfError::Unreadable { file: printable_path(path), reason: excerpt(&reason) };
-        let bytes = crate::text_file::read(path).map_err(|error| unreadable(error.to_string()))?;
+        let bytes = takt_wire::text_file::read(path).map_err(|error| unreadable(error.to_string()))?;
         let text = String::from_utf8(bytes).map_err(|_| unreadable("it is not text in UTF-8".to_owned()))?;
         Self::parse(path, &text)
     }

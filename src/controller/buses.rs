@@ -2,8 +2,8 @@
 //! another master is recognised. The folder `link` knows interfaces alone; which drives are on a bus is decided here.
 
 use takt_rt::Id;
+use takt_wire::canopen::function_code;
 
-use crate::canopen::function_code;
 use crate::config::Config;
 use crate::config::identifiers::IdUse;
 use crate::family::bring_up::ProcessData;

@@ -7,9 +7,9 @@ use std::collections::BTreeSet;
 use std::io;
 
 use socketcan::{CanFrame, CanInterface, CanSocket, Frame, Socket, SocketOptions};
+use takt_wire::canopen::nmt::{NmtCommand, NmtTarget};
 
 use super::assemble::is_canopen;
-use crate::canopen::nmt::{NmtCommand, NmtTarget};
 use crate::config::{Config, Interface};
 
 /// The sockets, opened in advance.

@@ -1,8 +1,8 @@
 //! Gives the cycle the time of day, which its monotonic clock does not have.
 
 use takt_rt::Request;
+use takt_wire::canopen::time::since_epoch_ns;
 
-use crate::canopen::time::since_epoch_ns;
 use crate::config::Config;
 use crate::telemetry::WallClock;
 

@@ -1,8 +1,9 @@
 //! Serial adapters on USB: RS-485 lines and SLCAN adapters are reached through them.
 
+use takt_wire::modbus::line_timing::LineTiming;
+
 use super::finding::{Check, Finding, Group};
 use super::source::Source;
-use crate::modbus::line_timing::LineTiming;
 
 const LATENCY: Check = Check {
     key: "serial_latency",

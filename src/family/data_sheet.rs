@@ -1,8 +1,7 @@
 //! What the data sheet of one drive says, where the drives of a family differ.
 
 use takt_rt::{Nanoseconds, OperationMode};
-
-use crate::canopen::object::{DataType, ObjectAddress};
+use takt_wire::canopen::object::{DataType, ObjectAddress};
 
 /// The data sheet of one drive, as far as its commissioning and its error codes need it.
 pub trait DataSheet {

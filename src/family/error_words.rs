@@ -1,8 +1,9 @@
 //! The error codes of drives in words, each with its cure. What a code means depends on the family of the drive.
 
+use takt_wire::canopen::emcy::ErrorCode;
+
 use super::DataSheet;
 use super::registry::{named, of};
-use crate::canopen::emcy::ErrorCode;
 use crate::config::DriveFamily;
 
 /// A drive that reports a fault without a code.

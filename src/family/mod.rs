@@ -53,10 +53,11 @@ pub use warning::{Warning, WarningKind, WarningSubject};
 pub(crate) use watchdog::least_shut_down_ns;
 pub use watchdog::{SignOfLife, Unwatched, Watchdog, stops_by_itself_after, unreached_words};
 
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::object::Object;
-use crate::canopen::objects::PdoDirection;
-use crate::canopen::sdo::SdoTiming;
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::object::Object;
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::canopen::sdo::SdoTiming;
+
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, PdoMapping};
 use crate::family::bring_up::{AxisSession, ProcessData, StepResult};
 pub use crate::family::commission::NamedEntry;

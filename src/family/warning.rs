@@ -4,7 +4,8 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use crate::canopen::object::ObjectAddress;
+use takt_wire::canopen::object::ObjectAddress;
+
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Short;
 use crate::config::{Axis, Bus, Config, Control, Interface, Plausible, ProgramTarget, Quantity, Travel};

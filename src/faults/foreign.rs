@@ -1,9 +1,9 @@
 //! A foreign station on the bus.
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::canopen::nmt::{ErrorControl, NmtState};
 
 use super::effect::ForeignFrames;
-use crate::canopen::nmt::{ErrorControl, NmtState};
 
 /// Most frames sent in one call, so that a long pause between calls does not cause a burst.
 const FRAMES_AT_ONCE: u32 = 64;

@@ -3,8 +3,8 @@
 use std::ops::RangeInclusive;
 
 use takt_rt::{Frame, Id};
+use takt_wire::canopen::function_code;
 
-use crate::canopen::function_code;
 use crate::sim::random::Random;
 
 /// The direction of a frame, seen from the controller.

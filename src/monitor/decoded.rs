@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::canopen::object::ObjectAddress;
+use takt_wire::canopen::object::ObjectAddress;
 
 /// What a frame is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 
 use takt_rt::{DriveState, Frame, FrameKind, TimeOfDay};
+use takt_wire::canopen::function_code;
+use takt_wire::canopen::lss::{LssRequest, LssResponse};
+use takt_wire::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
+use takt_wire::canopen::sdo::{SdoRequest, SdoResponse};
 
 use super::decoded::{Decoded, DecodedValue, Service};
 use super::members::{Member, Members, NamedDrive, Spoken};
 use super::process_data;
 use super::sdo_traffic::{Heard, SdoTraffic};
-use crate::canopen::function_code;
-use crate::canopen::lss::{LssRequest, LssResponse};
-use crate::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::objects::PdoDirection;
-use crate::canopen::pdo_configuration::PdoConfiguration;
-use crate::canopen::sdo::{SdoRequest, SdoResponse};
 use crate::config::Config;
 use crate::family::commission::{TargetDrive, meaning};
 

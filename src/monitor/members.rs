@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 
 use takt_rt::{Frame, Id, MappedObject};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 
 use super::field_frames::FieldMember;
 use super::process_data::configured;
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::pdo_configuration::PdoConfiguration;
 use crate::config::{Config, DriveFamily, PdoMapping};
 use crate::family::bring_up::ProcessData;
 use crate::family::commission::TargetDrive;

@@ -1,11 +1,11 @@
 //! PDOs in words, by the mapping that is in force.
 
 use takt_rt::{DriveState, Frame, MappedObject};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 
 use super::decoded::DecodedValue;
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::objects::PdoDirection;
-use crate::canopen::pdo_configuration::PdoConfiguration;
 use crate::family::bring_up::{PdoPlan, ProcessData};
 use crate::family::commission::{TargetDrive, meaning};
 

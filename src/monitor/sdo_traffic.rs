@@ -4,14 +4,12 @@
 use std::collections::BTreeMap;
 
 use takt_rt::Frame;
-
-use crate::canopen::function_code;
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::objects::{PdoDirection, PdoParameters};
-use crate::canopen::pdo_configuration::PdoConfiguration;
-use crate::canopen::sdo::wire::BlockSegment;
-use crate::canopen::sdo::{SdoRequest, SdoResponse};
-use crate::printable::printable;
+use takt_wire::canopen::function_code;
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::objects::{PdoDirection, PdoParameters};
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
+use takt_wire::canopen::sdo::{BlockSegment, SdoRequest, SdoResponse};
+use takt_wire::printable::printable;
 
 /// Bytes of a transfer that are kept, to show them at its end.
 const KEPT_BYTES: usize = 512;

@@ -3,8 +3,7 @@
 use std::collections::BTreeMap;
 
 use takt_rt::{Frame, NANOSECONDS_PER_SECOND, Nanoseconds};
-
-use crate::sim::wire_length::WireLength;
+use takt_wire::wire_length::WireLength;
 
 /// The load is measured in windows of this length, to find the busiest one.
 const WINDOW_NS: Nanoseconds = 100_000_000;

@@ -3,10 +3,11 @@
 use std::io;
 use std::path::Path;
 
+use takt_wire::text_file;
+
 use super::error::{FileProblem, PlayFileError};
 use super::table::{self, Cell};
 use crate::config::Axis;
-use crate::text_file;
 
 /// Longer than thirty years is a slip, and would not fit the clock in nanoseconds.
 const LONGEST_S: f64 = 1e9;

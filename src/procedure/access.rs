@@ -1,6 +1,6 @@
 //! An access to an object of a drive, for messages.
 
-use crate::canopen::object::Object;
+use takt_wire::canopen::object::Object;
 
 /// An access to an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

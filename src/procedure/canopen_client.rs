@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 
 use takt_rt::{Frame, Id, Nanoseconds};
+use takt_wire::canopen::emcy::Emergency;
+use takt_wire::canopen::function_code;
+use takt_wire::canopen::nmt::{ErrorControl, NmtState};
+use takt_wire::canopen::sdo::SdoClient;
 
 use super::client::Client;
 use super::sdo_quirks::SdoQuirks;
-use crate::canopen::emcy::Emergency;
-use crate::canopen::function_code;
-use crate::canopen::nmt::{ErrorControl, NmtState};
-use crate::canopen::sdo::SdoClient;
 
 /// The client of one node.
 #[derive(Debug)]

@@ -3,14 +3,14 @@
 //! Nothing here fails because of an interruption: the users decide where they let themselves be interrupted.
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::canopen::emcy::Emergency;
+use takt_wire::canopen::nmt::{NmtCommand, NmtState, NmtTarget};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
 
 use super::canopen_client::{CanopenClient, OwnHeartbeat};
 use super::sdo_quirks::SdoQuirks;
 use super::session::ProcedureSession;
-use crate::canopen::emcy::Emergency;
-use crate::canopen::nmt::{NmtCommand, NmtState, NmtTarget};
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
 
 /// Interval between two reads of a polled object.
 pub const POLL_NS: Nanoseconds = 5_000_000;

@@ -1,11 +1,11 @@
 //! What the code of a procedure does with a slave on a Modbus line: it reads and writes registers.
 
 use takt_rt::Nanoseconds;
+use takt_wire::modbus::frame::{RegisterRange, RegisterValues, Request, SlaveAddress, Values};
+use takt_wire::modbus::master::{Answer, Master, MasterTiming, Repeat, RequestError};
 
 use super::client::Client;
 use super::session::ProcedureSession;
-use crate::modbus::frame::{RegisterRange, RegisterValues, Request, SlaveAddress, Values};
-use crate::modbus::master::{Answer, Master, MasterTiming, Repeat, RequestError};
 
 /// The master of a line, for one slave.
 #[derive(Debug)]

@@ -1,8 +1,7 @@
 //! Timing and deviations of a drive's SDO server.
 
 use takt_rt::Nanoseconds;
-
-use crate::canopen::sdo::{SdoError, SdoTiming};
+use takt_wire::canopen::sdo::{SdoError, SdoTiming};
 
 /// Timing and deviations of a drive's SDO server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

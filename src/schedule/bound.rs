@@ -7,9 +7,10 @@
 //! it is known from the order within the cycle, so for a frame of ours those count as more important, and it competes
 //! with the identifier of the least important of them.
 
+use takt_wire::frame_time::{BitRates, worst_case_bits};
+
 use super::messages::{BusMessage, MessageKind};
 use super::response_time::{Message, response_time};
-use crate::frame_time::{BitRates, worst_case_bits};
 
 /// The messages that are analysed together, highest priority first.
 #[derive(Clone, Copy)]

@@ -33,12 +33,12 @@ use crate::family;
 use bound::Traffic;
 use messages::BusMessage;
 
-pub(crate) use crate::frame_time::{BitRates, worst_case_bits};
 pub use command_phase::{NoCommandPhase, automatic_command_phase};
 pub use messages::MessageKind;
 pub use remedy::Remedy;
 pub use send_phase::send_phase_ns;
 pub use slot::Slot;
+pub(crate) use takt_wire::frame_time::{BitRates, worst_case_bits};
 
 /// The result of the analysis of one bus. Times are in ns.
 #[derive(Clone, Debug, PartialEq, Serialize)]

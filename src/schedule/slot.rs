@@ -17,10 +17,10 @@
 //! is in time.
 
 use serde::Serialize;
+use takt_wire::frame_time::{BitRates, worst_case_bits};
 
 use super::messages::{BusMessage, MessageKind};
 use crate::config::Cycle;
-use crate::frame_time::{BitRates, worst_case_bits};
 
 /// The worst slot of a bus. All times are counted from the start of the slot or are lengths, in ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

@@ -4,8 +4,8 @@
 mod access;
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
+use takt_wire::canopen::object::ObjectAddress;
 
-use crate::canopen::object::ObjectAddress;
 use crate::config::PowerUpState;
 
 use super::drive::NodeState;

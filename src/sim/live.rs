@@ -165,12 +165,11 @@ mod tests {
     use std::os::unix::net::UnixDatagram;
     use std::path::Path;
 
-    use takt_rt::Id;
-
     use super::*;
-    use crate::canopen::lss::{LssAddress, LssRequest, LssResponse};
     use crate::config::Config;
     use crate::sim::erob::{ErobJoint, ErobParameters};
+    use takt_rt::Id;
+    use takt_wire::canopen::lss::{LssAddress, LssRequest, LssResponse};
 
     /// The drives of the first bus of a configuration on one end of a socket pair, and the other end. Only the
     /// interface differs from a real one.

@@ -3,9 +3,8 @@
 use std::collections::VecDeque;
 
 use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch, Received};
-
-use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssMode, LssRequest, LssResponse, LssResult};
-use crate::canopen::nmt::{ErrorControl, NmtState};
+use takt_wire::canopen::lss::{BitTiming, Inquiry, LssAddress, LssMode, LssRequest, LssResponse, LssResult};
+use takt_wire::canopen::nmt::{ErrorControl, NmtState};
 
 /// The node ID of an unconfigured device.
 const NO_NODE: u8 = 0xFF;

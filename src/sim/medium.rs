@@ -6,9 +6,9 @@
 //! here the station with the lower number goes first.
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::wire_length::{INTERMISSION_BITS, WireLength, bits_ns};
 
 use super::mailbox::{Mailbox, QueueOrder, priority};
-use super::wire_length::{INTERMISSION_BITS, WireLength, bits_ns};
 
 /// The bit rates of a bus in bit/s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,11 +7,11 @@
 //!     medium               drive ── Drive: the interface between a simulated drive and its bus
 //!     arbitration           │
 //!     who sends, when       │
-//!     mailbox  wire        cia402 ── any CiA 402 drive, made from its electronic data sheet
+//!     mailbox              cia402 ── any CiA 402 drive, made from its electronic data sheet
 //!                          bit_fields ── any drive of bit fields, made from its description
 //!                          erob, erob_can, yz_aim ── drives of their own, by their manuals and field experience
-//!     frames   bits,        │
-//!     waiting  stuffing     ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
+//!     frames                │
+//!     waiting               ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
 //!                           │     canopen_node ── these together, for the drives with CiA 402
 //!                         erob_modbus ── a drive on a serial line, with its line
 //!                           │
@@ -98,7 +98,6 @@ mod servo;
 mod silent_drive;
 #[cfg(feature = "cli")]
 pub(crate) mod slcan_adapter;
-pub(crate) mod wire_length;
 pub(crate) mod yz_aim;
 
 pub use defect::{Defect, Disobedience, Unsupported};

@@ -3,9 +3,9 @@
 
 pub mod table;
 
-use crate::canopen::eds;
-use crate::canopen::eds::{AccessType, DataTypeCode, ObjectType, ValueKind};
-use crate::canopen::object::ObjectAddress;
+use takt_wire::canopen::eds;
+use takt_wire::canopen::eds::{AccessType, DataTypeCode, ObjectType, ValueKind};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::sdo_reply::AbortCode;
 use table::ObjectRow;

@@ -10,8 +10,7 @@ use std::collections::VecDeque;
 use std::ops::Range;
 
 use takt_rt::Nanoseconds;
-
-use crate::canopen::object::ObjectAddress;
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::random::Random;
 use super::sdo_reply::{AbortCode, aborted, addressed, downloaded, uploaded};

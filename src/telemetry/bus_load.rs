@@ -1,10 +1,10 @@
 //! The load of a bus, by the frames that have passed its port.
 
 use takt_rt::{BusHealth, Nanoseconds};
+use takt_wire::wire_length::WireLength;
 
 use super::machine::BusDescription;
 use crate::link::trace::{TracedFrame, TracedHealth};
-use crate::sim::wire_length::WireLength;
 
 /// How often it is told.
 const PERIOD_NS: Nanoseconds = 100_000_000;

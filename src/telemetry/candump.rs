@@ -3,11 +3,11 @@
 use std::io::{self, BufWriter, Write};
 
 use takt_rt::Nanoseconds;
+use takt_wire::bus_log::candump::CandumpLine;
 
 use super::destination::Opened;
 use super::history::OnBus;
 use super::wall_clock::WallClock;
-use crate::bus_log::candump::CandumpLine;
 use crate::link::trace::{Trace, TracedFrame};
 
 /// Frames wait this long before they are written, so that the log is in the order of time. Received frames are read some

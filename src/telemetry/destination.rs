@@ -1,10 +1,10 @@
 //! Where a recording or a log is written. An existing file is never overwritten.
 
-use crate::printable::printable_path;
 use std::ffi::OsStr;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+use takt_wire::printable::printable_path;
 
 /// Where a recording or a log is written.
 #[non_exhaustive]

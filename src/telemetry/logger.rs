@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock};
 
 use mcap::McapError;
 use takt_rt::{CycleRecord, Event, Nanoseconds};
+use takt_wire::printable::printable_path;
 
 use super::announce;
 use super::black_box::{BlackBox, BlackBoxOptions, Incident, reason};
@@ -28,7 +29,6 @@ use crate::channels::LogSide;
 use crate::config::ConfigSources;
 use crate::journal::{RerunParts, RunJournal};
 use crate::link::trace::{Trace, Traced, TracedHealth};
-use crate::printable::printable_path;
 
 /// What is to be done with the record of each cycle.
 pub type EachCycle = Box<dyn FnMut(&CycleRecord) + Send>;

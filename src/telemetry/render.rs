@@ -3,11 +3,12 @@
 
 use std::fmt::Write;
 
+use takt_wire::printable::{printable, printable_path};
+
 use super::report::{
     AxisReport, BusReport, DECADES, GroupReport, LatencyReport, RANGES_PER_DECADE, RealtimeReport, RunEnd,
     RunReport, SetPointParts, StopReport,
 };
-use crate::printable::{printable, printable_path};
 
 /// Rows of the bars of a histogram.
 const ROWS: usize = 3;

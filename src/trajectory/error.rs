@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::printable::Shown;
+use takt_wire::printable::Shown;
 
 /// What of a point is meant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

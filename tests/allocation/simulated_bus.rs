@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use takt::Port;
-use takt::canopen::eds;
 use takt::config::quirks::Quirks;
 use takt::faults::{
     DelayPlace, DriveEffect, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect,
@@ -17,6 +16,7 @@ use takt::sim::homing_switches::ReferenceSwitches;
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Defect, Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
+use takt_wire::canopen::eds;
 
 use crate::heap;
 

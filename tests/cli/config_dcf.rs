@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use takt::canopen::object::ObjectAddress;
 use takt::config::{Config, ConfigError};
+use takt_wire::canopen::object::ObjectAddress;
 
 const CONFIG: &str = r#"
 name = "small"

@@ -19,14 +19,14 @@ use takt::internals::family::erob_modbus::drive::{AccessError, ErobDrive};
 use takt::internals::family::erob_modbus::registers;
 use takt::internals::link::modbus_line::ModbusLine;
 use takt::internals::link::serial_line::{SerialLineError, SerialSettings};
-use takt::internals::modbus::exception::ExceptionCode;
-use takt::internals::modbus::frame::{RegisterRange, RegisterValues, Request, SlaveAddress};
-use takt::internals::modbus::line_timing::LineTiming;
-use takt::internals::modbus::master::{Answer, Master, MasterTiming, Repeat, RequestError, RequestFailure};
 use takt::internals::procedure::{ModbusClient, ModbusSession, Procedure, ProcedureError};
 use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::internals::sim::pseudo_terminal::PseudoTerminal;
 use takt::internals::sim::serial_line::host;
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{RegisterRange, RegisterValues, Request, SlaveAddress};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::{Answer, Master, MasterTiming, Repeat, RequestError, RequestFailure};
 
 use crate::printed::ends_with;
 use crate::simulated::at_once;

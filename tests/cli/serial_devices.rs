@@ -5,9 +5,9 @@ use std::io::{Read, Write};
 use std::thread;
 use std::time::Duration;
 
-use takt::internals::hollow_lines::encoder::{self, EncoderReading};
-use takt::internals::hollow_lines::motor_data::{MotorCommand, MotorMode, MotorReply, MotorRun};
-use takt::internals::hollow_lines::transparent::{FrameReader, TransparentFrame};
+use takt_wire::hollow_lines::encoder::{self, EncoderReading};
+use takt_wire::hollow_lines::motor_data::{MotorCommand, MotorMode, MotorReply, MotorRun};
+use takt_wire::hollow_lines::transparent::{FrameReader, TransparentFrame};
 
 use crate::simulated::Simulated;
 

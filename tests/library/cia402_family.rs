@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use takt::Config;
-use takt::canopen::objects::PdoDirection;
-use takt::canopen::pdo_configuration::PdoConfiguration;
 use takt::config::Control;
 use takt::family::bring_up::{PdoPlan, ProcessData};
 use takt::family::cia402::{self, Device};
 use takt::{Outcome, VirtualRun};
 use takt_rt::PositionCounter;
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 
 const CYCLES_AT_MOST: u64 = 60_000;
 

@@ -1,13 +1,13 @@
 //! An axis that speaks eRob's own CAN protocol follows its group beside the cycle, in virtual time.
 
 use takt::family::{OffCycleDrive, OffCycleTarget, OffCycleWish};
-use takt::internals::erob_can::entries;
-use takt::internals::erob_can::frame::{ReceivedRequest, Reply, replying_node};
 use takt::internals::family::erob_can::follower::Follower;
 use takt::schedule::{self, MessageKind};
 use takt::sim::{Defect, DriveFault, SimulatedBus};
 use takt::{Config, Outcome, VirtualRun};
 use takt_rt::{BusPort, DriveState, Frame, OffCycleReport, ReceiveBatch};
+use takt_wire::erob_can::entries;
+use takt_wire::erob_can::frame::{ReceivedRequest, Reply, replying_node};
 
 const MS: u64 = 1_000_000;
 const NODE: u8 = 1;

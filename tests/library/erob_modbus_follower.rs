@@ -5,14 +5,14 @@ use std::f64::consts::TAU;
 use takt::family::{OffCycleLine, OffCycleTarget, OffCycleWish};
 use takt::internals::family::erob_modbus::follower::FollowerParameters;
 use takt::internals::family::erob_modbus::line::FollowedLine;
-use takt::internals::modbus::frame::{ReceivedRequest, Request, SlaveAddress};
-use takt::internals::modbus::line_timing::LineTiming;
-use takt::internals::modbus::master::MasterTiming;
 use takt::internals::sim::commanded_module::ModuleParameters;
 use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::sim::plant::Encoder;
 use takt::sim::{Defect, DevicesOnLine, Drive, LineDisturbance, Observation};
 use takt_rt::{DriveState, OffCycleReport};
+use takt_wire::modbus::frame::{ReceivedRequest, Request, SlaveAddress};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::MasterTiming;
 
 type Nanoseconds = u64;
 

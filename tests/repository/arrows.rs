@@ -1,11 +1,19 @@
-//! The folders of src/ stand in one order, and use only what is below them.
+//! The folders of a crate stand in one order, and use only what is below them.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The order, from top to bottom. A file at the top level of src/ counts as a folder. The picture in src/lib.rs is the same.
-const ORDER: [&str; 38] = [
+/// The sources of a crate, and the order of its folders from top to bottom. A file at the top level counts as a folder. The picture in
+/// lib.rs is the same.
+struct Tree {
+    root: &'static str,
+    order: &'static [&'static str],
+}
+
+const TREES: [Tree; 2] = [Tree { root: "src", order: &TAKT }, Tree { root: "crates/wire/src", order: &WIRE }];
+
+const TAKT: [&str; 29] = [
     "internals",
     "cli",
     "browser",
@@ -30,17 +38,21 @@ const ORDER: [&str; 38] = [
     "sim",
     "config",
     "procedure",
+    "channels",
+    "trajectory",
+    "packet",
+    "sleep_alignment",
+    "monotonic_clock",
+];
+
+const WIRE: [&str; 10] = [
     "canopen",
     "erob_can",
     "modbus",
     "hollow_lines",
-    "channels",
     "bus_log",
-    "trajectory",
-    "packet",
+    "wire_length",
     "frame_time",
-    "sleep_alignment",
-    "monotonic_clock",
     "source_text",
     "printable",
     "text_file",
@@ -56,9 +68,9 @@ struct Arrow {
 
 #[test]
 fn no_folder_uses_one_that_stands_above_it() {
-    let back: Vec<String> = arrows()
-        .into_iter()
-        .filter(points_back)
+    let back: Vec<String> = TREES
+        .iter()
+        .flat_map(|tree| tree.arrows().into_iter().filter(|arrow| tree.points_back(arrow)))
         .map(|Arrow { from, to, place }| format!("{place}: {from} uses {to}, which is above it"))
         .collect();
     assert!(back.is_empty(), "arrows that point back:\n{}", back.join("\n"));
@@ -99,10 +111,13 @@ const TELL: [&str; 9] = [
 
 #[test]
 fn only_what_runs_beside_the_real_time_thread_tells_tracing() {
-    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("rt/Cargo.toml");
-    assert!(!fs::read_to_string(manifest).unwrap().contains("tracing"));
+    for name in ["rt/Cargo.toml", "crates/wire/Cargo.toml"] {
+        let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
+        assert!(!fs::read_to_string(manifest).unwrap().contains("tracing"), "{name}");
+    }
     let uses_it = |path: &PathBuf| fs::read_to_string(path).unwrap().contains("tracing::");
-    let found: Vec<String> = sources().iter().filter(|path| uses_it(path)).map(|path| shown(path)).collect();
+    let found: Vec<String> =
+        rust_files("src").iter().filter(|path| uses_it(path)).map(|path| shown(path)).collect();
     assert_eq!(found, TELL);
 }
 
@@ -134,7 +149,7 @@ const NAMES: [&str; 22] = [
 
 /// The files that may name a family, and why.
 const MAY_NAME: [(&str, &str); 5] = [
-    ("src/lib.rs", "it declares the folder of a maker's own protocol"),
+    ("crates/wire/src/lib.rs", "it declares the folders of makers' own protocols"),
     ("src/family/registry.rs", "it is the list of the families"),
     ("src/family/mod.rs", "it declares their folders, and their names for configurations in code"),
     ("src/internals.rs", "it shows the simulated drives to the tests"),
@@ -145,12 +160,13 @@ const MAY_NAME: [(&str, &str); 5] = [
 fn only_its_own_folder_and_the_simulation_name_a_family() {
     let mut files = rust_files("src");
     files.extend(rust_files("rt/src"));
+    files.extend(rust_files("crates/wire/src"));
     let is_of_family = |name: &str| {
         let folders = ["erob", "erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402", "hollow"]
             .map(|family| format!("src/family/{family}/"));
         name.starts_with("src/sim/")
-            || name.starts_with("src/erob_can/")
-            || name.starts_with("src/hollow_lines/")
+            || name.starts_with("crates/wire/src/erob_can/")
+            || name.starts_with("crates/wire/src/hollow_lines/")
             || folders.iter().any(|folder| name.starts_with(folder))
     };
     let (mut found, mut needless) = (vec![], vec![]);
@@ -207,24 +223,33 @@ fn lines_without_tests<'a>(path: &Path, text: &'a str) -> impl Iterator<Item = (
 }
 
 #[test]
-fn the_folders_of_src_are_those_of_the_order() {
-    let there: BTreeSet<String> = sources().iter().map(|path| module_path(path)[0].clone()).collect();
-    let roots = ["lib", "main"].map(str::to_owned);
-    let ordered: BTreeSet<String> = ORDER.map(str::to_owned).into_iter().chain(roots).collect();
-    assert_eq!(there, ordered);
+fn the_folders_of_a_crate_are_those_of_its_order() {
+    for tree in &TREES {
+        let there: BTreeSet<String> = tree
+            .files()
+            .iter()
+            .map(|path| tree.module_path(path)[0].clone())
+            .filter(|name| !["lib", "main"].contains(&name.as_str()))
+            .collect();
+        let ordered: BTreeSet<String> = tree.order.iter().map(|name| name.to_string()).collect();
+        assert_eq!(there, ordered, "{}", tree.root);
+    }
 }
 
 #[test]
 fn the_picture_in_the_tour_shows_the_order() {
-    let tour = fs::read_to_string(source_root().join("lib.rs")).unwrap();
-    let picture = tour.split("//! ```text\n").nth(1).and_then(|rest| rest.split("//! ```").next()).unwrap();
-    // The names of a line are before its words, which begin behind two blanks.
-    let line = |line: &str| line.trim_start_matches("//! ").split("  ").next().unwrap().to_owned();
-    let shown: Vec<String> = picture
-        .lines()
-        .flat_map(|text| line(text).split(' ').map(str::to_owned).collect::<Vec<_>>())
-        .collect();
-    assert_eq!(shown, ORDER);
+    for tree in &TREES {
+        let tour = fs::read_to_string(tree.folder().join("lib.rs")).unwrap();
+        let picture =
+            tour.split("//! ```text\n").nth(1).and_then(|rest| rest.split("//! ```").next()).unwrap();
+        // The names of a line are before its words, which begin behind two blanks.
+        let line = |line: &str| line.trim_start_matches("//! ").split("  ").next().unwrap().to_owned();
+        let shown: Vec<String> = picture
+            .lines()
+            .flat_map(|text| line(text).split(' ').map(str::to_owned).collect::<Vec<_>>())
+            .collect();
+        assert_eq!(shown, tree.order, "{}", tree.root);
+    }
 }
 
 #[test]
@@ -259,37 +284,50 @@ fn uses_are_found_wherever_they_stand_in_a_file_and_not_in_comments_or_texts() {
     assert!(found.iter().all(|arrow| arrow.from == "here"));
 }
 
-/// An arrow to something that is no folder, such as a name that lib.rs re-exports, hides where it leads: it points back too.
-fn points_back(arrow: &Arrow) -> bool {
-    let place = |name: &str| ORDER.iter().position(|folder| *folder == name);
-    match (place(&arrow.from), place(&arrow.to)) {
-        (Some(from), Some(to)) => to < from,
-        // lib.rs and main.rs stand above all.
-        (None, _) => false,
-        (Some(_), None) => true,
+impl Tree {
+    fn folder(&self) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join(self.root)
     }
-}
 
-fn arrows() -> Vec<Arrow> {
-    let mut all = vec![];
-    for path in sources() {
-        let text = fs::read_to_string(&path).unwrap();
-        all.extend(arrows_in(&text, &module_path(&path), &shown(&path)));
+    fn files(&self) -> Vec<PathBuf> {
+        rust_files(self.root)
     }
-    all
+
+    /// The names of the module of a file, as in `["link", "ownership"]`.
+    fn module_path(&self, path: &Path) -> Vec<String> {
+        let relative = path.strip_prefix(self.folder()).unwrap().with_extension("");
+        let mut names: Vec<String> =
+            relative.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        if names.last().is_some_and(|name| name == "mod") {
+            names.pop();
+        }
+        names
+    }
+
+    fn arrows(&self) -> Vec<Arrow> {
+        let mut all = vec![];
+        for path in self.files() {
+            let text = fs::read_to_string(&path).unwrap();
+            all.extend(arrows_in(&text, &self.module_path(&path), &shown(&path)));
+        }
+        all
+    }
+
+    /// An arrow to something that is no folder, such as a name that lib.rs re-exports, hides where it leads: it points back too.
+    fn points_back(&self, arrow: &Arrow) -> bool {
+        let place = |name: &str| self.order.iter().position(|folder| *folder == name);
+        match (place(&arrow.from), place(&arrow.to)) {
+            (Some(from), Some(to)) => to < from,
+            // lib.rs and main.rs stand above all.
+            (None, _) => false,
+            (Some(_), None) => true,
+        }
+    }
 }
 
 /// A file of the repository as messages name it.
 fn shown(path: &Path) -> String {
     path.strip_prefix(env!("CARGO_MANIFEST_DIR")).unwrap().display().to_string()
-}
-
-fn source_root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
-}
-
-fn sources() -> Vec<PathBuf> {
-    rust_files("src")
 }
 
 /// The Rust files below a folder of the repository.
@@ -309,16 +347,6 @@ fn rust_files(folder: &str) -> Vec<PathBuf> {
     all.sort();
     assert!(all.len() > 60, "{folder}/ was not found");
     all
-}
-
-/// The names of the module of a file, as in `["link", "ownership"]`.
-fn module_path(path: &Path) -> Vec<String> {
-    let relative = path.strip_prefix(source_root()).unwrap().with_extension("");
-    let mut names: Vec<String> = relative.iter().map(|part| part.to_string_lossy().into_owned()).collect();
-    if names.last().is_some_and(|name| name == "mod") {
-        names.pop();
-    }
-    names
 }
 
 /// Every path of a file that leads to another top-level module of its crate.

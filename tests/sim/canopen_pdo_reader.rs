@@ -2,17 +2,16 @@
 
 use std::path::Path;
 
-use takt::canopen::eds;
-use takt::canopen::object::ObjectAddress;
-use takt::canopen::objects::PdoDirection;
-use takt::canopen::pdo_configuration::PdoConfiguration;
-use takt::canopen::sdo::{Completed, SdoError, SdoTiming, Transfer};
-use takt::internals::canopen::pdo_reader::{PdoReadError, PdoReader};
-use takt::internals::canopen::sdo::{Expedited, SdoClient, SdoRequest};
 use takt::internals::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
+use takt_wire::canopen::eds;
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
+use takt_wire::canopen::pdo_reader::{PdoReadError, PdoReader};
+use takt_wire::canopen::sdo::{Completed, Expedited, SdoClient, SdoError, SdoRequest, SdoTiming, Transfer};
 
 const NODE: u8 = 5;
 const MILLISECOND_NS: u64 = 1_000_000;

@@ -7,12 +7,12 @@ mod services;
 
 use std::path::{Path, PathBuf};
 
-use takt::canopen::eds;
 use takt::config::quirks::Quirks;
 use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters, counts_per_turn};
 use takt::sim::homing_switches::{ReferenceSwitches, Switch};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt_rt::OperationMode;
+use takt_wire::canopen::eds;
 
 use crate::bench::{Bench, MILLISECOND_NS, NODE};
 
@@ -102,7 +102,7 @@ impl Tried {
 
     /// Writes an object with the length that the data sheet gives it.
     pub fn write(&mut self, index: u16, subindex: u8, value: i64) -> Result<(), u32> {
-        let address = takt::canopen::object::ObjectAddress::new(index, subindex);
+        let address = takt_wire::canopen::object::ObjectAddress::new(index, subindex);
         let bits = self.sheet.entry(address).unwrap().data_type.unwrap().bits().unwrap();
         self.bench.write(index, subindex, bits / 8, value)
     }
@@ -148,7 +148,7 @@ impl Tried {
     /// The modes that the drive has, by 6502 or, without it, by its objects.
     pub fn modes(&self) -> Vec<OperationMode> {
         use OperationMode as Mode;
-        let address = takt::canopen::object::ObjectAddress::new(0x6502, 0);
+        let address = takt_wire::canopen::object::ObjectAddress::new(0x6502, 0);
         let supported = self.sheet.number(address, Some(NODE)).filter(|modes| *modes != 0);
         let simulated = Mode::ALL.into_iter().filter(|mode| *mode != Mode::Velocity);
         simulated

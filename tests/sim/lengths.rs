@@ -2,9 +2,9 @@
 //! The two calculations are independent.
 
 use proptest::prelude::*;
-use takt::internals::schedule::{FrameShape, worst_case_bits};
-use takt::internals::sim::WireLength;
 use takt_rt::{Frame, Id};
+use takt_wire::frame_time::{FrameShape, worst_case_bits};
+use takt_wire::wire_length::WireLength;
 
 fn identifiers() -> impl Strategy<Value = Id> {
     prop_oneof![

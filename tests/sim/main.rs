@@ -3,6 +3,7 @@
 mod bench;
 mod canopen_pdo_reader;
 mod cia402;
+mod data_sheet;
 mod device;
 mod lengths;
 mod motion;

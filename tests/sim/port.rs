@@ -1,10 +1,10 @@
 //! The simulated bus as a port of the real-time thread: timing, pauses, counters, determinism.
 
 use takt::config::{Config, Travel};
-use takt::internals::sim::WireLength;
 use takt::internals::sim::erob::ErobJoint;
 use takt::sim::{SimulatedBus, UnknownNode, WireBitRates};
 use takt_rt::{BusPort, BusState, Frame, Id, RECEIVE_BATCH, ReceiveBatch};
+use takt_wire::wire_length::WireLength;
 
 use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
 

@@ -1,6 +1,5 @@
 //! Whom a fault concerns, from the cycle on in which it begins.
 
-use takt::canopen::nmt::{NmtCommand, NmtTarget};
 use takt::config::{Axis, Config};
 use takt::family;
 use takt::faults::{
@@ -9,6 +8,7 @@ use takt::faults::{
 };
 use takt::schedule::analyse;
 use takt::sim::Defect;
+use takt_wire::canopen::nmt::{NmtCommand, NmtTarget};
 
 use crate::heartbeat::MissedHeartbeat;
 use crate::off_cycle::is_beside_the_cycle;

@@ -1,9 +1,9 @@
 //! What is sent to drives that are spoken to outside of the cycle.
 
 use takt::config::{Axis, Config};
-use takt::internals::erob_can::entries;
-use takt::internals::erob_can::frame::ReceivedRequest;
 use takt_rt::Frame;
+use takt_wire::erob_can::entries;
+use takt_wire::erob_can::frame::ReceivedRequest;
 
 /// Whether the drive of an axis is spoken to outside of the cycle.
 pub fn is_beside_the_cycle(axis: &Axis) -> bool {

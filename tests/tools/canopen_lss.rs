@@ -2,13 +2,13 @@
 
 use proptest::prelude::*;
 use takt::VirtualClock;
-use takt::internals::canopen::lss::{
-    BitTiming, Inquiry, LssAddress, LssBusy, LssError, LssMaster, LssMode, LssOutcome, LssResult, LssTask,
-    LssTiming,
-};
 use takt::internals::commission::layer_settings::{ImplausibleIdentity, LayerSettingFailure, LayerSettings};
 use takt::internals::sim::lss::{LssBus, LssDevice, LssStack};
 use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch};
+use takt_wire::canopen::lss::{
+    BitTiming, Inquiry, LssAddress, LssBusy, LssError, LssMaster, LssMode, LssOutcome, LssResult, LssTask,
+    LssTiming,
+};
 
 const MILLISECOND_NS: u64 = 1_000_000;
 

@@ -3,13 +3,13 @@
 use takt::family::scan::{
     Answered, BusScan, FoundDevice, LineScan, PlaceOfScan, Scanned, scan_line, starting_configuration,
 };
-use takt::internals::canopen::sdo::{SdoRequest, SdoResponse};
 use takt::internals::commission::bus_scan;
 use takt::internals::commission::bus_session::SessionEvent;
 use takt::internals::sim::lss::{LssBus, LssDevice};
 use takt::rt::{BusHealth, BusPort, BusState, Clock, Frame, Id, ReceiveBatch, Received};
 use takt::sim::{DevicesOnLine, SimulatedBus};
 use takt::{Config, VirtualClock};
+use takt_wire::canopen::sdo::{SdoRequest, SdoResponse};
 
 const MS: u64 = 1_000_000;
 const SECOND: u64 = 1_000 * MS;
@@ -283,7 +283,7 @@ fn a_device_that_floods_the_bus_is_named_and_the_others_are_found_all_the_same()
 fn a_node_whose_sdo_server_aborts_everything_is_there() {
     let refuse = |frame: &Frame| match SdoRequest::decode(frame) {
         Some((5, SdoRequest::Upload { object })) => {
-            let abort = takt::canopen::sdo::AbortCode::from_number(0x0800_0000);
+            let abort = takt_wire::canopen::sdo::AbortCode::from_number(0x0800_0000);
             vec![SdoResponse::Abort { object, code: abort }.frame(5)]
         }
         _ => vec![],
@@ -364,7 +364,7 @@ fn an_interrupted_scan_shows_what_it_had_found() {
 fn devices_without_a_node_id_are_found_by_lss() {
     let identities = [[0x331, 1, 0x100, 7], [0x331, 1, 0x100, 8]];
     let devices = identities
-        .map(|values| LssDevice::new(takt::internals::canopen::lss::LssAddress::from_values(values), None));
+        .map(|values| LssDevice::new(takt_wire::canopen::lss::LssAddress::from_values(values), None));
     let mut bus = LssBus::new(devices);
     let outcome = scan(&usual(), &mut bus);
     let serials: Vec<_> = outcome.found.devices.iter().map(|device| device.serial.as_deref()).collect();

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use clap::{Args, Subcommand};
+use takt_wire::canopen::object::DataType;
 
-use crate::canopen::object::DataType;
 use crate::commission::{Task, ValueText, dictionary};
 
 use super::super::configuration;

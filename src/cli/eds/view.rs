@@ -1,10 +1,12 @@
 //! What is printed of a dictionary: every value resolved for one node.
 
-use crate::canopen::eds::{DictionaryEntry, DictionaryObject, Number, ObjectDictionary, ObjectList, Value};
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::objects::PdoDirection;
-use crate::canopen::pdo_configuration::PdoConfiguration;
 use serde::Serialize;
+use takt_wire::canopen::eds::{
+    DictionaryEntry, DictionaryObject, Number, ObjectDictionary, ObjectList, Value,
+};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 
 use super::PrintedProblem;
 

@@ -7,7 +7,6 @@ use std::sync::atomic::Ordering;
 
 use clap::{Args, Subcommand};
 
-use crate::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 use crate::commission::layer_settings::{DeviceSelection, LayerSettingFailure, LayerSettings, NO_NODE};
 use crate::config::{Interface, Quantity};
 use crate::controller::VirtualClock;
@@ -17,6 +16,7 @@ use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions, open_inter
 use crate::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds};
+use takt_wire::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 
 use super::columns::paragraph;
 use super::exit::Exit;

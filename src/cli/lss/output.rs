@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use crate::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
 use crate::commission::bus_session::SessionEvent;
 use crate::commission::layer_settings::LayerSettingFailure;
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::lss::{LssAddress, LssError, LssRequest, LssResponse};
 
 use super::super::exit::Exit;
 use super::super::print;

@@ -2,7 +2,8 @@
 
 use std::str::FromStr;
 
-use crate::canopen::lss::LssAddress;
+use takt_wire::canopen::lss::LssAddress;
+
 use crate::commission::layer_settings::NO_NODE;
 use crate::sim::lss::{LssDevice, LssStack};
 

@@ -2,9 +2,9 @@
 
 use serde_json::json;
 use takt_rt::{Frame, FrameKind, Nanoseconds};
+use takt_wire::bus_log::Direction;
 
 use super::TimeStyle;
-use crate::bus_log::Direction;
 use crate::cli::columns::columns;
 use crate::cli::print;
 use crate::monitor::{Decoded, Service};

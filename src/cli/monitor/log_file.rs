@@ -5,9 +5,9 @@ use std::io::{BufRead, BufReader, stdin};
 use std::path::Path;
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::bus_log::{self, Direction, LogCondition, LoggedFrame};
 
 use super::session::Session;
-use crate::bus_log::{self, Direction, LogCondition, LoggedFrame};
 use crate::cli::usage_error::UsageError;
 use crate::telemetry;
 
@@ -93,7 +93,7 @@ impl Names {
         if self.known.len() >= MOST_BUSES {
             return 0;
         }
-        let shown = crate::printable::printable(name);
+        let shown = takt_wire::printable::printable(name);
         let number = session.add_bus(&shown, session.number_of(name));
         self.known.push((name.to_owned(), number));
         number

@@ -13,8 +13,8 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use takt_wire::bus_log::{LogFormat, LogWriter};
 
-use crate::bus_log::{LogFormat, LogWriter};
 use crate::config::{Config, Quantity};
 use crate::monitor::{FrameFilter, IdFilter, ServiceKind};
 

@@ -7,11 +7,11 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use takt_rt::{BusState, Frame, Nanoseconds};
+use takt_wire::bus_log::{Direction, LogWriter, LoggedFrame};
 
 use super::TimeStyle;
 use super::line::{Line, LineStyle};
 use super::statistics;
-use crate::bus_log::{Direction, LogWriter, LoggedFrame};
 use crate::cli::exit::Exit;
 use crate::cli::print::Collected;
 use crate::config::{Config, Interface};

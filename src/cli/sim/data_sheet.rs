@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use takt_wire::canopen::eds;
 
-use crate::canopen::eds;
 use crate::config::FrictionShape;
 use crate::config::quirks::{self, Quirks};
 use crate::config::{Interface, InterfaceError};

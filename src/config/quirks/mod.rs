@@ -4,9 +4,9 @@
 mod read;
 
 use takt_rt::{Nanoseconds, OperationMode};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::PowerUpState;
-use crate::canopen::object::ObjectAddress;
 
 pub use super::data_file::Confirmation;
 pub use read::{load, parse};

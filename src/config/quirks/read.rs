@@ -4,11 +4,11 @@
 use std::path::Path;
 
 use takt_rt::{Nanoseconds, OperationMode};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::objects::PROFILE_ACCELERATION;
 use toml::de::DeTable;
 
 use super::{Delays, MotionUnit, ObjectPattern, Quirks, QuirkyDrive};
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::objects::PROFILE_ACCELERATION;
 use crate::config::ConfigError;
 use crate::config::data_file::{self, DescribedDrive, each, each_of_some, optional};
 use crate::config::read::document;

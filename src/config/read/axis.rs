@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use takt_rt::MAX_AXES;
+use takt_wire::canopen::dcf::DeviceConfiguration;
 
 use super::bus::ReadBus;
 use super::control::modes;
@@ -12,7 +13,6 @@ use super::machine::{boolean, heartbeat, node};
 use super::section::Section;
 use super::travel::{counting, travel};
 use super::urdf::{DescribedJoint, Description};
-use crate::canopen::dcf::DeviceConfiguration;
 use crate::config::defaults;
 use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, Protocol};
 use crate::config::model::{

@@ -3,6 +3,7 @@
 use std::ops::{Range, RangeInclusive};
 use std::path::PathBuf;
 
+use takt_wire::printable::excerpt;
 use toml::Spanned;
 use toml::de::{DeArray, DeInteger, DeTable, DeValue};
 
@@ -12,7 +13,6 @@ use crate::config::quantity::{Quantity, QuantityError, Short};
 use crate::config::rules;
 use crate::config::spelling;
 use crate::config::spot::{Problems, Spot};
-use crate::printable::excerpt;
 
 /// One value with its place.
 #[derive(Clone)]

@@ -1,5 +1,7 @@
 //! `[axis.limits]` and `[axis.following_error]`.
 
+use takt_wire::printable::printable_path;
+
 use super::entry::Entry;
 use super::section::Section;
 use super::urdf::DescribedJoint;
@@ -13,7 +15,6 @@ use crate::config::ranges;
 use crate::config::rules;
 use crate::config::spot::Spot;
 use crate::config::urdf::{LimitOrigin, UrdfJoint, UrdfLimits, exceeds};
-use crate::printable::printable_path;
 
 /// What was read of the limits of an axis.
 pub struct ReadLimits {

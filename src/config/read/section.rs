@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use takt_wire::printable::excerpt;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
@@ -10,7 +11,6 @@ use super::entry::Entry;
 use crate::config::problem_kind::ProblemKind;
 use crate::config::spelling;
 use crate::config::spot::{Problems, Spot};
-use crate::printable::excerpt;
 
 /// Keys of earlier versions, with the table that they were in where the same key has another place now, and what to write
 /// instead.

@@ -1,12 +1,13 @@
 //! `urdf` and `urdf_joint`: the joint of an axis in a robot description.
 
+use takt_wire::printable::printable_path;
+
 use super::entry::Entry;
 use super::section::Section;
 use crate::config::model::Travel;
 use crate::config::problem_kind::ProblemKind;
 use crate::config::spot::Spot;
 use crate::config::urdf::{Urdf, UrdfJoint};
-use crate::printable::printable_path;
 
 /// The robot description of a configuration.
 pub enum Description {

@@ -1,6 +1,7 @@
 //! The axes.
 
 use takt_rt::{MAX_AXES, OperationMode};
+use takt_wire::printable::excerpt;
 
 use super::loops::Surroundings;
 use super::{Fields, bit_fields, converter, identifiers, limits, line, loops, master, name, simulation};
@@ -15,7 +16,6 @@ use crate::config::quantity::{Quantity, Short};
 use crate::config::ranges;
 use crate::config::spelling;
 use crate::config::spot::Spot;
-use crate::printable::excerpt;
 
 pub fn validate(config: &Config, whole: &Fields<'_>) {
     let axes = &config.axes;

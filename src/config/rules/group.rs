@@ -1,12 +1,12 @@
 //! The groups.
 
 use takt_rt::MAX_GROUPS;
+use takt_wire::printable::excerpt;
 
 use super::{Fields, name};
 use crate::config::model::Config;
 use crate::config::problem_kind::ProblemKind;
 use crate::config::spelling;
-use crate::printable::excerpt;
 
 pub fn validate(config: &Config, whole: &Fields<'_>) {
     let groups = &config.groups;

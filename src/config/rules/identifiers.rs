@@ -5,8 +5,8 @@
 use std::ops::Range;
 
 use takt_rt::Id;
+use takt_wire::canopen::function_code;
 
-use crate::canopen::function_code;
 use crate::config::bit_fields::FieldDevice;
 use crate::config::identifiers::IdUse;
 use crate::config::model::Axis;

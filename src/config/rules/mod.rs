@@ -20,12 +20,13 @@ pub mod telemetry;
 #[cfg(target_os = "linux")]
 mod this_machine;
 
+use takt_wire::printable::excerpt;
+
 use super::error::ConfigError;
 use super::model::{Config, StreamDelay};
 use super::problem_kind::ProblemKind;
 use super::ranges;
 use super::spot::{Problems, Spot};
-use crate::printable::excerpt;
 
 impl Config {
     /// Checks every value by the rules of the reader of files. A configuration that was changed in code needs this; everything

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{Nanoseconds, OperationMode};
+use takt_wire::canopen::object::{DataType, ObjectAddress};
 
-use crate::canopen::object::{DataType, ObjectAddress};
 use crate::config::Axis;
 use crate::config::bit_fields::FieldDevice;
 use crate::family::DataSheet;

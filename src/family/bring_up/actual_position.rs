@@ -1,8 +1,9 @@
 //! The actual position of a drive (6064), and the target position (607A) made equal to it.
 
+use takt_wire::canopen::objects::{POSITION_ACTUAL_VALUE, TARGET_POSITION};
+
 use super::axis_session::{AxisSession, StepResult};
 use super::check::Check;
-use crate::canopen::objects::{POSITION_ACTUAL_VALUE, TARGET_POSITION};
 
 /// Reads the actual position.
 pub async fn read(c: &AxisSession<'_>) -> StepResult {

@@ -12,15 +12,15 @@ use std::path::PathBuf;
 use std::sync::{Mutex, MutexGuard, PoisonError, RwLock};
 
 use takt_rt::{Frame, MappedObject, Nanoseconds};
+use takt_wire::canopen::dcf::{DeviceConfiguration, Download};
+use takt_wire::canopen::object::{Object, ObjectAddress};
+use takt_wire::canopen::sdo::{AbortCode, SdoError, Transfer};
 
 use super::axis_units::SiUnit;
 use super::check::Check;
 use super::facts::AxisFacts;
 use super::failure::{Content, FailureCause};
 use super::stages::BringUpTiming;
-use crate::canopen::dcf::{DeviceConfiguration, Download};
-use crate::canopen::object::{Object, ObjectAddress};
-use crate::canopen::sdo::{AbortCode, SdoError, Transfer};
 use crate::config::{Axis, Config};
 use crate::procedure::{Access, CanopenSession, POLL_NS};
 

@@ -1,9 +1,9 @@
 //! What a procedure expects of a number that it reads from a drive.
 
 use takt_rt::{DriveState, OperationMode};
+use takt_wire::canopen::object::Object;
 
 use super::axis_units::SiUnit;
-use crate::canopen::object::Object;
 
 /// The condition that a number must meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

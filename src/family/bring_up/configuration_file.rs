@@ -1,7 +1,8 @@
 //! The configuration file of an axis (`dcf`): its values are written to the drive.
 
+use takt_wire::canopen::object::Object;
+
 use super::axis_session::{AxisSession, StepResult};
-use crate::canopen::object::Object;
 
 /// Writes the values of the file. They come first, so that what the controller needs overrides them.
 pub async fn write(c: &AxisSession<'_>) -> StepResult {

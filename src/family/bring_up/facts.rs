@@ -1,10 +1,10 @@
 //! What a bring-up reads from a drive.
 
 use takt_rt::{Cia402Codec, DriveState};
+use takt_wire::canopen::emcy::{Emergency, ErrorCode};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::process_data::ProcessData;
-use crate::canopen::emcy::{Emergency, ErrorCode};
-use crate::canopen::object::ObjectAddress;
 
 /// What a drive has reported, each value as it was last read.
 #[derive(Clone, Debug, Default, PartialEq)]

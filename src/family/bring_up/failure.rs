@@ -3,15 +3,15 @@
 use std::fmt;
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::emcy::Emergency;
+use takt_wire::canopen::nmt::NmtState;
+use takt_wire::canopen::object::{Object, ObjectAddress};
+use takt_wire::canopen::pdo_reader::PdoReadError;
+use takt_wire::canopen::sdo::{AbortCode, SdoError};
 
 use super::axis_units::SiUnit;
 use super::check::Check;
 use super::reported_mapping::MappingProblem;
-use crate::canopen::emcy::Emergency;
-use crate::canopen::nmt::NmtState;
-use crate::canopen::object::{Object, ObjectAddress};
-use crate::canopen::pdo_reader::PdoReadError;
-use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::procedure::Access;
 
 /// The drives that failed during bring-up or shutdown.

@@ -1,9 +1,10 @@
 //! The heartbeats between drive and master (objects 1016 and 1017). Without them a drive does not react when the master
 //! fails.
 
+use takt_wire::canopen::objects::{CONSUMER_HEARTBEAT_TIME, PRODUCER_HEARTBEAT_TIME};
+
 use super::axis_session::{AxisSession, StepResult};
 use super::axis_units::rounded_up;
-use crate::canopen::objects::{CONSUMER_HEARTBEAT_TIME, PRODUCER_HEARTBEAT_TIME};
 
 /// Sets the period of the drive's own heartbeat; 0 if none is configured.
 pub async fn produce(c: &AxisSession<'_>) -> StepResult {

@@ -6,10 +6,10 @@
 //! 94 and more node IDs that no axis has, and no axis needs more than eight.
 
 use takt_rt::Id;
+use takt_wire::canopen::objects::PdoDirection;
 
 use super::process_data::{PdoPlan, ProcessData, pdo_id};
 use super::shared_commands;
-use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, PdoMapping};
 use crate::family;
 

@@ -1,8 +1,9 @@
 //! The identity of a drive (objects 1000 and 1018) and its texts.
 
+use takt_wire::canopen::objects::*;
+
 use super::axis_session::{AxisSession, StepResult};
 use super::check::Check;
-use crate::canopen::objects::*;
 
 /// A device of the profile CiA 402.
 pub const PROFILE_CIA402: Check = Check::Profile(402);

@@ -27,7 +27,6 @@ mod reported_mapping;
 mod shared_commands;
 pub(crate) mod stages;
 
-pub use crate::canopen::pdo_reader::PdoReadError;
 pub use crate::procedure::Access;
 pub use axis_session::{AxisSession, StepResult};
 pub use axis_units::SiUnit;
@@ -39,3 +38,4 @@ pub use process_data::{PdoPlan, ProcessData, Reply, first_pdo};
 pub use reported_mapping::MappingProblem;
 pub use stages::BringUpTiming;
 pub(crate) use stages::{BringUp, Shutdown, overwritten, refused_values};
+pub use takt_wire::canopen::pdo_reader::PdoReadError;

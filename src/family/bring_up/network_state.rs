@@ -1,13 +1,13 @@
 //! The NMT states of a drive in bring-up and shutdown: commands, confirmation by boot-up and heartbeat, restarts.
 
 use takt_rt::{DriveState, Nanoseconds};
+use takt_wire::canopen::nmt::{NmtCommand, NmtState};
+use takt_wire::canopen::objects::{DEVICE_TYPE, STATUSWORD};
+use takt_wire::canopen::sdo::{SdoError, Transfer};
 
 use super::axis_session::{AxisSession, StepResult, object_of};
 use super::failure::{FailureCause, ProbeResult};
 use super::stages::BringUpTiming;
-use crate::canopen::nmt::{NmtCommand, NmtState};
-use crate::canopen::objects::{DEVICE_TYPE, STATUSWORD};
-use crate::canopen::sdo::{SdoError, Transfer};
 use crate::config::Supervision;
 use crate::family;
 use crate::procedure::Access;

@@ -1,11 +1,12 @@
 //! The PDO mapping of a drive: written and read back, or taken as the drive reports it.
 
+use takt_wire::canopen::objects::{PDO_IDENTITY, PDO_INVALID, PdoDirection, PdoParameters};
+use takt_wire::canopen::pdo_reader::PdoReader;
+
 use super::axis_session::{AxisSession, StepResult};
 use super::check::Check;
 use super::failure::FailureCause;
 use super::process_data::{PdoPlan, ProcessData, first_pdo, pdo_id};
-use crate::canopen::objects::{PDO_IDENTITY, PDO_INVALID, PdoDirection, PdoParameters};
-use crate::canopen::pdo_reader::PdoReader;
 
 /// Writes the mapping of the planned PDOs of one direction, and switches the others of the axis off, up to `count` of them.
 pub async fn write(c: &AxisSession<'_>, direction: PdoDirection, plans: &[PdoPlan], count: u8) -> StepResult {

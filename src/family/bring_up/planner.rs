@@ -1,18 +1,19 @@
 //! Objects by which a drive bounds its motion: read back, since a drive that keeps narrower bounds than the axis does not move or stop as
 //! planned.
 
+use takt_wire::canopen::object::Object;
+use takt_wire::canopen::objects::{
+    MAX_ACCELERATION, MAX_DECELERATION, MAX_MOTOR_SPEED, MAX_PROFILE_VELOCITY, MOTION_PROFILE_TYPE,
+    PROFILE_ACCELERATION, PROFILE_DECELERATION, PROFILE_JERK, PROFILE_VELOCITY, QUICK_STOP_DECELERATION,
+    SOFTWARE_LIMIT_HIGHEST, SOFTWARE_LIMIT_LOWEST,
+};
+
 use super::axis_session::{AxisSession, StepResult};
 use super::axis_units::{
     SiUnit, acceleration_units, jerk_units, motor_speed_units, position_counts, profile_velocity_units,
 };
 use super::check::Check;
 use super::configuration_file::{raise_unless_in_file, write_unless_in_file};
-use crate::canopen::object::Object;
-use crate::canopen::objects::{
-    MAX_ACCELERATION, MAX_DECELERATION, MAX_MOTOR_SPEED, MAX_PROFILE_VELOCITY, MOTION_PROFILE_TYPE,
-    PROFILE_ACCELERATION, PROFILE_DECELERATION, PROFILE_JERK, PROFILE_VELOCITY, QUICK_STOP_DECELERATION,
-    SOFTWARE_LIMIT_HIGHEST, SOFTWARE_LIMIT_LOWEST,
-};
 use crate::config::{Axis, Control};
 use crate::family;
 

@@ -3,13 +3,13 @@
 use takt_rt::{
     AxisProcessData, CommandSlot, Id, MAX_PDOS, MappedObject, MappedPdo, Request, TransmissionType,
 };
+use takt_wire::canopen::objects::PdoDirection;
 
 use super::identifiers;
 use super::mapped_objects::{
     CONTROLWORD, CURRENT, ERROR_CODE, OPERATION_MODE, OPERATION_MODE_DISPLAY, POSITION, STATUSWORD,
     TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY, TORQUE, TORQUE_OFFSET, VELOCITY, VELOCITY_OFFSET,
 };
-use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, Control, Feedback};
 
 const PDO_BITS: u32 = 64;

@@ -2,11 +2,11 @@
 //! they do not.
 
 use takt_rt::{CommandSlot, Id, MappedObject, TransmissionType};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 
 use super::process_data::{PdoPlan, ProcessData, Reply, pdo_id};
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::objects::PdoDirection;
-use crate::canopen::pdo_configuration::PdoConfiguration;
 use crate::config::{Axis, Config};
 use crate::family::{self, MappingMatch};
 

@@ -6,12 +6,12 @@
 //! do the targets, whichever is shorter; if neither is shorter than a frame for each axis, nothing is shared.
 
 use takt_rt::{MappedObject, TransmissionType};
+use takt_wire::canopen::objects::PdoDirection;
+use takt_wire::frame_time::{FrameShape, worst_case_bits};
 
 use super::process_data::{PdoPlan, ProcessData, Reply, pdo_id};
-use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, CommandFrames, Config, PdoMapping};
 use crate::family;
-use crate::frame_time::{FrameShape, worst_case_bits};
 
 const PDO_BITS: usize = 64;
 /// Transmission types up to this one are synchronous (CiA 301, 7.5.2.36): the parts of a frame take effect at the same SYNC.

@@ -15,17 +15,17 @@ use std::sync::Arc;
 use std::task::{Context, Waker};
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::sdo;
+use takt_wire::printable::printable_path;
 use tracing::{debug, error, info};
 
 use super::axis_session::{AxisSession, DryRun, OnFailure, RefusedValue, StepFailure};
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError, FailureCause};
 use super::network_state::RESTART_STEP;
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::sdo;
 use crate::config::{Axis, Config, ProblemKind};
 use crate::family::{self, SettingUp};
-use crate::printable::printable_path;
 use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure};
 
 /// The target of what is told of bring-up and shutdown.

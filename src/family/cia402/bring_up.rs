@@ -4,12 +4,12 @@
 //! otherwise. `takt check` says what safety is lost by that: see [`remarks`](super::remarks).
 
 use takt_rt::{CommandSlot, Nanoseconds, controlword};
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::nmt::{NmtCommand, NmtState};
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
 
 use super::device::Device;
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::nmt::{NmtCommand, NmtState};
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
 use crate::config::{PdoMapping, Supervision};
 use crate::family::bring_up::axis_units::{
     acceleration_units, counts, interpolation_time, profile_velocity_units, rounded_up, velocity_units,

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode, PositionCounter};
-
-use crate::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
-use crate::canopen::object::{DataType, Object, ObjectAddress};
-use crate::canopen::objects::{
+use takt_wire::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
+use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
+use takt_wire::canopen::objects::{
     CONSUMER_HEARTBEAT_TIME, CONTROLWORD, GUARD_TIME, LIFE_TIME_FACTOR, MAX_MOTOR_SPEED, MODES_OF_OPERATION,
     POSITION_ACTUAL_VALUE, PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection,
     PdoParameters, STATUSWORD,
 };
+
 use crate::config::quirks::{MotionUnit, Quirks};
 use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, VelocityUnit};
 use crate::family::DataSheet;
@@ -69,7 +69,7 @@ impl Device {
     /// # Errors
     /// In words for the reader of a configuration: the file, the line, what is wrong.
     pub fn load(eds: &Path, quirks: Option<&Path>) -> Result<Self, String> {
-        let loaded = crate::canopen::eds::load(eds).map_err(|findings| findings.to_string())?;
+        let loaded = takt_wire::canopen::eds::load(eds).map_err(|findings| findings.to_string())?;
         let quirks = match quirks {
             Some(path) => crate::config::quirks::load(path).map_err(|error| error.to_string())?,
             None => Quirks::default(),

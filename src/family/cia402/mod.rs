@@ -23,11 +23,11 @@ use super::commission::dictionary::ObjectEntry;
 use super::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
 use super::scan::{FoundDevice, NodeIdentity, Recognised, StartingKeys};
 use super::{DataSheet, Family, SettingUp};
-use crate::canopen::object::Object;
-use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
 use crate::sim::Drive;
 use bring_up::Sheet;
+use takt_wire::canopen::object::Object;
+use takt_wire::canopen::objects::PdoDirection;
 
 /// The family.
 #[derive(Clone, Copy, Debug)]

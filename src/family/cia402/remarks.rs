@@ -1,7 +1,8 @@
 //! What is lost because a drive lacks an object.
 
+use takt_wire::canopen::object::ObjectAddress;
+
 use super::device::Device;
-use crate::canopen::object::ObjectAddress;
 use crate::config::ErrorControl;
 
 /// Objects that keep a drive safe, or let a person see why it is not, and what is lost without each.

@@ -1,12 +1,13 @@
 //! First contact with a drive: checks that it answers SDO requests, and that its vendor ID is the expected one.
 
+use takt_wire::canopen::nmt::NmtCommand;
+use takt_wire::canopen::objects::{DEVICE_TYPE, PRODUCT_CODE, REVISION_NUMBER, VENDOR_ID};
+use takt_wire::canopen::sdo::SdoError;
+
 use super::failure::{AnsweredProtocol, Failure};
 use super::report::Report;
 use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
-use crate::canopen::nmt::NmtCommand;
-use crate::canopen::objects::{DEVICE_TYPE, PRODUCT_CODE, REVISION_NUMBER, VENDOR_ID};
-use crate::canopen::sdo::SdoError;
 use crate::procedure::Access;
 
 /// How long to wait for an answer in the vendor's own protocol.

@@ -1,6 +1,7 @@
 //! A family's object dictionary for the operator: names, access, units.
 
-use crate::canopen::object::{DataType, Object, ObjectAddress};
+use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
+
 use crate::config::{DriveFamily, Quantity};
 use crate::family;
 

@@ -1,10 +1,10 @@
 //! Why a procedure failed.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::nmt::NmtState;
+use takt_wire::canopen::object::{Object, ObjectAddress};
+use takt_wire::canopen::sdo::{AbortCode, SdoError};
 
-use crate::canopen::nmt::NmtState;
-use crate::canopen::object::{Object, ObjectAddress};
-use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::config::Quantity;
 use crate::procedure::Access;
 

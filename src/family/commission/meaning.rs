@@ -1,15 +1,15 @@
 //! Describes frames in words, for the trace of a procedure.
 
 use takt_rt::{Frame, MappedObject, StoppedHeartbeat};
+use takt_wire::canopen::communication_names;
+use takt_wire::canopen::emcy::Emergency;
+use takt_wire::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
+use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
+use takt_wire::canopen::sdo::{SdoRequest, SdoResponse};
+use takt_wire::printable::printable;
 
 use super::dictionary::{self, ObjectEntry, UNNAMED};
 use super::target::TargetDrive;
-use crate::canopen::communication_names;
-use crate::canopen::emcy::Emergency;
-use crate::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
-use crate::canopen::object::{DataType, Object, ObjectAddress};
-use crate::canopen::sdo::{SdoRequest, SdoResponse};
-use crate::printable::printable;
 
 /// Describes a frame on the bus of `target`.
 pub fn of(target: &TargetDrive, frame: &Frame) -> String {

@@ -1,6 +1,8 @@
 //! Reads and writes any object.
 
 use serde_json::json;
+use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
+use takt_wire::canopen::sdo::Uploaded;
 
 use super::contact;
 use super::dictionary::{self, ObjectEntry, Permission, SelectedObject};
@@ -9,8 +11,6 @@ use super::report::Report;
 use super::sdo_session::{SdoSession, number};
 use super::target::TargetDrive;
 use super::task::ValueText;
-use crate::canopen::object::{DataType, Object, ObjectAddress};
-use crate::canopen::sdo::Uploaded;
 
 /// An object to read.
 pub struct ReadObject {

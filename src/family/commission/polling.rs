@@ -1,6 +1,7 @@
 //! Polls the readings of an axis, and reports its final position and its moves.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::objects::POSITION_ACTUAL_VALUE;
 
 use super::contact;
 use super::failure::Failure;
@@ -8,7 +9,6 @@ use super::report::Report;
 use super::sdo_session::SdoSession;
 use super::target::TargetDrive;
 use super::task::MoveKind;
-use crate::canopen::objects::POSITION_ACTUAL_VALUE;
 use crate::procedure::{AxisReading, ProcedureSession};
 
 /// Shows a reading at each interval until the time is over, whatever the drive is spoken to by.

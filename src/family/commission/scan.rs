@@ -4,12 +4,12 @@ use std::collections::BTreeSet;
 
 use serde_json::Value;
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::canopen::objects::DEVICE_TYPE;
+use takt_wire::canopen::sdo::{SdoError, SdoRequest};
 
 use super::failure::Failure;
 use super::report::Report;
 use super::sdo_session::SdoSession;
-use crate::canopen::objects::DEVICE_TYPE;
-use crate::canopen::sdo::{SdoError, SdoRequest};
 
 /// Interval between two SDO requests.
 const QUESTION_NS: Nanoseconds = 2_000_000;

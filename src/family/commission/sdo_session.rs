@@ -6,10 +6,10 @@
 use std::ops::Deref;
 
 use takt_rt::{Frame, MappedObject, Nanoseconds};
+use takt_wire::canopen::object::{Object, ObjectAddress};
+use takt_wire::canopen::sdo::{Completed, SdoError, Transfer, Uploaded};
 
 use super::failure::Failure;
-use crate::canopen::object::{Object, ObjectAddress};
-use crate::canopen::sdo::{Completed, SdoError, Transfer, Uploaded};
 use crate::procedure::{Access, CanopenSession, POLL_NS};
 
 /// An SDO session with one axis of a drive. An interruption ends each wait, and is refused by each new transfer.

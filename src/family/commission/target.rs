@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{Nanoseconds, OperationMode, Scale, ScaleError, ScaleParameters};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::failure::Failure;
-use crate::canopen::object::ObjectAddress;
 use crate::config::{Axis, DriveFamily, Limits, Quantity, Travel};
 use crate::family::{self, DataSheet, Family, is_rounded};
 

@@ -1,10 +1,10 @@
 //! The tasks that commissioning can carry out with a drive.
 
 use takt_rt::{FieldMode, Nanoseconds};
+use takt_wire::canopen::object::DataType;
 
 use super::motion_profile::MotionProfile;
 use super::target::CommandValue;
-use crate::canopen::object::DataType;
 
 /// A task with one drive.
 #[derive(Clone, Debug, PartialEq)]

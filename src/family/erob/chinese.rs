@@ -207,7 +207,7 @@ mod tests {
         for english in ["battery voltage of the multi-turn encoder low", "RS-485 communication time-out"] {
             assert!(PHRASES.iter().any(|(own, _)| *own == english), "{english}");
         }
-        for code in crate::erob_can::error_code::ErrorCode::ALL {
+        for code in takt_wire::erob_can::error_code::ErrorCode::ALL {
             for english in [code.words(), code.cure()].into_iter().flatten() {
                 assert!(PHRASES.iter().any(|(own, _)| *own == english), "{english}");
             }

@@ -4,9 +4,9 @@
 use std::fmt;
 
 use takt_rt::Nanoseconds;
+use takt_wire::erob_can::parameter::Parameter;
 
 use super::motion::Motion;
-use crate::erob_can::parameter::Parameter;
 use crate::family::commission::{Failure, TargetDrive};
 use crate::procedure::{AxisReading, Client, ProcedureSession};
 

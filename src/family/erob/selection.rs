@@ -1,10 +1,10 @@
 //! Reading and writing parameters that the user names, whichever protocol carries them.
 
 use serde_json::{Value, json};
+use takt_wire::erob_can::parameter::{Access, Parameter, Unit, Values};
 
 use super::module::CommandedModule;
 use crate::config::Quantity;
-use crate::erob_can::parameter::{Access, Parameter, Unit, Values};
 use crate::family::commission::command_value;
 use crate::family::commission::dictionary::integer;
 use crate::family::commission::{Failure, NamedEntry, Report, TargetDrive, ValueText};
@@ -251,9 +251,9 @@ pub async fn write<M: CommandedModule>(
 mod tests {
     use super::*;
     use crate::config::DriveFamily;
-    use crate::erob_can::entries::{self, Entry};
     use crate::family::erob_modbus::register::Register;
     use crate::family::{erob_can, erob_modbus};
+    use takt_wire::erob_can::entries::{self, Entry};
 
     fn to_write<P: Parameter>(name: &str, text: &str) -> Result<i64, String> {
         let facts = if P::KIND == Entry::KIND { &erob_can::FACTS } else { &erob_modbus::FACTS };

@@ -1,10 +1,10 @@
 //! A module with its own CAN protocol, as motions and tasks see it: the sequences of the eRunner manual (7.4 and chapter 4).
 
 use takt_rt::Nanoseconds;
+use takt_wire::erob_can::client::{RequestClient, RequestError, RequestFailure};
+use takt_wire::erob_can::entries::{self, Entry};
 
 use super::session::ErobCanSession;
-use crate::erob_can::client::{RequestClient, RequestError, RequestFailure};
-use crate::erob_can::entries::{self, Entry};
 use crate::family::commission::{AnsweredProtocol, Failure, TargetDrive};
 use crate::family::erob::module::{CommandedModule, Status, Stop};
 use crate::family::erob::motion::{Motion, OperatingMode};

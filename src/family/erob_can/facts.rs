@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use takt_rt::OperationMode;
+use takt_wire::erob_can::frame;
 
 use crate::config::{
     DriveFacts, ErrorControl, ModeChangeRule, ModeSet, OwnIdentifiers, Plausible, Protocol, VelocityUnit,
 };
-use crate::erob_can::frame;
 use crate::family::erob::ENABLED_FROM_NS;
 
 /// The facts.

@@ -1,8 +1,9 @@
 //! Why a task with a drive has failed, as commissioning shows it.
 
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::erob_can::client::{RequestError, RequestFailure};
+
 use super::follower::UNKNOWN_REFUSAL;
-use crate::canopen::emcy::ErrorCode;
-use crate::erob_can::client::{RequestError, RequestFailure};
 use crate::family::commission::Failure;
 
 /// What helps after an error of the drive.
@@ -32,7 +33,7 @@ pub fn error_words(code: u16) -> String {
     }
     /// What CiA 402 says of other codes.
     const UNKNOWN: &str = "unknown error";
-    if let Some(words) = crate::erob_can::error_code::ErrorCode(code).words() {
+    if let Some(words) = takt_wire::erob_can::error_code::ErrorCode(code).words() {
         return format!("0x{code:04X} (the drive refuses to be enabled: {words})");
     }
     if code == UNKNOWN_REFUSAL {

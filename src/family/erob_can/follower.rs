@@ -11,17 +11,17 @@
 //! enabled: one that is not to be is told so again and again, and one that shows an error is disabled before that counts.
 
 use takt_rt::{DriveState, Frame, Nanoseconds, OffCycleReport};
+use takt_wire::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure, RequestTiming};
+use takt_wire::erob_can::entries::{self, Entry};
+use takt_wire::erob_can::frame::Request;
+use takt_wire::frame_time::{FrameShape, worst_case_bits};
 
 use crate::config::Axis;
-use crate::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure, RequestTiming};
-use crate::erob_can::entries::{self, Entry};
-use crate::erob_can::frame::Request;
 use crate::family::commission::{CommandValue, TargetDrive};
 use crate::family::erob::following::{self, LOST_NS, STALE_NS, STEEPER};
 use crate::family::erob::motion::OperatingMode;
 use crate::family::erob::{AGAIN_NS, ENABLING_NS, STANDING};
 use crate::family::{OffCycleBudget, OffCycleDrive, OffCycleTarget, OffCycleWish};
-use crate::frame_time::{FrameShape, worst_case_bits};
 
 /// Longest time from a request to its reply at the drive (captures of the eRunner manual).
 const REPLY_NS: Nanoseconds = 1_000_000;

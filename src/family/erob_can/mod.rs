@@ -30,16 +30,16 @@ use super::{
     ChinesePhrase, ChineseTerm, Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol,
     SettingUp, Unwatched, Watchdog, erob,
 };
-use crate::canopen::function_code;
-use crate::canopen::objects::DEVICE_TYPE;
-use crate::canopen::sdo::SdoRequest;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
-use crate::erob_can::entries::{self, Entry};
-use crate::erob_can::frame::Request;
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::erob::selection;
 use crate::sim::Drive;
 use follower::Follower;
+use takt_wire::canopen::function_code;
+use takt_wire::canopen::objects::DEVICE_TYPE;
+use takt_wire::canopen::sdo::SdoRequest;
+use takt_wire::erob_can::entries::{self, Entry};
+use takt_wire::erob_can::frame::Request;
 
 /// The family.
 #[derive(Clone, Copy, Debug)]

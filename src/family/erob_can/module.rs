@@ -1,8 +1,9 @@
 //! What a module tells of itself; and what is done with it beside motions: saving, the brake, the encoder, other node IDs.
 
-use crate::erob_can::client::{RequestError, RequestFailure};
-use crate::erob_can::entries::{self, Entry};
-use crate::erob_can::module_information::ModuleNumbers;
+use takt_wire::erob_can::client::{RequestError, RequestFailure};
+use takt_wire::erob_can::entries::{self, Entry};
+use takt_wire::erob_can::module_information::ModuleNumbers;
+
 use crate::family::erob::SAVING_NS;
 use crate::family::erob_can::session::ErobCanSession;
 

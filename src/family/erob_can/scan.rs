@@ -3,11 +3,11 @@
 use std::ops::RangeInclusive;
 
 use takt_rt::{Frame, Id, Nanoseconds};
+use takt_wire::erob_can::entries::{self, Entry};
+use takt_wire::erob_can::frame::{ReceivedRequest, Reply, Request, reply_id, replying_node};
+use takt_wire::erob_can::module_information::ModuleNumbers;
 
 use super::FACTS;
-use crate::erob_can::entries::{self, Entry};
-use crate::erob_can::frame::{ReceivedRequest, Reply, Request, reply_id, replying_node};
-use crate::erob_can::module_information::ModuleNumbers;
 use crate::family::scan::{Answered, FoundDevice, OwnProtocol, Reading, ScanSession};
 
 const NAME: &str = "eRob's own protocol";
@@ -73,7 +73,7 @@ async fn module(session: &ScanSession, node: u8, reply: Frame) -> FoundDevice {
     match numbers(session, node).await {
         Some(numbers) => {
             let mut take =
-                |name: &str, text: Result<String, crate::erob_can::module_information::UnknownField>| {
+                |name: &str, text: Result<String, takt_wire::erob_can::module_information::UnknownField>| {
                     text.map_err(|unknown| {
                         device.remarks.push(format!("its {name} is not decoded: {unknown}"))
                     })

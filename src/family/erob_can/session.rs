@@ -1,10 +1,10 @@
 //! What the code of a procedure does with a drive that speaks eRob's own CAN protocol: reads, writes and commands.
 
 use takt_rt::{Frame, Id, Nanoseconds};
+use takt_wire::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure, RequestTiming};
+use takt_wire::erob_can::entries::Entry;
+use takt_wire::erob_can::frame::{EntryAddress, Reply, Request};
 
-use crate::erob_can::client::{Answer, RequestClient, RequestError, RequestFailure, RequestTiming};
-use crate::erob_can::entries::Entry;
-use crate::erob_can::frame::{EntryAddress, Reply, Request};
 use crate::procedure::{Client, ProcedureSession};
 
 impl Client for RequestClient {

@@ -2,11 +2,11 @@
 //! experience).
 
 use takt_rt::{CommandSlot, Nanoseconds, controlword};
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::nmt::{NmtCommand, NmtState};
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
 
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::nmt::{NmtCommand, NmtState};
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
 use crate::config::{Axis, Control, PdoMapping};
 use crate::family::bring_up::axis_units::{counts, interpolation_time, rounded_up};
 use crate::family::bring_up::configuration_file::write_unless_in_file;

@@ -1,6 +1,6 @@
 //! The error codes of an eRob.
 
-use crate::canopen::emcy::ErrorCode;
+use takt_wire::canopen::emcy::ErrorCode;
 
 /// The fault of a drive whose multi-turn battery is empty or was disconnected.
 pub const MULTI_TURN_BATTERY: ErrorCode = ErrorCode(0x730F);

@@ -9,14 +9,14 @@ pub use errors::{MULTI_TURN_BATTERY, error_text};
 pub use facts::FACTS;
 
 use takt_rt::Frame;
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::object::Object;
+use takt_wire::erob_can::entries;
+use takt_wire::erob_can::frame::{self, Request};
 
 use super::scan::{FoundDevice, StartingKeys};
 use super::{ChinesePhrase, ChineseTerm, Family, OtherProtocol, SettingUp, erob, erob_can};
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
-use crate::erob_can::entries;
-use crate::erob_can::frame::{self, Request};
 use crate::family::bring_up::AxisSession;
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};

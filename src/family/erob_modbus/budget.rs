@@ -1,12 +1,12 @@
 //! How often each drive of a line is spoken to.
 
 use takt_rt::Nanoseconds;
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::MasterTiming;
 
 use crate::config::{Config, Interface};
 use crate::family::OffCycleBudget;
 use crate::link::adapter_latency_ns;
-use crate::modbus::line_timing::LineTiming;
-use crate::modbus::master::MasterTiming;
 
 /// From a request to its reply, at the longest. The manual says nothing of it; this is twice what is simulated.
 const REPLY_NS: Nanoseconds = 2_000_000;

@@ -1,6 +1,7 @@
 //! A module on a Modbus line, as motions and tasks see it: the sequences of the eRob Modbus-RTU manual (chapter 5).
 
 use takt_rt::Nanoseconds;
+use takt_wire::modbus::exception::ExceptionCode;
 
 use super::drive::{AccessError, ErobDrive};
 use super::register::Register;
@@ -8,7 +9,6 @@ use super::registers;
 use crate::family::commission::{Failure, TargetDrive};
 use crate::family::erob::module::{CommandedModule, Status, Stop};
 use crate::family::erob::motion::Motion;
-use crate::modbus::exception::ExceptionCode;
 use crate::procedure::{ModbusClient, ModbusSession};
 
 /// 1 ms in the unit of the dwell time is 20.

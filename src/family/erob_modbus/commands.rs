@@ -3,13 +3,13 @@
 use std::fmt;
 
 use takt_rt::Nanoseconds;
+use takt_wire::modbus::exception::ExceptionCode;
 
 use super::drive::{AccessError, ErobDrive};
 use super::fault_code::FaultCode;
 use super::register::Register;
 use super::registers;
 use crate::family::erob::SAVING_NS;
-use crate::modbus::exception::ExceptionCode;
 
 /// From a command to what it has brought.
 const ACTING_NS: Nanoseconds = 100_000_000;

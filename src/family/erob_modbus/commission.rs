@@ -1,5 +1,10 @@
 //! Commissioning of a drive by Modbus-RTU: the tasks of `takt drive`.
 
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{ReceivedRequest, SlaveAddress};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::{MasterTiming, RequestFailure};
+
 use super::commands::{self, CommandFailure};
 use super::drive::{AccessError, AccessFailure, ErobDrive};
 use super::register::Register;
@@ -7,10 +12,6 @@ use super::registers;
 use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
 use crate::family::erob::module::CommandedModule as _;
 use crate::family::erob::{selection, tasks};
-use crate::modbus::exception::ExceptionCode;
-use crate::modbus::frame::{ReceivedRequest, SlaveAddress};
-use crate::modbus::line_timing::LineTiming;
-use crate::modbus::master::{MasterTiming, RequestFailure};
 use crate::procedure::{ModbusClient, ModbusSession, Procedure};
 
 /// A task with a drive on a line of this bit rate.

@@ -2,14 +2,15 @@
 
 use std::fmt;
 
+use takt_wire::erob_can::parameter::ValueError;
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{RegisterRange, RegisterValues, Values};
+use takt_wire::modbus::master::{Repeat, RequestError, RequestFailure};
+
 use super::fault_code::FaultCode;
 use super::register::Register;
 use super::registers;
-use crate::erob_can::parameter::ValueError;
 use crate::family::erob::module::Status;
-use crate::modbus::exception::ExceptionCode;
-use crate::modbus::frame::{RegisterRange, RegisterValues, Values};
-use crate::modbus::master::{Repeat, RequestError, RequestFailure};
 use crate::procedure::ModbusSession;
 
 /// A register that could not be read or written.

@@ -5,7 +5,8 @@
 
 use std::fmt;
 
-use crate::canopen::emcy;
+use takt_wire::canopen::emcy;
+
 use crate::family::error_cure;
 
 /// The family whose codes the others are taken for.

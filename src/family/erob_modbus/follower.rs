@@ -21,10 +21,10 @@ use super::registers;
 use crate::family::erob::following::{self, LOST_NS, STALE_NS};
 use crate::family::erob::{AGAIN_NS, ENABLING_NS, STANDING};
 use crate::family::{OffCycleTarget, OffCycleWish};
-use crate::modbus::exception::ExceptionCode;
-use crate::modbus::frame::{RegisterRange, RegisterValues, Request, Values};
-use crate::modbus::master::{Answer, RequestError, RequestFailure};
 use seen::{Reading, Seen};
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{RegisterRange, RegisterValues, Request, Values};
+use takt_wire::modbus::master::{Answer, RequestError, RequestFailure};
 
 /// A joint that does not come to rest in this time is disabled all the same.
 const STOPPING_NS: Nanoseconds = 2_000_000_000;
@@ -465,7 +465,7 @@ fn read(reading: Reading) -> Option<(Purpose, Request)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modbus::frame::SlaveAddress;
+    use takt_wire::modbus::frame::SlaveAddress;
 
     const MS: Nanoseconds = 1_000_000;
     const PARAMETERS: FollowerParameters = FollowerParameters {

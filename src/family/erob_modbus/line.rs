@@ -1,11 +1,11 @@
 //! The drives of a serial line, each with its follower: they share the line by turns, one request at a time.
 
 use takt_rt::{Nanoseconds, OffCycleReport};
+use takt_wire::modbus::frame::SlaveAddress;
+use takt_wire::modbus::master::{Master, MasterTiming, Repeat};
 
 use super::follower::{Follower, FollowerParameters};
 use crate::family::{LineCounts, OffCycleLine, OffCycleTarget};
-use crate::modbus::frame::SlaveAddress;
-use crate::modbus::master::{Master, MasterTiming, Repeat};
 
 /// A line whose drives follow.
 #[derive(Debug)]

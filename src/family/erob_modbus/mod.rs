@@ -41,7 +41,6 @@ use super::{
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::erob::selection;
-use crate::modbus::frame::SlaveAddress;
 use crate::procedure::ModbusSession;
 use crate::sim::{DevicesOnLine, Drive};
 use axis::LineKeys;
@@ -49,6 +48,7 @@ use budget::LineBudget;
 use fault_code::FaultCode;
 use line::FollowedLine;
 use register::Register;
+use takt_wire::modbus::frame::SlaveAddress;
 
 /// The family.
 #[derive(Clone, Copy, Debug)]

@@ -3,9 +3,9 @@
 use std::fmt;
 
 use arrayvec::ArrayVec;
+use takt_wire::erob_can::parameter::{Access, Parameter, Unit, ValueError, Values};
 
 use super::registers;
-use crate::erob_can::parameter::{Access, Parameter, Unit, ValueError, Values};
 
 /// A register, or two that make one number of 32 bits: the high word has the lower address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

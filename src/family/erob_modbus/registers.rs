@@ -1,8 +1,9 @@
 //! The table of registers (eRob Modbus-RTU manual 1.5, tables 4-1 and 5-1 to 5-6). Where the manual says nothing of a sign, the reading
 //! is argued in its companion table (`tests/vectors/erob-modbus-registers.csv`).
 
+use takt_wire::erob_can::parameter::{Access, Unit, Values};
+
 use super::register::{Number, Register};
-use crate::erob_can::parameter::{Access, Unit, Values};
 
 /// The register at an address, if the table has it.
 pub fn find(address: u16) -> Option<&'static Register> {
@@ -304,7 +305,7 @@ pub static ALL: [Register; 60] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::erob_can::parameter::Parameter as _;
+    use takt_wire::erob_can::parameter::Parameter as _;
 
     #[test]
     fn the_registers_stand_in_the_order_of_their_addresses_and_none_overlaps_another() {

@@ -1,12 +1,13 @@
 //! How a drive is recognised on a Modbus line: by registers that say what only they can say together.
 
+use takt_wire::modbus::frame::RegisterRange;
+
 use super::FACTS;
 use super::fault_code::FaultCode;
 use super::register::Register;
 use super::registers::{BIT_RATE, FAULT_CODE, SLAVE_ADDRESS};
 use crate::family::erob_can;
 use crate::family::scan::{Answered, FoundDevice};
-use crate::modbus::frame::RegisterRange;
 use crate::procedure::ModbusSession;
 
 /// Looks whether the slave has its own address in register 0000, a bit rate that there is in 0001, and a fault code.

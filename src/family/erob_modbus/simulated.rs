@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use takt_wire::modbus::frame::SlaveAddress;
+use takt_wire::modbus::line_timing::LineTiming;
+
 use crate::config::{Axis, Config, FrictionShape};
 use crate::family::erob::simulated::{TORQUE_PER_AMPERE, module};
 use crate::family::simulated_bus::gravity;
-use crate::modbus::frame::SlaveAddress;
-use crate::modbus::line_timing::LineTiming;
 use crate::sim::commanded_module::ModuleParameters;
 use crate::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use crate::sim::plant::{Encoder, JointParameters};

@@ -6,13 +6,13 @@
 
 use takt_rt::transparent::DATA_BYTES;
 use takt_rt::{Frame, Id, Nanoseconds};
+use takt_wire::hollow_lines::registers::{BAUD_RATE, FIRST_ADDRESS, from_registers, to_registers};
+use takt_wire::modbus::frame::{ReceivedRequest, RegisterRange, RegisterValues, Request, SlaveAddress};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::{Answer, Master, MasterTiming, Repeat, RequestError};
 
 use crate::family::bit_fields;
 use crate::family::commission::{DriveTask, Failure, ProcedureError, Report, RunningTask, TargetDrive, Task};
-use crate::hollow_lines::registers::{BAUD_RATE, FIRST_ADDRESS, from_registers, to_registers};
-use crate::modbus::frame::{ReceivedRequest, RegisterRange, RegisterValues, Request, SlaveAddress};
-use crate::modbus::line_timing::LineTiming;
-use crate::modbus::master::{Answer, Master, MasterTiming, Repeat, RequestError};
 use crate::procedure::ProcedureEvent;
 
 /// From one command to the next: a write and a read, with what a USB adapter adds to both.

@@ -5,12 +5,12 @@
 use std::ops::RangeInclusive;
 
 use takt_rt::{Frame, FrameKind, Id};
+use takt_wire::hollow_lines::motor_data::DATA_BYTES;
+use takt_wire::hollow_lines::registers::{BAUD_RATE, FIRST_ADDRESS, from_registers};
+use takt_wire::modbus::frame::RegisterRange;
+use takt_wire::modbus::master::{RequestError, RequestFailure};
 
 use crate::family::scan::{Answered, FoundDevice, OwnProtocol, Reading, ScanSession, StartingKeys};
-use crate::hollow_lines::motor_data::DATA_BYTES;
-use crate::hollow_lines::registers::{BAUD_RATE, FIRST_ADDRESS, from_registers};
-use crate::modbus::frame::RegisterRange;
-use crate::modbus::master::{RequestError, RequestFailure};
 use crate::procedure::ModbusSession;
 
 use super::{CAN, CAN_FD};

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use takt_rt::{BusState, Frame, Id, Nanoseconds};
+use takt_wire::canopen::objects::DEVICE_TYPE;
+use takt_wire::canopen::sdo::SdoRequest;
 
 use super::Scanned;
 use super::canopen;
@@ -12,8 +14,6 @@ use super::device::{Answered, FoundDevice};
 use super::heard::{Heard, HeardDrive, HeardNode};
 use super::own_protocol::OwnProtocol;
 use super::session::{ScanClient, ScanSession};
-use crate::canopen::objects::DEVICE_TYPE;
-use crate::canopen::sdo::SdoRequest;
 use crate::family::commission::Failure;
 use crate::procedure::Procedure;
 

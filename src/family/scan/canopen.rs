@@ -1,18 +1,18 @@
 //! What a CANopen node tells of itself: device type (1000), identity (1018), names and versions (1008, 100A).
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::nmt::NmtState;
+use takt_wire::canopen::object::{DataType, ObjectAddress};
+use takt_wire::canopen::objects::{
+    DEVICE_NAME, DEVICE_TYPE, PRODUCT_CODE, REVISION_NUMBER, SOFTWARE_VERSION, VENDOR_ID,
+};
+use takt_wire::canopen::sdo::SdoError;
+use takt_wire::printable::printable;
 
 use super::device::{Answered, FoundDevice};
 use super::heard::HeardNode;
 use super::session::ScanSession;
-use crate::canopen::nmt::NmtState;
-use crate::canopen::object::{DataType, ObjectAddress};
-use crate::canopen::objects::{
-    DEVICE_NAME, DEVICE_TYPE, PRODUCT_CODE, REVISION_NUMBER, SOFTWARE_VERSION, VENDOR_ID,
-};
-use crate::canopen::sdo::SdoError;
 use crate::family::{self, Family};
-use crate::printable::printable;
 
 /// A node of which nothing more is known.
 pub const KIND: &str = "CANopen node";

@@ -3,11 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use takt_rt::{Frame, FrameKind, Id};
+use takt_wire::canopen::emcy::Emergency;
+use takt_wire::canopen::nmt::{ErrorControl, NmtState};
+use takt_wire::canopen::{function_code, node_of};
 
 use super::own_protocol::{Likeness, OwnProtocol};
-use crate::canopen::emcy::Emergency;
-use crate::canopen::nmt::{ErrorControl, NmtState};
-use crate::canopen::{function_code, node_of};
 use crate::family;
 
 /// Other identifiers that are kept apart. A device that sends under more is counted all the same.

@@ -3,14 +3,14 @@
 use std::ops::RangeInclusive;
 
 use takt_rt::Nanoseconds;
+use takt_wire::modbus::frame::{RegisterRange, SlaveAddress};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::{MasterTiming, RequestError, RequestFailure};
 
 use super::Scanned;
 use super::device::{Answered, FoundDevice};
 use crate::family;
 use crate::family::commission::Failure;
-use crate::modbus::frame::{RegisterRange, SlaveAddress};
-use crate::modbus::line_timing::LineTiming;
-use crate::modbus::master::{MasterTiming, RequestError, RequestFailure};
 use crate::procedure::{ModbusClient, ModbusSession, Procedure};
 
 /// The address before the session turns to those that are asked.

@@ -1,9 +1,9 @@
 //! Which frames only read from a device, so that they may be sent beside a running controller.
 
 use takt_rt::{Frame, FrameKind, Id};
+use takt_wire::canopen::function_code;
+use takt_wire::canopen::sdo::SdoRequest;
 
-use crate::canopen::function_code;
-use crate::canopen::sdo::SdoRequest;
 use crate::family;
 
 /// The identifier of the reply to a frame that only reads: an upload of an object from a CANopen node, or a read in the protocol of a
@@ -29,8 +29,8 @@ fn sdo_reply(frame: &Frame) -> Option<Id> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::erob_can::entries;
-    use crate::erob_can::frame::Request;
+    use takt_wire::erob_can::entries;
+    use takt_wire::erob_can::frame::Request;
 
     #[test]
     fn uploads_and_reads_are_readings_and_nothing_else_is() {

@@ -3,11 +3,11 @@
 use std::collections::VecDeque;
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::canopen::function_code;
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
 
 use super::heard::Heard;
-use crate::canopen::function_code;
-use crate::canopen::object::ObjectAddress;
-use crate::canopen::sdo::{Completed, SdoClient, SdoError, SdoTiming, Transfer, Uploaded};
 use crate::procedure::{Client, ProcedureSession};
 
 /// Frames that wait for the procedure. More come in one poll only from a device that floods the bus; the oldest go.

@@ -1,12 +1,12 @@
 //! Bring-up, start and shutdown of a YZ-AIM integrated servo, CANopen edition (manual v1.62, and field experience).
 
 use takt_rt::controlword;
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::nmt::{NmtCommand, NmtState};
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
 
 use super::{HIGHEST_SPEED_RPM, NO_RAMP, STANDSTILL, answers_sync};
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::nmt::{NmtCommand, NmtState};
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
 use crate::config::Axis;
 use crate::family::bring_up::axis_units::turns;
 use crate::family::bring_up::{AxisSession, Check, RESTART_STEP, StepResult};

@@ -15,10 +15,10 @@ pub use facts::{FACTS, HIGHEST_SPEED_RPM, NO_RAMP, STANDSTILL};
 pub(crate) use process_data::answers_sync;
 
 use takt_rt::Frame;
+use takt_wire::canopen::object::Object;
 
 use super::scan::{FoundDevice, StartingKeys};
 use super::{ChinesePhrase, ChineseTerm, Family, MappingMatch, SettingUp};
-use crate::canopen::object::Object;
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::commission::dictionary::ObjectEntry;

@@ -1,8 +1,8 @@
 //! The fixed PDOs of a YZ-AIM (manual, 5.08): it answers RPDO n with TPDO n at once, and SYNC with TPDO 2.
 
 use takt_rt::TransmissionType;
+use takt_wire::canopen::objects::PdoDirection;
 
-use crate::canopen::objects::PdoDirection;
 use crate::config::{Axis, Control};
 use crate::family::bring_up::mapped_objects::{
     CONTROLWORD, OPERATION_MODE, POSITION, STATUSWORD, TARGET_POSITION, TARGET_VELOCITY, VELOCITY,

@@ -1,9 +1,9 @@
 //! The kinds of fault and their keys.
 
 use takt_rt::{Frame, Id, Nanoseconds};
+use takt_wire::canopen::nmt::{NmtCommand, NmtTarget};
 
 use super::common::{self, Location};
-use crate::canopen::nmt::{NmtCommand, NmtTarget};
 use crate::config::bounds::Bounds;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;

@@ -8,6 +8,7 @@ mod line;
 use std::fmt;
 use std::path::Path;
 
+use takt_wire::printable::printable_path;
 use toml::de::DeTable;
 
 use super::scenario::{Scenario, ScenarioFault};
@@ -15,7 +16,6 @@ use crate::config::read::document;
 use crate::config::read::section::Section;
 use crate::config::spot::Problems;
 use crate::config::{Config, ConfigError, ProblemKind};
-use crate::printable::printable_path;
 
 /// The largest number of faults in one file.
 const FAULTS_AT_MOST: usize = 64;
@@ -56,7 +56,7 @@ impl Scenario {
     /// See [`ScenarioError`].
     pub fn load(path: &Path, config: &Config) -> Result<Self, ScenarioError> {
         let name = printable_path(path);
-        match crate::text_file::read(path) {
+        match takt_wire::text_file::read(path) {
             Ok(bytes) => Ok(Self::parse(&name, &ConfigError::text_of(&name, bytes)?, config)?),
             Err(error) => Err(ScenarioError::Unreadable { path: name, reason: error.to_string() }),
         }

@@ -4,9 +4,9 @@
 use std::fmt;
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
+use takt_wire::canopen::function_code;
+use takt_wire::canopen::nmt::{NmtCommand, NmtTarget};
 
-use crate::canopen::function_code;
-use crate::canopen::nmt::{NmtCommand, NmtTarget};
 use crate::config::defaults;
 
 /// Requests of an LSS master (CiA 305).

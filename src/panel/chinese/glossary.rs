@@ -153,15 +153,15 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::bus_log::frame_text;
-    use crate::canopen::emcy::ErrorCode;
-    use crate::canopen::sdo::AbortCode;
     use crate::config::Config;
-    use crate::erob_can::entries::Entry;
-    use crate::erob_can::parameter::{Parameter as _, Values};
     use crate::monitor::BusDecoder;
     use crate::panel::chinese::Words;
     use crate::panel::chinese::tests::source;
+    use takt_wire::bus_log::frame_text;
+    use takt_wire::canopen::emcy::ErrorCode;
+    use takt_wire::canopen::sdo::AbortCode;
+    use takt_wire::erob_can::entries::Entry;
+    use takt_wire::erob_can::parameter::{Parameter as _, Values};
 
     /// Names of protocols, units and the like, which are the same in Chinese.
     const KEPT: &str = "rad rad/s rad/s² m m/s mm/s Nm N·m mN·m count/s count/s² kbit/s bit/s ms min r/min save load deg deg/s deg/s² CiA eRob \

@@ -217,12 +217,12 @@ pub const PHRASES: &[ChinesePhrase] = &[
 #[cfg(test)]
 mod tests {
     use super::super::tests::is_chinese;
-    use crate::canopen::nmt::NmtState;
-    use crate::canopen::object::{DataType, Object};
-    use crate::canopen::sdo::{AbortCode, SdoError};
     use crate::config::Quantity;
     use crate::family::commission::Failure;
     use crate::procedure::Access;
+    use takt_wire::canopen::nmt::NmtState;
+    use takt_wire::canopen::object::{DataType, Object};
+    use takt_wire::canopen::sdo::{AbortCode, SdoError};
 
     const STATUSWORD: Object = Object::new(0x6041, 0, DataType::U16, "6041");
 

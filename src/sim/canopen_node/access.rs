@@ -1,9 +1,9 @@
 //! Access of the master to the objects by SDO, with the effects of each write on the communication.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::{CanopenDevice, CanopenNode};
-use crate::canopen::object::ObjectAddress;
 use crate::sim::object_dictionary::ObjectKind;
 use crate::sim::pdo_engine::{check_parameter, is_parameter};
 use crate::sim::sdo_reply::AbortCode;

@@ -1,11 +1,11 @@
 //! The complete drive: it receives frames and time, advances its parts, and sends frames.
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::axis::{Axis, AxisEvent};
 use super::places::{AXIS_OFFSET, is_measured};
 use super::{Cia402Parameters, NotADrive, dictionary_of};
-use crate::canopen::object::ObjectAddress;
 use crate::config::quirks::Quirks;
 use crate::sim::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, TakesField, ValueSource};
 use crate::sim::defect::{Defect, Unsupported};

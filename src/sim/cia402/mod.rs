@@ -34,9 +34,9 @@ mod profile;
 mod units;
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::eds;
+use takt_wire::canopen::object::ObjectAddress;
 
-use crate::canopen::eds;
-use crate::canopen::object::ObjectAddress;
 use crate::config::quirks::Quirks;
 
 use super::homing_switches::ReferenceSwitches;

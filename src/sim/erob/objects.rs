@@ -1,7 +1,8 @@
 //! The object dictionary of the eRob's CANopen firmware by its EDS. Objects that are not in the EDS do not exist here.
 //! Unknown defaults are 0, or as noted.
 
-use crate::canopen::eds::{AccessType, DataTypeCode};
+use takt_wire::canopen::eds::{AccessType, DataTypeCode};
+
 use crate::sim::object_dictionary::table::{I8, I16, I32, ObjectRow, U8, U16, U32, table_places};
 
 use AccessType::{ReadWrite, WriteOnly};
@@ -329,9 +330,9 @@ pub fn is_measured(index: u16) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::canopen::object::ObjectAddress;
     use crate::sim::object_dictionary::SimulatedDictionary;
     use crate::sim::sdo_reply::AbortCode;
+    use takt_wire::canopen::object::ObjectAddress;
 
     fn dictionary() -> SimulatedDictionary {
         SimulatedDictionary::of_table(&OBJECTS, 5)

@@ -1,10 +1,10 @@
 //! The complete module: it receives frames and time, moves its joint, and replies.
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::erob_can::error_code::ErrorCode;
+use takt_wire::erob_can::frame::{ReceivedRequest, Reply, reply_id};
 
 use super::settings::{CAN_ADDRESS, Settings, Writable};
-use crate::erob_can::error_code::ErrorCode;
-use crate::erob_can::frame::{ReceivedRequest, Reply, reply_id};
 use crate::sim::commanded_module::{CommandedModule, ModuleParameters, NotEnabled, NotStarted};
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};

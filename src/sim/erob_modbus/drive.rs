@@ -1,12 +1,12 @@
 //! The complete module: it receives requests and time, moves its joint, and replies.
 
 use takt_rt::{Frame, Nanoseconds};
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{ReceivedRequest, RegisterRange, Request, Values, reply_frame};
 
 use super::registers::{
     BIT_RATE, COMMUNICATION_TIMEOUT, OPERATION_MODE, SLAVE_ADDRESS, Settings, TARGET_CURRENT, TARGET_VELOCITY,
 };
-use crate::modbus::exception::ExceptionCode;
-use crate::modbus::frame::{ReceivedRequest, RegisterRange, Request, Values, reply_frame};
 use crate::sim::commanded_module::{CommandedModule, ModuleParameters, NotEnabled};
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 
 use takt_rt::Nanoseconds;
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::request_gathering::RequestGathering;
 
 use super::drive::ErobModbusDrive;
-use crate::modbus::line_timing::LineTiming;
-use crate::modbus::request_gathering::RequestGathering;
 use crate::sim::drive::Drive;
 use crate::sim::random::Random;
 use crate::sim::serial_line::{DevicesOnLine, LineDisturbance};
@@ -134,10 +134,10 @@ impl DevicesOnLine for SimulatedLine {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::modbus::frame::{RegisterRange, Request, SlaveAddress};
     use crate::sim::commanded_module::ModuleParameters;
     use crate::sim::erob_modbus::ErobModbusParameters;
     use crate::sim::plant::{Encoder, JointParameters};
+    use takt_wire::modbus::frame::{RegisterRange, Request, SlaveAddress};
 
     const LINE: LineTiming = LineTiming::new(115_200);
     const MS: Nanoseconds = 1_000_000;

@@ -1,6 +1,7 @@
 //! What can be read and written in a module, and what of it is kept without power.
 
-use crate::modbus::exception::ExceptionCode;
+use takt_wire::modbus::exception::ExceptionCode;
+
 use crate::sim::commanded_module::{ControlMode, ModuleSettings, ramp};
 use crate::sim::profile_motions::MotionProfile;
 

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 
 use takt_rt::Nanoseconds;
+use takt_wire::hollow_lines::motor_data::MotorCommand;
+use takt_wire::hollow_lines::transparent::{FrameReader, TransparentFrame};
 
 use super::motor::Motor;
-use crate::hollow_lines::motor_data::MotorCommand;
-use crate::hollow_lines::transparent::{FrameReader, TransparentFrame};
 use crate::sim::serial_device::SerialDevice;
 
 /// The time from a request to the reply of a motor.
@@ -56,7 +56,7 @@ impl SerialDevice for Bridge {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hollow_lines::motor_data::{MotorMode, MotorReply, MotorRun};
+    use takt_wire::hollow_lines::motor_data::{MotorMode, MotorReply, MotorRun};
 
     fn replies(bridge: &mut Bridge, now_ns: Nanoseconds, id: u8, command: MotorCommand) -> Vec<MotorReply> {
         let mut answer = vec![];

@@ -4,12 +4,12 @@
 //! what [`ConsoleCommand`] assumes.
 
 use takt_rt::Nanoseconds;
-
-use super::motor::Motor;
-use crate::hollow_lines::console::{
+use takt_wire::hollow_lines::console::{
     ConsoleCommand, ConsoleReader, PARAMETERS, Parameter, ParameterAccess, TERMINATOR, ZeroPoint,
 };
-use crate::hollow_lines::motor_data::{COUNTS_PER_TURN, MotorCommand, MotorMode, MotorRun};
+use takt_wire::hollow_lines::motor_data::{COUNTS_PER_TURN, MotorCommand, MotorMode, MotorRun};
+
+use super::motor::Motor;
 use crate::sim::serial_device::SerialDevice;
 
 /// 10 Hz of electrical frequency in position mode.

@@ -1,9 +1,9 @@
 //! The hollow encoder.
 
 use takt_rt::Nanoseconds;
+use takt_wire::hollow_lines::encoder::REQUEST;
+use takt_wire::hollow_lines::transparent::{FrameReader, TransparentFrame};
 
-use crate::hollow_lines::encoder::REQUEST;
-use crate::hollow_lines::transparent::{FrameReader, TransparentFrame};
 use crate::sim::serial_device::SerialDevice;
 
 /// An encoder that stands.

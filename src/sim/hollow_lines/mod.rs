@@ -13,9 +13,10 @@ pub use encoder::Encoder;
 pub use pulse_module::PulseModule;
 pub use registers::RegisterBridge;
 
+use takt_wire::hollow_lines;
+use takt_wire::hollow_lines::transparent;
+
 use super::serial_device::SerialDeviceKind;
-use crate::hollow_lines;
-use crate::hollow_lines::transparent;
 
 /// The identifiers of the motors behind the RS-485 module.
 const MOTORS: [u8; 4] = [1, 2, 3, 4];

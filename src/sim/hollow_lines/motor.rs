@@ -1,8 +1,7 @@
 //! A motor that does what a CAN FD command says, without mechanics: it keeps to the velocity that it is given.
 
 use takt_rt::Nanoseconds;
-
-use crate::hollow_lines::motor_data::{
+use takt_wire::hollow_lines::motor_data::{
     COUNTS_PER_TURN, MotorCommand, MotorMode, MotorReply, MotorRun, MotorScale,
 };
 

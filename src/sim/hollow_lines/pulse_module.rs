@@ -1,8 +1,8 @@
 //! The pulse module: it takes stiffness settings, and answers nothing.
 
 use takt_rt::Nanoseconds;
+use takt_wire::hollow_lines::pulse_module::{SETTING_BYTES, StiffnessSetting};
 
-use crate::hollow_lines::pulse_module::{SETTING_BYTES, StiffnessSetting};
 use crate::sim::serial_device::SerialDevice;
 
 /// A pause that ends a frame: the manual prints no mark of its beginning.

@@ -6,14 +6,14 @@
 use std::collections::VecDeque;
 
 use takt_rt::Nanoseconds;
+use takt_wire::hollow_lines::motor_data::{DATA_BYTES, MotorCommand};
+use takt_wire::hollow_lines::registers::{BAUD_RATE, FIRST_ADDRESS, from_registers, to_registers};
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{ReceivedRequest, Request, reply_frame};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::request_gathering::RequestGathering;
 
 use super::motor::Motor;
-use crate::hollow_lines::motor_data::{DATA_BYTES, MotorCommand};
-use crate::hollow_lines::registers::{BAUD_RATE, FIRST_ADDRESS, from_registers, to_registers};
-use crate::modbus::exception::ExceptionCode;
-use crate::modbus::frame::{ReceivedRequest, Request, reply_frame};
-use crate::modbus::line_timing::LineTiming;
-use crate::modbus::request_gathering::RequestGathering;
 use crate::sim::serial_device::SerialDevice;
 
 /// The time from a request to its reply.
@@ -125,10 +125,10 @@ mod tests {
     fn another_address_is_silent_and_another_function_or_register_is_refused() {
         let mut bridge = RegisterBridge::new(&[2]);
         assert!(answer(&mut bridge, 0, &[1, 3, 0, 0, 0, 0x10, 0x44, 6]).is_empty());
-        let slave = crate::modbus::frame::SlaveAddress::new(2).unwrap();
+        let slave = takt_wire::modbus::frame::SlaveAddress::new(2).unwrap();
         let one = Request::WriteOne { register: 0, value: 1 }.frame(slave);
         assert_eq!(answer(&mut bridge, 100_000_000, &one)[1..3], [0x86, 1]);
-        let beyond = Request::Read(crate::modbus::frame::RegisterRange::new(8, 9).unwrap()).frame(slave);
+        let beyond = Request::Read(takt_wire::modbus::frame::RegisterRange::new(8, 9).unwrap()).frame(slave);
         assert_eq!(answer(&mut bridge, 200_000_000, &beyond)[1..3], [0x83, 2]);
     }
 }

@@ -1,6 +1,6 @@
 //! Dictionaries written by hand, for drives whose manual says more than their data sheet.
 
-use crate::canopen::eds::{AccessType, DataTypeCode};
+use takt_wire::canopen::eds::{AccessType, DataTypeCode};
 
 /// One entry of such a dictionary.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,8 +4,8 @@
 //! identifier can be written at all; its entries only while their count is 0.
 
 use takt_rt::MappedObject;
+use takt_wire::canopen::object::ObjectAddress;
 
-use crate::canopen::object::ObjectAddress;
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::sdo_reply::AbortCode;
 

@@ -1,6 +1,7 @@
 //! Block transfers (CiA 301, 7.2.4.3.9 to 7.2.4.3.16).
 
-use crate::canopen::object::ObjectAddress;
+use takt_wire::canopen::object::ObjectAddress;
+
 use crate::sim::sdo_reply::{AbortCode, addressed};
 
 use super::{ObjectAccess, SdoServer, Transfer, check_length};

@@ -1,7 +1,8 @@
 //! The object dictionary by the manual's chapter VI, with the entries that CiA 301 implies. Other objects do not exist
 //! here. The manual gives few defaults outside the communication parameters; the others are from a new unit.
 
-use crate::canopen::eds::{AccessType, DataTypeCode};
+use takt_wire::canopen::eds::{AccessType, DataTypeCode};
+
 use crate::sim::object_dictionary::table::{I8, I16, I32, ObjectRow, U8, U16, U32, table_places};
 
 const FULL_8: [i64; 2] = [0, 0xFF];

@@ -25,8 +25,8 @@ use super::machine::{BusDescription, Machine};
 use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use crate::link::trace::TracedHealth;
-use crate::printable::printable;
 use decoder::{Decoder, Item};
+use takt_wire::printable::printable;
 
 pub use cause::Cause;
 pub use frames::{RecordedFrame, RecordedFrames, frames};

@@ -5,8 +5,8 @@ use std::io::{self, Read};
 
 use mcap::MAGIC;
 use mcap::records::op;
+use takt_wire::printable::printable;
 
-use crate::printable::printable;
 use crate::telemetry::compression;
 
 /// No record of takt is longer, nor what comes out of a compressed chunk. A longer one means that the file is damaged.

@@ -1,9 +1,9 @@
 //! The texts of rejected requests.
 
 use takt_rt::{MappedObject, RejectReason, RequestError, RequestKind};
+use takt_wire::printable::Shown;
 
 use super::{mode, phase, rule_key};
-use crate::printable::Shown;
 use crate::telemetry::machine::{Machine, Unit};
 
 /// The name of a request: "the move".

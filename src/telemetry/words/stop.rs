@@ -1,10 +1,10 @@
 //! The texts of stops.
 
 use takt_rt::{Fault, Id, StopCause, StopReason};
+use takt_wire::printable::Shown;
 
 use super::cures::cure;
 use super::{category, mode, phase};
-use crate::printable::Shown;
 use crate::telemetry::machine::{Machine, Unit};
 
 /// Whether this is the identifier of an SDO request to a node (CiA 301, 7.3.3).

@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use takt::canopen::dcf::{self, DeviceConfiguration, Download};
-use takt::canopen::eds;
-use takt::canopen::sdo::AbortCode;
 use takt::config::Config;
 use takt::family::bring_up::BringUpError;
 use takt::internals::family::bring_up::BringUp;
+use takt_wire::canopen::dcf::{self, DeviceConfiguration, Download};
+use takt_wire::canopen::eds;
+use takt_wire::canopen::sdo::AbortCode;
 
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, ReceiveBatch};

@@ -1,11 +1,11 @@
 //! The message of each kind of failure.
 
-use takt::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
-use takt::canopen::sdo::AbortCode;
 use takt::config::Control;
 use takt::family::bring_up::{FailureCause, ProbeResult};
 use takt::internals::family::bring_up::{BringUp, Shutdown};
 use takt_rt::DriveState;
+use takt_wire::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
+use takt_wire::canopen::sdo::AbortCode;
 
 use super::scripted_drive::{ScriptedDrive, at};
 use super::started;

@@ -9,12 +9,12 @@ mod world;
 
 use proptest::prelude::*;
 use scripted_drive::at;
-use takt::canopen::emcy::ErrorCode;
-use takt::canopen::nmt::{ErrorControl, NmtState};
 use takt::config::{Config, Control};
 use takt::family::bring_up::BringUpTiming;
 use takt::internals::family::bring_up::{BringUp, BringUpProgress, NotConfigured, Shutdown, Stage};
 use takt_rt::{DriveState, Frame, Id};
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::nmt::{ErrorControl, NmtState};
 use world::{World, config};
 
 /// A world whose drives are configured and started.

@@ -2,11 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use takt::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
-use takt::canopen::object::ObjectAddress;
-use takt::canopen::sdo::AbortCode;
-use takt::internals::canopen::sdo::{Expedited, SdoRequest, SdoResponse, Segment};
 use takt_rt::{Command, DriveState, Frame, Id, controlword};
+use takt_wire::canopen::nmt::{ErrorControl, NmtCommand, NmtState, NmtTarget};
+use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::sdo::{AbortCode, Expedited, SdoRequest, SdoResponse, Segment};
 
 const INVALID: u32 = 1 << 31;
 

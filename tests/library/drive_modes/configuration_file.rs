@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use takt::Outcome;
-use takt::canopen::dcf::{self, DeviceConfiguration, Download};
-use takt::canopen::eds;
-use takt::canopen::object::ObjectAddress;
 use takt::config::Config;
+use takt_wire::canopen::dcf::{self, DeviceConfiguration, Download};
+use takt_wire::canopen::eds;
+use takt_wire::canopen::object::ObjectAddress;
 
 use crate::drive_modes::one_yz_aim::one_yz_aim;
 use crate::drive_modes::wire::id;

@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use takt::Outcome;
-use takt::canopen::dcf::DeviceConfiguration;
-use takt::canopen::eds;
 use takt::config::Config;
 use takt::internals::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
+use takt_wire::canopen::dcf::DeviceConfiguration;
+use takt_wire::canopen::eds;
 
 use crate::drive_modes::one_yz_aim::one_yz_aim;
 use crate::drive_modes::wire::{counts_per_unit, id, word};

@@ -1,9 +1,9 @@
 //! TIME: when it is sent, what it says, and that nobody minds.
 
 use takt::Outcome;
-use takt::internals::canopen::time::TimeOfDay;
 use takt::schedule::{self, MessageKind};
 use takt_rt::TIME_ID;
+use takt_wire::canopen::time::TimeOfDay;
 
 use crate::drive_modes::wire::MILLISECOND_NS;
 use crate::drive_modes::world::{World, parse, text_of};

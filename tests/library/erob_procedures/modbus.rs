@@ -6,16 +6,16 @@ use takt::internals::family::erob_modbus::commands::{self, CommandFailure};
 use takt::internals::family::erob_modbus::drive::{AccessError, AccessFailure, ErobDrive};
 use takt::internals::family::erob_modbus::fault_code::FaultCode;
 use takt::internals::family::erob_modbus::registers;
-use takt::internals::modbus::exception::ExceptionCode;
-use takt::internals::modbus::frame::{ReceivedRequest, Request, SlaveAddress};
-use takt::internals::modbus::line_timing::LineTiming;
-use takt::internals::modbus::master::{MasterTiming, RequestFailure};
 use takt::internals::procedure::{ModbusClient, ModbusSession};
 use takt::internals::sim::commanded_module::ModuleParameters;
 use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::internals::sim::serial_line::{DevicesOnLine, LineDisturbance};
 use takt::sim::{Defect, Drive, DriveFault, Mailbox, Observation, QueueOrder};
 use takt_rt::DriveState;
+use takt_wire::modbus::exception::ExceptionCode;
+use takt_wire::modbus::frame::{ReceivedRequest, Request, SlaveAddress};
+use takt_wire::modbus::line_timing::LineTiming;
+use takt_wire::modbus::master::{MasterTiming, RequestFailure};
 
 use super::bench::{self, Bench, COUNTS_PER_TURN, MS, Outcome, PROFILE, SECOND, Wire};
 
@@ -359,8 +359,8 @@ fn every_register_can_be_read_and_what_the_model_does_not_have_is_left_out() {
 fn the_simulated_drive_refuses_gaps_halves_and_changes_while_enabled() {
     let mut bench = Bench::<Modbus>::ready();
     let refusals = bench.run_alone(async |drive| {
-        use takt::internals::modbus::frame::{RegisterRange, RegisterValues};
-        use takt::internals::modbus::master::Repeat;
+        use takt_wire::modbus::frame::{RegisterRange, RegisterValues};
+        use takt_wire::modbus::master::Repeat;
         let session = drive.session();
         drive.write(&registers::MOTOR_ENABLE, 1).await?;
         let mut refusals = vec![];

@@ -1,10 +1,5 @@
 //! What the vendor's own CAN protocol adds.
 
-use takt::internals::erob_can::client::{RequestClient, RequestError, RequestFailure, RequestTiming};
-use takt::internals::erob_can::entries;
-use takt::internals::erob_can::error_code::ErrorCode;
-use takt::internals::erob_can::frame::{ReceivedRequest, Request};
-use takt::internals::erob_can::parameter::Access;
 use takt::internals::family::erob::motion::Motion;
 use takt::internals::family::erob::procedure::End;
 use takt::internals::family::erob_can::module;
@@ -13,6 +8,11 @@ use takt::internals::sim::commanded_module::ModuleParameters;
 use takt::internals::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
 use takt::sim::{Defect, DriveFault, Observation, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, ReceiveBatch};
+use takt_wire::erob_can::client::{RequestClient, RequestError, RequestFailure, RequestTiming};
+use takt_wire::erob_can::entries;
+use takt_wire::erob_can::error_code::ErrorCode;
+use takt_wire::erob_can::frame::{ReceivedRequest, Request};
+use takt_wire::erob_can::parameter::Access;
 
 use super::bench::{self, Bench, COUNTS_PER_TURN, MS, Outcome, PROFILE, SECOND, Wire};
 

@@ -1,8 +1,8 @@
 //! Frames that are as long as their content can make them.
 
-use takt::internals::schedule::{BitRates, FrameShape, worst_case_bits};
-use takt::internals::sim::WireLength;
 use takt_rt::{Frame, FrameKind, Id};
+use takt_wire::frame_time::{BitRates, FrameShape, worst_case_bits};
+use takt_wire::wire_length::WireLength;
 
 /// Runs of four equal bits, shifted, and runs of five: what needs the most stuff bits depends on the bits before.
 const PATTERNS: [u8; 12] = [0x0F, 0x1E, 0x3C, 0x78, 0xF0, 0xE1, 0xC3, 0x87, 0x00, 0xFF, 0x07, 0xF8];

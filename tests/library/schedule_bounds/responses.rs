@@ -1,10 +1,10 @@
 //! Response times of messages that are queued at any moment.
 
 use proptest::prelude::*;
-use takt::internals::schedule::BitRates;
 use takt::internals::schedule::{Message, response_time};
 use takt::sim;
 use takt_rt::{Frame, FrameKind, Id};
+use takt_wire::frame_time::BitRates;
 
 use crate::schedule_bounds::frames::{bound_ns, longest};
 use crate::schedule_bounds::traffic::{Traffic, longest_response_ns};

@@ -1,8 +1,8 @@
 //! What holds for the drive of every data sheet.
 
-use takt::canopen::object::ObjectAddress;
 use takt::sim::{Defect, NodeState};
 use takt_rt::{DriveState, OperationMode};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::{Tried, parameters, sheets};
 use crate::bench::{Bench, MILLISECOND_NS, NODE};
@@ -46,7 +46,7 @@ fn every_object_is_read_as_its_data_sheet_says_and_an_absent_one_aborts() {
                 continue;
             }
             let read = tried.bench.read(index, subindex);
-            let is_write_only = entry.access == takt::canopen::eds::AccessType::WriteOnly;
+            let is_write_only = entry.access == takt_wire::canopen::eds::AccessType::WriteOnly;
             assert_eq!(read.err(), is_write_only.then_some(WRITE_ONLY), "{name} {}", entry.address);
         }
         for index in (0x1000..0x1030).chain(0x6000..0x6100) {

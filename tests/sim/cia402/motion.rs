@@ -142,7 +142,7 @@ fn with_a_second_axis(text: &str) -> String {
 fn two_axes_in_one_node_move_by_themselves() {
     let text = std::fs::read_to_string("tests/eds/vendors/eyou-euservo.eds").unwrap();
     let sheet =
-        takt::canopen::eds::parse("two.eds", with_a_second_axis(&text).as_bytes()).unwrap().dictionary;
+        takt_wire::canopen::eds::parse("two.eds", with_a_second_axis(&text).as_bytes()).unwrap().dictionary;
     let mut parameters = parameters(sheet, Quirks::default());
     parameters.axes.push(joint(65_536.0));
     let mut tried = Tried::of(parameters);

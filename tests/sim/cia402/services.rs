@@ -119,12 +119,12 @@ fn long_values_go_in_segments_and_in_blocks_and_without_blocks_abort() {
 }
 
 /// The EYOU's data sheet with a device name, a text.
-fn eyou_with_a_name() -> takt::canopen::eds::ObjectDictionary {
+fn eyou_with_a_name() -> takt_wire::canopen::eds::ObjectDictionary {
     let path = "tests/eds/vendors/eyou-euservo.eds";
     let text = std::fs::read_to_string(path).unwrap();
     let name = "\n[1008]\nParameterName=Manufacturer device name\nObjectType=7\nDataType=0x0009\nAccessType=const\n\
         DefaultValue=takt tester\nPDOMapping=0\n";
-    takt::canopen::eds::parse(path, (text + name).as_bytes()).unwrap().dictionary
+    takt_wire::canopen::eds::parse(path, (text + name).as_bytes()).unwrap().dictionary
 }
 
 #[test]

@@ -5,8 +5,6 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use takt::Config;
-use takt::canopen::eds::AccessType;
-use takt::canopen::object::ObjectAddress;
 use takt::config::quirks::Quirks;
 use takt::family::cia402::Device;
 use takt::family::commission::{CommandValue, Failure, MoveKind, TargetDrive, Task};
@@ -16,6 +14,8 @@ use takt::sim::homing_switches::{ReferenceSwitches, Switch};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{DriveState, OperationMode};
+use takt_wire::canopen::eds::AccessType;
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::bench::*;
 

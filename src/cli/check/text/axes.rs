@@ -1,7 +1,8 @@
 //! The tables of the axes: limits, units, supervision.
 
+use takt_wire::printable::printable_path;
+
 use crate::config::LimitOrigin;
-use crate::printable::printable_path;
 
 use super::{counted_span, short, span, time};
 use crate::cli::check::{AxisCheck, ComplianceCheck};

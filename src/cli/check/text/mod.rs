@@ -5,8 +5,9 @@ mod buses;
 
 use std::fmt::Write as _;
 
+use takt_wire::printable::printable_path;
+
 use crate::config::Config;
-use crate::printable::printable_path;
 use crate::schedule::BusSchedule;
 use crate::schedule::text::microseconds;
 

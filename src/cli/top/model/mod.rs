@@ -8,11 +8,11 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use takt_rt::{AxisLimits, AxisSnapshot, Event, EventKind, Nanoseconds, RequestTarget, Snapshot};
+use takt_wire::printable::printable;
 
 use super::jog::Jog;
 use super::request::Request;
 use crate::command::LeaseHolder;
-use crate::printable::printable;
 use crate::telemetry::{LoopTiming, Machine, words};
 
 /// Lines of events that are kept.

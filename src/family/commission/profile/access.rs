@@ -1,6 +1,7 @@
 //! Objects that a drive may lack: its data sheet tells, or the drive itself.
 
-use crate::canopen::object::Object;
+use takt_wire::canopen::object::Object;
+
 use crate::family::commission::failure::Failure;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;

@@ -1,13 +1,13 @@
 //! Enabling and disabling, with the checks before motion.
 
 use takt_rt::{DriveState, Nanoseconds, OperationMode, controlword};
+use takt_wire::canopen::nmt::NmtCommand;
+use takt_wire::canopen::objects::*;
 
 use super::access::{read_if_there, write_if_writable};
 use super::objects::ABORT_CONNECTION_OPTION;
 use super::reading;
 use super::words::modes_words;
-use crate::canopen::nmt::NmtCommand;
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::DriveProfile;

@@ -1,11 +1,11 @@
 //! Clears a fault by a rising edge of controlword bit 7.
 
 use takt_rt::{DriveState, Nanoseconds, controlword};
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::objects::*;
 
 use super::enabling::state;
 use super::reading::{error_code, summary};
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;

@@ -1,13 +1,13 @@
 //! Homing by object 6098, with every method of the standard and those of the manufacturer.
 
 use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
 
 use super::access::read_if_there;
 use super::motion::{POLL_NS, with_torque};
 use super::objects::{HOMING_METHOD, HOMING_SPEED_SWITCH, HOMING_SPEED_ZERO};
 use super::{enabling, reading};
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::DriveProfile;

@@ -2,13 +2,13 @@
 
 use serde_json::json;
 use takt_rt::{DriveState, OperationMode};
+use takt_wire::canopen::emcy::{ErrorCode, ErrorRegister};
+use takt_wire::canopen::objects::*;
 
 use super::access::read_if_there;
 use super::objects::*;
 use super::reading;
 use super::words::{modes_words, statusword_words};
-use crate::canopen::emcy::{ErrorCode, ErrorRegister};
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;

@@ -1,12 +1,12 @@
 //! The objects of CiA 301 and CiA 402 that commissioning knows by name, with their units.
 
 use takt_rt::OperationMode;
+use takt_wire::canopen::emcy::ErrorRegister;
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
 
 use super::upkeep::{LOAD_SIGNATURE, SAVE_SIGNATURE};
 use super::words::{controlword_words, modes_words, statusword_words};
-use crate::canopen::emcy::ErrorRegister;
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
 use crate::config::DriveFamily;
 use crate::family::commission::dictionary::{ObjectEntry, ObjectUnit};
 use crate::family::drive_error_words;

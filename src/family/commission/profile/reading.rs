@@ -1,11 +1,11 @@
 //! Reads position, velocity, torque and faults.
 
 use takt_rt::{DriveState, Nanoseconds};
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::objects::*;
 
 use super::access::read_if_there;
 use super::objects::{TORQUE_ACTUAL_VALUE, error_history};
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::polling;

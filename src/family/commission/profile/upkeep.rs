@@ -1,10 +1,10 @@
 //! Stores the parameters (1010), and restores those of the factory (1011).
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::object::Object;
 
 use super::enabling::state;
 use super::objects::{RESTORE, STORE};
-use crate::canopen::object::Object;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;

@@ -1,11 +1,12 @@
 //! What the drive tells of itself, and the other drives on the bus.
 
+use takt_wire::erob_can::client::RequestTiming;
+use takt_wire::erob_can::entries::{self, Entry};
+use takt_wire::erob_can::frame::NODES;
+use takt_wire::erob_can::module_information::{ModuleNumbers, UnknownField};
+
 use super::super::failure::FAULT_CURE;
 use super::super::module;
-use crate::erob_can::client::RequestTiming;
-use crate::erob_can::entries::{self, Entry};
-use crate::erob_can::frame::NODES;
-use crate::erob_can::module_information::{ModuleNumbers, UnknownField};
 use crate::family::commission::scan::report;
 use crate::family::commission::{Failure, Report, TargetDrive};
 use crate::family::erob::module::CommandedModule as _;

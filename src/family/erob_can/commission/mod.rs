@@ -10,11 +10,11 @@ mod upkeep;
 mod words;
 
 use takt_rt::Frame;
+use takt_wire::canopen::object::DataType;
+use takt_wire::erob_can::client::{RequestClient, RequestTiming};
+use takt_wire::erob_can::entries::Entry;
+use takt_wire::erob_can::frame::NODES;
 
-use crate::canopen::object::DataType;
-use crate::erob_can::client::{RequestClient, RequestTiming};
-use crate::erob_can::entries::Entry;
-use crate::erob_can::frame::NODES;
 use crate::family::FrameWords;
 use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
 use crate::family::erob::module::CommandedModule as _;

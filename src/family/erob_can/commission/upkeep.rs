@@ -1,8 +1,9 @@
 //! Saving, the node ID, the brake, faults, and the count of turns.
 
+use takt_wire::erob_can::entries;
+use takt_wire::erob_can::frame::NODES;
+
 use super::super::module;
-use crate::erob_can::entries;
-use crate::erob_can::frame::NODES;
 use crate::family::commission::{Failure, Report, TargetDrive};
 use crate::family::erob::module::CommandedModule as _;
 use crate::family::erob::tasks;

@@ -1,10 +1,10 @@
 //! Requests and replies in words. A reply says nothing of its own: the request before it tells what it is.
 
 use takt_rt::Frame;
+use takt_wire::erob_can::entries;
+use takt_wire::erob_can::frame::{ReceivedRequest, Reply, replying_node};
+use takt_wire::erob_can::parameter::Access;
 
-use crate::erob_can::entries;
-use crate::erob_can::frame::{ReceivedRequest, Reply, replying_node};
-use crate::erob_can::parameter::Access;
 use crate::family::commission::TargetDrive;
 use crate::family::erob::selection;
 use crate::family::erob_can::session::ErobCanSession;
@@ -71,8 +71,8 @@ impl Words {
 mod tests {
     use super::*;
     use crate::config::DriveFamily;
-    use crate::erob_can::error_code::ErrorCode;
-    use crate::erob_can::frame::Request;
+    use takt_wire::erob_can::error_code::ErrorCode;
+    use takt_wire::erob_can::frame::Request;
 
     #[test]
     fn a_reply_is_described_by_the_request_before_it() {

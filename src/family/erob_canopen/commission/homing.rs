@@ -1,8 +1,8 @@
 //! Homing of an eRob. The known firmware has no homing mode; firmware that declares one can use methods 35 and 37.
 
 use takt_rt::{Nanoseconds, OperationMode};
+use takt_wire::canopen::objects::*;
 
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::profile::homing::{self, PRESENT_POSITION};

@@ -1,12 +1,12 @@
 //! Object dictionary of an eRob with CANopen firmware, with units (vendor's EDS, CiA 402, field experience).
 
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
 use crate::family::commission::dictionary::{ObjectEntry, ObjectUnit};
 use crate::family::commission::profile::objects::*;
 use crate::family::commission::profile::words::statusword_words;
 use crate::family::commission::target::TargetDrive;
 use takt_rt::{Frame, Id};
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
 
 /// 22A2: °C.
 pub const TEMPERATURE: Object = Object::new(0x22A2, 0, DataType::U16, "temperature");

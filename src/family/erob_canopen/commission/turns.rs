@@ -1,12 +1,12 @@
 //! Clears the turn count of the multi-turn encoder.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::emcy::ErrorCode;
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
+use takt_wire::canopen::sdo::{AbortCode, SdoError};
 
 use super::objects::MULTI_TURN_RESET;
-use crate::canopen::emcy::ErrorCode;
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
-use crate::canopen::sdo::{AbortCode, SdoError};
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::profile::enabling::state;

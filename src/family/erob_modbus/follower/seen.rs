@@ -1,11 +1,11 @@
 //! What is read of a drive, and what it has said.
 
 use takt_rt::Nanoseconds;
+use takt_wire::modbus::frame::{RegisterRange, Values};
 
 use crate::family::erob::module::ReachedStatus;
 use crate::family::erob_modbus::register::Register;
 use crate::family::erob_modbus::registers;
-use crate::modbus::frame::{RegisterRange, Values};
 
 /// The registers of one read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

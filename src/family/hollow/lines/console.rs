@@ -3,15 +3,15 @@
 //! The manual prints the items of the menus and not their text, so whatever is set is read back from the menu: what that shows counts.
 
 use takt_rt::{FieldMode, Nanoseconds};
+use takt_wire::hollow_lines::console::{
+    BAUD_RATE, ConsoleCommand, ConsoleReader, PARAMETERS, Parameter, ParameterAccess, ZeroPoint,
+};
 
 use super::super::encoder_output::EncoderOutput;
 use super::client::{LineClient, LineSession};
 use super::menu::Menu;
 use super::unsupported;
 use crate::family::commission::{DriveTask, Failure, NamedEntry, Report, Task, ValueText};
-use crate::hollow_lines::console::{
-    BAUD_RATE, ConsoleCommand, ConsoleReader, PARAMETERS, Parameter, ParameterAccess, ZeroPoint,
-};
 use crate::procedure::Procedure;
 
 /// The console has come to its end when it has typed nothing for so long.

@@ -2,12 +2,12 @@
 
 use takt_rt::Nanoseconds;
 use takt_rt::transparent::{FrameReader, TransparentFrame};
+use takt_wire::hollow_lines::encoder::{EncoderReading, REQUEST};
 
 use super::client::{LineClient, LineSession};
 use super::unsupported;
 use crate::family::commission::polling;
 use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
-use crate::hollow_lines::encoder::{EncoderReading, REQUEST};
 use crate::procedure::{AxisReading, Procedure};
 
 /// How long the encoder has for its reply. The manual does not say.

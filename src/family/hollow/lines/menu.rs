@@ -1,6 +1,6 @@
 //! The menu of the parameters of a console, as a motor types it. The manual prints its items and not their text.
 
-use crate::hollow_lines::console::{PARAMETERS, Parameter};
+use takt_wire::hollow_lines::console::{PARAMETERS, Parameter};
 
 /// What the menu of the parameters shows.
 #[derive(Clone, Debug, Default, PartialEq)]

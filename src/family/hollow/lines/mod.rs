@@ -12,6 +12,7 @@ mod menu;
 mod pulse;
 
 use takt_rt::Frame;
+use takt_wire::hollow_lines::motor_data::COUNTS_PER_TURN;
 
 use crate::config::{
     Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, ErrorControl, FamilyKeys, ModeChangeRule,
@@ -19,7 +20,6 @@ use crate::config::{
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::commission::{DriveTask, Failure, TargetDrive, Task};
 use crate::family::{Family, NamedEntry, SettingUp};
-use crate::hollow_lines::motor_data::COUNTS_PER_TURN;
 use crate::sim::{Drive, SilentDrive};
 
 /// A device on a serial line.

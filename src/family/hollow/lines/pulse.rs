@@ -1,9 +1,10 @@
 //! The stiffness of the motor behind the pulse module.
 
+use takt_wire::hollow_lines::pulse_module::{FIRST_BYTE_OF_EXAMPLE, LoopGain, StiffnessSetting};
+
 use super::client::{LineClient, LineSession};
 use super::unsupported;
 use crate::family::commission::{DriveTask, Failure, GainFactors, Report, Task};
-use crate::hollow_lines::pulse_module::{FIRST_BYTE_OF_EXAMPLE, LoopGain, StiffnessSetting};
 use crate::procedure::Procedure;
 
 /// Between two settings: the module has no answer by which to pace them.

@@ -2,13 +2,13 @@
 //! of communication the drive resumes its motion as soon as the heartbeat returns.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::nmt::{ErrorControl, NmtState};
+use takt_wire::canopen::objects::*;
 
 use super::enabling::statusword;
 use super::objects::*;
 use super::words::{self, control};
 use super::{reading, storing};
-use crate::canopen::nmt::{ErrorControl, NmtState};
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;

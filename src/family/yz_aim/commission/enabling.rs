@@ -1,12 +1,12 @@
 //! Enabling and disabling a YZ-AIM, with the checks before motion.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::nmt::NmtCommand;
+use takt_wire::canopen::objects::*;
 
 use super::objects::{ACCELERATION, VELOCITY};
 use super::reading::{self, TENTHS};
 use super::words::{self, control};
-use crate::canopen::nmt::NmtCommand;
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::DriveProfile;

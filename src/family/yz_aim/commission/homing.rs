@@ -1,13 +1,13 @@
 //! Homing (manual 5.09). Setting the mode starts it; statusword bit 12 reports its end, bit 13 an error.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::objects::*;
 
 use super::enabling::{self, mode};
 use super::motion::with_torque;
 use super::objects::HOMING_METHOD;
 use super::reading;
 use super::words::{self, control};
-use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::DriveProfile;
 use crate::family::commission::report::Report;

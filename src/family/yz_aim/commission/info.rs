@@ -1,11 +1,12 @@
 //! Identity, condition and settings of a YZ-AIM.
 
+use takt_wire::canopen::object::Object;
+use takt_wire::canopen::objects::*;
+use takt_wire::canopen::sdo::SdoError;
+
 use super::objects::*;
 use super::reading::{self, alarm};
 use super::words;
-use crate::canopen::object::Object;
-use crate::canopen::objects::*;
-use crate::canopen::sdo::SdoError;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;

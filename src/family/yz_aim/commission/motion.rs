@@ -2,12 +2,12 @@
 //! standstill.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::objects::*;
 
 use super::enabling::{self, mode};
 use super::objects::ACCELERATION;
 use super::reading;
 use super::words::{self, control};
-use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::guarded::{add_final_position, guarded};
 use crate::family::commission::motion_profile::{DriveProfile, MotionProfile};

@@ -1,7 +1,8 @@
 //! Object dictionary of a YZ-AIM (manual 1.62, chapter VI).
 
-use crate::canopen::object::{DataType, Object};
-use crate::canopen::objects::*;
+use takt_wire::canopen::object::{DataType, Object};
+use takt_wire::canopen::objects::*;
+
 use crate::family::commission::dictionary::{ObjectEntry, ObjectUnit};
 
 use super::words;

@@ -1,10 +1,10 @@
 //! Reads position, velocity, current and alarms of a YZ-AIM.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::objects::*;
 
 use super::objects::{ALARM, CURRENT, TEMPERATURE, VELOCITY};
 use super::words;
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::polling;

@@ -2,11 +2,11 @@
 //! 5.13).
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::objects::*;
 
 use super::enabling::refuse_enabled;
 use super::objects::*;
 use super::reading;
-use crate::canopen::objects::*;
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;

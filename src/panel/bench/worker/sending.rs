@@ -6,13 +6,13 @@ use std::time::{Duration, Instant};
 
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Frame, Nanoseconds, ReceiveBatch};
+use takt_wire::bus_log::frame_text;
 
 use super::super::interruption::Interruption;
 use super::super::told::Torque;
 use super::place::{BenchBus, BenchLink};
 use super::watcher::keep;
 use super::{POLL, PageNumber, Worker};
-use crate::bus_log::frame_text;
 
 /// How long drives are listened to before a frame is sent, as `takt send` does.
 const TORQUE_NS: Nanoseconds = 300_000_000;

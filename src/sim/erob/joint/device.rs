@@ -1,9 +1,9 @@
 //! What the objects of the module mean, where it is not as in every CANopen device.
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::ErobJoint;
-use crate::canopen::object::ObjectAddress;
 use crate::sim::canopen_node::{CanopenDevice, CanopenNode, TakesField, ValueSource};
 use crate::sim::drive::DriveFault;
 use crate::sim::erob::objects::at;

@@ -1,9 +1,9 @@
 //! Access of the master to the object dictionary by SDO and RPDO.
 
 use takt_rt::{Nanoseconds, controlword};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::{YzAimJoint, mode};
-use crate::canopen::object::ObjectAddress;
 use crate::sim::object_dictionary::SimulatedDictionary;
 use crate::sim::pdo_engine::is_parameter;
 use crate::sim::sdo_reply::AbortCode;

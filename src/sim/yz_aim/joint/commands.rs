@@ -1,9 +1,9 @@
 //! The effects of the values that a master writes.
 
 use takt_rt::{Nanoseconds, controlword};
+use takt_wire::canopen::object::ObjectAddress;
 
 use super::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimJoint, mode};
-use crate::canopen::object::ObjectAddress;
 use crate::sim::drive::NodeState;
 use crate::sim::pdo_engine::is_parameter;
 use crate::sim::yz_aim::device::Level;

@@ -4,10 +4,10 @@ pub mod position;
 pub mod torque;
 
 use takt_rt::{Nanoseconds, OperationMode};
+use takt_wire::canopen::objects::*;
 
 use super::access::read_if_there;
 use super::{enabling, reading};
-use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::guarded::{add_final_position, guarded};
 use crate::family::commission::motion_profile::{DriveProfile, MotionProfile};

@@ -1,11 +1,11 @@
 //! Profile position mode. Each target (607A) uses the handshake of controlword bit 4 and statusword bit 12.
 
 use takt_rt::{Nanoseconds, OperationMode, controlword, statusword};
+use takt_wire::canopen::objects::*;
 
 use super::super::access::read_if_there;
 use super::super::objects::POSITION_WINDOW;
 use super::{POLL_NS, begin, with_torque};
-use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::{DriveProfile, MotionProfile};
 use crate::family::commission::polling;

@@ -1,9 +1,9 @@
 //! Profile torque mode. The velocity is monitored here, because the drive does not limit it in this mode.
 
 use takt_rt::{Nanoseconds, OperationMode};
+use takt_wire::canopen::objects::*;
 
 use super::{begin, check_velocity_is_shown, poll_until, with_torque};
-use crate::canopen::objects::*;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::motion_profile::DriveProfile;
 use crate::family::commission::profile::{enabling, reading};

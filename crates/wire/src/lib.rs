@@ -1,0 +1,36 @@
+//! Protocols of drives and buses without I/O: the caller passes time, frames and bytes in, and sends the frames and bytes that come out.
+//!
+//! - [`canopen`]: the services of CiA 301, the layer settings of CiA 305, and the device descriptions of CiA 306 (EDS, DCF).
+//! - [`erob_can`]: the CAN protocol of ZeroErr eRob drives.
+//! - [`modbus`]: Modbus-RTU.
+//! - [`hollow_lines`]: the serial lines of the hollow-shaft motors.
+//! - [`bus_log`]: logs of frames, in the formats of other programs.
+//! - [`frame_time`] and [`wire_length`]: the longest and the exact time of a frame on the wire.
+//!
+//! The rest is for messages about the files that people write: [`source_text`] shows a problem at its line, [`printable`] makes text safe
+//! for a terminal, and [`text_file`] reads a file. It is the only module that uses the operating system.
+//!
+//! The types of frames are those of [`takt_rt`]. To command an arm, depend on `takt` instead.
+//!
+//! # The order of modules
+//! Each module uses only what stands below it (`tests/repository/arrows.rs` proves it):
+//!
+//! ```text
+//! canopen                             CiA 301, 305 and 306
+//! erob_can modbus hollow_lines        the protocol of one maker; Modbus-RTU; serial lines
+//! bus_log                             logs of frames
+//! wire_length frame_time              times of frames
+//! source_text printable text_file     text of files and of messages
+//! ```
+#![deny(unsafe_code)]
+
+pub mod bus_log;
+pub mod canopen;
+pub mod erob_can;
+pub mod frame_time;
+pub mod hollow_lines;
+pub mod modbus;
+pub mod printable;
+pub mod source_text;
+pub mod text_file;
+pub mod wire_length;
