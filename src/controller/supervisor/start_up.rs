@@ -78,11 +78,14 @@ impl Supervisor {
                 self.enter(Stage::Run, now_ns);
             }
             None if !is_any(snapshot, |phase| phase != Phase::Disabled) => {
-                if self.faulted(snapshot).is_some() {
-                    self.request(Request::ResetFaults);
-                    self.enter(Stage::ResetFaults, now_ns);
-                } else {
-                    self.go_on_without_faults(now_ns);
+                match (self.faulted(snapshot), fault_stop(snapshot)) {
+                    // A reset of the drive would hide what has stopped the group.
+                    (Some(_), Some(stop)) => self.end(now_ns, Outcome::Stopped(stop)),
+                    (Some(_), None) => {
+                        self.request(Request::ResetFaults);
+                        self.enter(Stage::ResetFaults, now_ns);
+                    }
+                    (None, _) => self.go_on_without_faults(now_ns),
                 }
             }
             Some(axis) if elapsed_ns > self.stage_timeout_ns => self.end(now_ns, Outcome::NotHeard { axis }),
