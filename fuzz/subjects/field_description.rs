@@ -3,10 +3,11 @@
 use std::sync::OnceLock;
 
 use takt::config::{Axis, Config};
-use takt::internals::bit_fields::{FieldDevice, Setting, Settings, parse};
+use takt::internals::bit_fields::{compile, parse};
 use takt_rt::{
     FieldDrive, FieldDriveParameters, FieldMode, FieldTargets, Frame, FrameFormat, LifeWish, ReplyValue,
 };
+use takt_wire::bit_fields::{FieldDevice, Setting, Settings};
 
 use super::configuration::assert_explained;
 use super::input::Input;
@@ -36,7 +37,7 @@ pub fn run(bytes: &[u8]) {
     settings.set(Setting::PositionGain, NUMBER);
     settings.set(Setting::PositionDamping, NUMBER);
     let device = FieldDevice { description, settings };
-    if let Ok(by) = device.compile(axis()) {
+    if let Ok(by) = compile(&device, axis()) {
         lead(&by, Input::new(bytes));
     }
 }

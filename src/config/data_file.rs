@@ -1,8 +1,9 @@
-//! What quirk files and descriptions of bit fields have in common: how they are read, which drive they are about and how well it is known,
-//! and the errors of the drive in words.
+//! What quirk files and descriptions of bit fields have in common: how they are read, the drive that they are about, and its errors in
+//! words.
 
 use std::path::Path;
 
+use takt_wire::described_drive::{Confirmation, DescribedDrive};
 use takt_wire::printable::printable_path;
 
 use super::ConfigError;
@@ -10,44 +11,10 @@ use super::read::entry::Entry;
 use super::read::section::Section;
 use super::spot::Problems;
 
-/// Whether anybody has tried what a file says of a drive.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Confirmation {
-    /// It comes from documents alone.
-    #[default]
-    DataSheetOnly,
-    /// A real drive has shown it.
-    TriedOnHardware,
-}
-
-impl Confirmation {
-    /// For people.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::DataSheetOnly => "from its data sheet, not tried on hardware",
-            Self::TriedOnHardware => "tried on hardware",
-        }
-    }
-}
-
 const CONFIRMATIONS: [(&str, Confirmation); 2] = [
     (Confirmation::DataSheetOnly.name(), Confirmation::DataSheetOnly),
     (Confirmation::TriedOnHardware.name(), Confirmation::TriedOnHardware),
 ];
-
-/// The drive that a file is about.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct DescribedDrive {
-    /// The vendor, for people.
-    pub vendor: String,
-    /// The product, for people.
-    pub product: String,
-    /// Whether it was tried.
-    pub confirmation: Confirmation,
-    /// The documents that it was taken from.
-    pub sources: Vec<String>,
-}
 
 /// Reads a file by what parses its text.
 ///

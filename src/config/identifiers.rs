@@ -1,8 +1,8 @@
 //! The identifiers of the frames between a drive and the controller.
 
 use takt_rt::Id;
+use takt_wire::bit_fields::FieldDevice;
 
-use super::bit_fields::FieldDevice;
 use super::drive_family::DriveFamily;
 
 /// What an identifier is for.

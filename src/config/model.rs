@@ -12,8 +12,8 @@ pub use takt_rt::AxisLimits as Limits;
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
 pub use takt_rt::ControlLaw as Control;
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
-
 use takt_wire::canopen::dcf::DeviceConfiguration;
+pub use takt_wire::quirks::PowerUpState;
 
 use super::drive_family::DriveFamily;
 use super::position_unit::PositionUnit;
@@ -507,17 +507,6 @@ pub struct Joint {
     /// The rated torque of the drive at the joint: N·m (N). What the drive reports (object 6076) goes before it. Default: the
     /// torque limit.
     pub rated_torque: Option<f64>,
-}
-
-/// The NMT state of a simulated drive after power-up. Not every manual says which one real units have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum PowerUpState {
-    /// Pre-operational, as CiA 301 has it.
-    #[default]
-    PreOperational,
-    /// Operational, as published programs for some drives seem to expect.
-    Operational,
 }
 
 /// How the Coulomb friction of a simulated joint depends on its speed.

@@ -11,9 +11,9 @@ use takt_rt::{
     MAX_GROUPS, MappedObject, Mapping, MappingError, ModeChanges, NANOSECONDS_PER_SECOND, Pdo, Pdos,
     ScaleError, SetUpError, SlotPlan, Supervision, TimingLadder, TorqueLimits,
 };
+use takt_wire::bit_fields::{FieldDevice, ReplyMoment};
 
 use crate::channels::{ChannelSizes, GroupAxes, GroupStream};
-use crate::config::bit_fields::{FieldDevice, ReplyMoment};
 use crate::config::{self, Axis, Compliance, Config, ConfigError, Interface};
 use crate::family;
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};

@@ -1,6 +1,7 @@
 //! What is to be known about a bus behind an SLCAN adapter or a converter on a serial line, and about the adapter of a serial line.
 
-use crate::config::bit_fields::FieldDevice;
+use takt_wire::bit_fields::FieldDevice;
+
 use crate::config::{Config, Interface};
 use crate::family::WarningKind;
 use crate::family::bring_up::ProcessData;

@@ -1,10 +1,10 @@
 //! Drives that are spoken to by frames of bit fields, in words. Descriptions say which fields there are.
 
 use takt_rt::{CommandValue, FieldDriveParameters, Frame, FrameKind, OwnFrame, ReplyValue, ReplyValues};
+use takt_wire::bit_fields::{DescribedLifeCycle, FieldDevice};
 use takt_wire::printable::printable;
 
 use super::decoded::{DecodedValue, Service};
-use crate::config::bit_fields::{DescribedLifeCycle, FieldDevice};
 use crate::config::{Axis, Quantity, Travel};
 use crate::family;
 

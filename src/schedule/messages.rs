@@ -4,11 +4,11 @@ use std::collections::HashSet;
 
 use serde::Serialize;
 use takt_rt::{FrameFormat, FrameKind, Id, TIME_ID, TransmissionType, transparent};
+use takt_wire::bit_fields::{DescribedLifeCycle, FieldDevice, ReplyMoment};
 use takt_wire::canopen::function_code;
 use takt_wire::frame_time::FrameShape;
 
 use crate::config::Interface;
-use crate::config::bit_fields::{DescribedLifeCycle, FieldDevice, ReplyMoment};
 use crate::config::{Axis, Config, Master, Protocol, Supervision};
 use crate::family::bring_up::{PdoPlan, ProcessData, Reply};
 

@@ -5,8 +5,7 @@ mod access;
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 use takt_wire::canopen::object::ObjectAddress;
-
-use crate::config::PowerUpState;
+use takt_wire::quirks::PowerUpState;
 
 use super::drive::NodeState;
 use super::errors::{DeviceError, Errors};

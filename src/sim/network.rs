@@ -2,8 +2,8 @@
 //! 7.2.8, 7.3.2), each as far as its dictionary has the object.
 
 use takt_rt::{Id, Nanoseconds};
+use takt_wire::quirks::PowerUpState;
 
-use crate::config::PowerUpState;
 use crate::sim::drive::NodeState;
 use crate::sim::object_dictionary::SimulatedDictionary;
 

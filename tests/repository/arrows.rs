@@ -45,7 +45,9 @@ const TAKT: [&str; 29] = [
     "monotonic_clock",
 ];
 
-const WIRE: [&str; 10] = [
+const WIRE: [&str; 13] = [
+    "quirks",
+    "bit_fields",
     "canopen",
     "erob_can",
     "modbus",
@@ -53,6 +55,7 @@ const WIRE: [&str; 10] = [
     "bus_log",
     "wire_length",
     "frame_time",
+    "described_drive",
     "source_text",
     "printable",
     "text_file",

@@ -6,14 +6,15 @@ use takt_rt::{
     BitRange, ByteOrder, CodeRange, CommandValue, FieldBits, FieldMode, FieldValue, FrameFormat, ModeCodes,
     Number, PositionReference, ReplyValue, StateCodes,
 };
-use toml::de::DeTable;
-
-use super::read_scan;
-use super::{
+use takt_wire::bit_fields::{
     Amount, BesideTargetKind, DescribedFrames, DescribedHeartbeat, DescribedLifeCycle, DescribedScale,
     Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, IdExpression,
     PayloadByte, ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
 };
+use toml::de::DeTable;
+
+use super::compile::{check_command, check_reply};
+use super::read_scan;
 use crate::config::ConfigError;
 use crate::config::bounds::Bounds;
 use crate::config::data_file::{self, each, each_of_some, optional};
@@ -190,7 +191,7 @@ fn check_frames(description: &Description, [command, reply]: [&Spot<'_>; 2]) {
             }
         }
     }
-    for (spot, result) in [(command, device.check_command()), (reply, device.check_reply())] {
+    for (spot, result) in [(command, check_command(&device)), (reply, check_reply(&device))] {
         if let Err(error) = result {
             spot.report_range(format!("a frame in which {error}"), "fields that fit it".to_owned());
         }

@@ -1,12 +1,12 @@
 //! Reads the section `[scan]` of a description.
 
 use takt_rt::Id;
-
-use super::read::{expression, two};
-use super::{
+use takt_wire::bit_fields::{
     DescribedHeartbeat, DescribedScan, HeartbeatScan, RegisterByte, RegisterFrame, RegisterProtocol,
     RegisterScan, Setting,
 };
+
+use super::read::{expression, two};
 use crate::config::data_file::each;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;

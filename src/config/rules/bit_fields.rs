@@ -1,8 +1,9 @@
 //! Axes whose drives are spoken to by bit fields.
 
 use takt_rt::{CommandValue, FrameFormat};
+use takt_wire::bit_fields::{FieldDevice, Setting};
 
-use crate::config::bit_fields::{FieldDevice, Setting};
+use crate::config::bit_fields;
 use crate::config::model::{Axis, Bus, Control, Interface};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
@@ -47,7 +48,7 @@ pub fn axis<'a>(axis: &Axis, bus: Option<&Bus>, at: impl Fn(&str) -> Spot<'a>) {
 
 /// Every position of the joint has a code.
 fn position_range<'a>(device: &FieldDevice, axis: &Axis, at: &impl Fn(&str) -> Spot<'a>) {
-    let Some((lowest, highest)) = device.position_range(axis) else { return };
+    let Some((lowest, highest)) = bit_fields::position_range(device, axis) else { return };
     let limits = &axis.limits;
     if limits.position_min < lowest || limits.position_max > highest {
         let q = Quantities::of(axis.travel);
@@ -76,7 +77,7 @@ fn gains<'a>(device: &FieldDevice, axis: &Axis, at: &impl Fn(&str) -> Spot<'a>) 
         ),
     ];
     for (setting, value, is_needed) in needed {
-        let Some(most) = device.most(value, axis) else { continue };
+        let Some(most) = bit_fields::most(device, value, axis) else { continue };
         let spot = at(setting.key());
         match device.settings.get(setting) {
             None if is_needed => {

@@ -1,8 +1,8 @@
 //! Axes on a bus behind a transparent converter between RS-485 and CAN FD: what it carries, and how much of it.
 
 use takt_rt::{FrameFormat, Id, transparent};
+use takt_wire::bit_fields::{DescribedLifeCycle, FieldDevice};
 
-use crate::config::bit_fields::{DescribedLifeCycle, FieldDevice};
 use crate::config::model::{Axis, Config, Interface};
 use crate::config::spot::Spot;
 

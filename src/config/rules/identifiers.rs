@@ -5,9 +5,9 @@
 use std::ops::Range;
 
 use takt_rt::Id;
+use takt_wire::bit_fields::FieldDevice;
 use takt_wire::canopen::function_code;
 
-use crate::config::bit_fields::FieldDevice;
 use crate::config::identifiers::IdUse;
 use crate::config::model::Axis;
 use crate::config::problem_kind::ProblemKind;

@@ -3,10 +3,10 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{Nanoseconds, OperationMode};
+use takt_wire::bit_fields::FieldDevice;
 use takt_wire::canopen::object::{DataType, ObjectAddress};
 
 use crate::config::Axis;
-use crate::config::bit_fields::FieldDevice;
 use crate::family::DataSheet;
 use crate::sim::bit_fields::FieldSimulationParameters;
 use crate::sim::plant::JointParameters;

@@ -15,17 +15,15 @@ use takt_rt::{
     CommandValue, FieldDriveParameters, FieldMode, Frame, FrameFormat, Id, ModeCondition, Nanoseconds,
     OperationMode,
 };
+use takt_wire::bit_fields::{BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings};
 
 use super::bring_up::{AxisSession, ProcessData};
 use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
 use super::{ChinesePhrase, DataSheet, Family, LookingAtSlave, SettingUp, SignOfLife, Unwatched, Watchdog};
-use crate::config::bit_fields::{
-    self, BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings,
-};
 use crate::config::{
     Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, ErrorControl, FamilyKeys,
-    ModeChangeRule, ModeSet, Protocol, Quantity,
+    ModeChangeRule, ModeSet, Protocol, Quantity, bit_fields,
 };
 use crate::procedure::ModbusSession;
 use crate::sim::Drive;
@@ -306,7 +304,7 @@ impl Family for BitFieldFamily {
     }
 
     fn field_drive(&self, axis: &Axis) -> Option<FieldDriveParameters> {
-        device(axis).compile(axis).ok()
+        bit_fields::compile(device(axis), axis).ok()
     }
 
     fn stops_by_itself_after(&self, axis: &Axis, _: &Config) -> Result<Watchdog, Unwatched> {

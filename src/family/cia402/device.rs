@@ -10,8 +10,8 @@ use takt_wire::canopen::objects::{
     POSITION_ACTUAL_VALUE, PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection,
     PdoParameters, STATUSWORD,
 };
+use takt_wire::quirks::{MotionUnit, Quirks};
 
-use crate::config::quirks::{MotionUnit, Quirks};
 use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, VelocityUnit};
 use crate::family::DataSheet;
 use crate::family::bring_up::first_pdo;

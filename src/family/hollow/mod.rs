@@ -18,8 +18,9 @@ mod pwm_task;
 mod registers_task;
 mod scan;
 
+use takt_wire::bit_fields::Description;
+
 use crate::config::FamilyKeys;
-use crate::config::bit_fields::Description;
 use crate::family::bit_fields::{BitFieldFamily, FoundBy, shipped};
 
 pub use lines::{CONSOLE, ENCODER, PULSE};

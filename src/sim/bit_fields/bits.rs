@@ -1,8 +1,7 @@
 //! Fields of frames, bit by bit: slow, plain, and independent of the codec of the cycle.
 
 use takt_rt::{BitRange, ByteOrder, Number};
-
-use crate::config::bit_fields::FieldDescription;
+use takt_wire::bit_fields::FieldDescription;
 
 /// The place of a bit: byte, and bit of the byte counted from its lowest one.
 fn place(bit: usize, order: ByteOrder) -> (usize, usize) {
@@ -67,7 +66,7 @@ mod tests {
         BitField, CommandValue, CommandValues, FieldBits, FieldFrame, FrameFormat, Id, LinearScale,
     };
 
-    use crate::config::bit_fields::{Amount, DescribedScale, FieldUnit};
+    use takt_wire::bit_fields::{Amount, DescribedScale, FieldUnit};
 
     proptest! {
         /// Two codecs that have nothing in common agree.

@@ -22,12 +22,12 @@ use super::mailbox::Mailbox;
 use super::motion::{Actual, Generator};
 use super::plant::{Gravity, Joint, JointParameters};
 use super::servo::{LoopFactors, Servo};
-use crate::config::bit_fields::{
-    BesideTargetKind, DescribedLifeCycle, DescribedScan, FieldDevice, ReplyMoment, Setting, SetupFrame,
-};
 use current_loop::CurrentLoop;
 use registers::RegisterServer;
 pub use shaft::{Command, Reply};
+use takt_wire::bit_fields::{
+    BesideTargetKind, DescribedLifeCycle, DescribedScan, FieldDevice, ReplyMoment, Setting, SetupFrame,
+};
 
 /// The period of the drive's loops.
 const STEP_NS: Nanoseconds = 125_000;

@@ -1,8 +1,7 @@
 //! The registers of a simulated drive, which a scan reads.
 
 use takt_rt::{Frame, FrameKind, Nanoseconds};
-
-use crate::config::bit_fields::{
+use takt_wire::bit_fields::{
     DescribedScan, FieldDevice, RegisterByte, RegisterFrame, RegisterProtocol, RegisterScan,
 };
 

@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{CommandValue, Frame, FrameFormat, Id, ReplyValue};
-
-use super::bits;
-use crate::config::bit_fields::{
+use takt_wire::bit_fields::{
     DescribedScale, FieldDescription, FieldDevice, FieldUnit, FrameDescription, Setting,
 };
+
+use super::bits;
 
 /// A command as the drive takes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,8 +1,8 @@
 //! One axis of the drive: its objects, its state machine, its set-points, its loops and its joint.
 
 use takt_rt::{DriveState, NANOSECONDS_PER_SECOND, Nanoseconds, OperationMode};
+use takt_wire::quirks::Quirks;
 
-use crate::config::quirks::Quirks;
 use crate::sim::defect::Disobedience;
 use crate::sim::errors::DeviceError;
 use crate::sim::feedback_defects::JointDefects;

@@ -2,11 +2,11 @@
 
 use takt_rt::{Frame, Nanoseconds};
 use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::quirks::Quirks;
 
 use super::axis::{Axis, AxisEvent};
 use super::places::{AXIS_OFFSET, is_measured};
 use super::{Cia402Parameters, NotADrive, dictionary_of};
-use crate::config::quirks::Quirks;
 use crate::sim::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, TakesField, ValueSource};
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};

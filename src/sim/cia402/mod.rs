@@ -36,8 +36,7 @@ mod units;
 use takt_rt::Nanoseconds;
 use takt_wire::canopen::eds;
 use takt_wire::canopen::object::ObjectAddress;
-
-use crate::config::quirks::Quirks;
+use takt_wire::quirks::Quirks;
 
 use super::homing_switches::ReferenceSwitches;
 use super::object_dictionary::SimulatedDictionary;

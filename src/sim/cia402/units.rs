@@ -1,7 +1,8 @@
 //! The units of the drive's objects, by objects 608F, 6091, 6092, 6096 and 60A9 as far as the data sheet has them, and by
 //! its quirks.
 
-use crate::config::quirks::{MotionUnit, Quirks};
+use takt_wire::quirks::{MotionUnit, Quirks};
+
 use crate::sim::object_dictionary::SimulatedDictionary;
 
 use super::places::Places;

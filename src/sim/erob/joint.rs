@@ -4,12 +4,12 @@ mod device;
 mod loops;
 
 use takt_rt::{DriveState, Frame, Nanoseconds, OperationMode, statusword};
+use takt_wire::quirks::PowerUpState;
 
 use super::ErobParameters;
 use super::device::{Change, ErobDevice};
 use super::motion::ErobMotion;
 use super::objects::{OBJECTS, at, is_measured};
-use crate::config::PowerUpState;
 use crate::sim::canopen_node::{CanopenDevice, CanopenNode, NodeDelays};
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};

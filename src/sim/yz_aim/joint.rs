@@ -18,7 +18,6 @@ use super::motion::YzAimMotion;
 use super::objects::{OBJECTS, at};
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
 use super::process_data::{PDO_FEATURES, Transmission, report_state_first};
-use crate::config::PowerUpState;
 use crate::sim::defect::{Defect, Unsupported};
 use crate::sim::drive::{Drive, DriveFault, Observation};
 use crate::sim::feedback_defects::{FeedbackDefects, JointDefects};
@@ -33,6 +32,7 @@ use crate::sim::random::Random;
 use crate::sim::sdo_server::{SdoFeatures, SdoServer};
 use crate::sim::servo::Servo;
 use load_monitor::LoadMonitor;
+use takt_wire::quirks::PowerUpState;
 
 /// Longest time between two advances.
 const IDLE_NS: Nanoseconds = 1_000_000;

@@ -2,7 +2,7 @@
 
 use takt::Config;
 use takt::config::Axis;
-use takt::internals::bit_fields::FieldDevice;
+use takt_wire::bit_fields::FieldDevice;
 
 /// The keys of a hollow-shaft motor with the scales of the manual's examples.
 pub const HOLLOW: &str = r#"drive = "hollow-can"

@@ -2,7 +2,8 @@
 
 use proptest::prelude::*;
 use takt::Config;
-use takt::internals::bit_fields::{self, FieldDevice, Setting, Settings};
+use takt::internals::bit_fields;
+use takt_wire::bit_fields::{FieldDevice, Setting, Settings};
 
 use crate::bit_fields::machine::{HOLLOW, HOLLOW_FD, MIT, problems, text};
 
@@ -208,7 +209,8 @@ proptest! {
             Setting::ALL.into_iter().for_each(|(_, setting)| settings.set(setting, 2.0));
             settings.master_id = Some(0x65);
             let device = FieldDevice { description, settings };
-            prop_assert!(device.check_command().is_ok() && device.check_reply().is_ok());
+            prop_assert!(bit_fields::check_command(&device).is_ok());
+            prop_assert!(bit_fields::check_reply(&device).is_ok());
             for motor in device.description.motor_ids.clone() {
                 device.request_ids(motor);
                 device.setup(motor);

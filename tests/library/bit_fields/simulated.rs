@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use takt::config::{Axis, FrictionShape};
-use takt::internals::bit_fields::FieldDevice;
 use takt::internals::sim::bit_fields::{FieldSimulation, FieldSimulationParameters};
 use takt::sim::plant::JointParameters;
 use takt::sim::{Defect, DriveFault, Observation, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, DriveState, Frame, Id, ReceiveBatch, Received};
+use takt_wire::bit_fields::FieldDevice;
 
 use crate::bit_fields::machine::{HOLLOW, HOLLOW_FD, axis};
 

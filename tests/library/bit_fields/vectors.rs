@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 
 use takt::config::Axis;
+use takt::internals::bit_fields;
 use takt::internals::sim::bit_fields::{Command, Reply};
 use takt_rt::{
     CommandValue, CommandValues, FieldDriveParameters, Frame, FrameFormat, Id, LifeCycle, OwnFrame,
@@ -58,7 +59,7 @@ impl Row {
 
 fn motor(keys: &str, more: &str) -> (Axis, FieldDriveParameters) {
     let axis = axis(&format!("{keys}master_id = {MASTER_ID}\n{more}"));
-    let compiled = device(&axis).compile(&axis).unwrap();
+    let compiled = bit_fields::compile(device(&axis), &axis).unwrap();
     (axis, compiled)
 }
 
@@ -284,7 +285,7 @@ fn gear_direction_and_zero_are_in_the_scales_of_every_field() {
     let keys =
         format!("{HOLLOW_FD}master_id = 0x64\nreversed = true\ngear_ratio = 3\nzero_counts = 262144\n");
     let axis = axis(&keys);
-    let compiled = device(&axis).compile(&axis).unwrap();
+    let compiled = bit_fields::compile(device(&axis), &axis).unwrap();
     let mut values = CommandValues::default();
     values.set(CommandValue::Position, 0.5);
     values.set(CommandValue::Velocity, -1.0);

@@ -20,11 +20,11 @@ use takt_rt::{
 };
 
 use super::SETUP_PAUSE_NS;
-use crate::config::bit_fields::{FieldDevice, ReplyMoment};
-use crate::config::{Axis, Control};
+use crate::config::{Axis, Control, bit_fields};
 use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
 use crate::procedure::Procedure;
 use client::{FieldClient, FieldSession};
+use takt_wire::bit_fields::{FieldDevice, ReplyMoment};
 
 /// From one command to the next on a CAN bus. The bus carries ten times as many, and an ordinary thread keeps to it.
 pub const CAN_PERIOD_NS: Nanoseconds = 5_000_000;
@@ -58,7 +58,8 @@ pub fn begin(target: TargetDrive, task: Task, period_ns: Nanoseconds) -> Result<
     // A drive that is addressed by another ID than the configuration says.
     let axis = Axis { node: target.node, ..axis };
     let device: FieldDevice = axis.drive.description().cloned().ok_or_else(unnamed)?;
-    let parameters = device.compile(&axis).map_err(|error| Failure::Unsuitable(error.to_string()))?;
+    let parameters =
+        bit_fields::compile(&device, &axis).map_err(|error| Failure::Unsuitable(error.to_string()))?;
     refuse(&target, &device, &task)?;
     let session = FieldSession::new(FieldClient::new(parameters, period_ns));
     let words = words(&device, target.node);
@@ -73,8 +74,8 @@ fn words(device: &FieldDevice, motor: u8) -> impl FnMut(&Frame) -> String + 'sta
     let (command, reply) = (device.id(&device.description.command.id, motor), device.reply_id(motor));
     let setup: Vec<_> = device.setup_ids(motor);
     let own: Vec<_> = match &device.description.life_cycle {
-        crate::config::bit_fields::DescribedLifeCycle::ByFields(_) => vec![],
-        crate::config::bit_fields::DescribedLifeCycle::ByFrames(frames) => {
+        takt_wire::bit_fields::DescribedLifeCycle::ByFields(_) => vec![],
+        takt_wire::bit_fields::DescribedLifeCycle::ByFrames(frames) => {
             frames.all().map(|(name, frame)| (name, device.fixed(frame, motor))).collect()
         }
     };
@@ -256,7 +257,7 @@ impl FieldTask {
 
     /// A joint that is no faster than this stands: rad/s (m/s). The last code of a velocity goes to and fro at rest.
     fn standing(&self) -> f64 {
-        let step = self.device.step(takt_rt::ReplyValue::Velocity, &self.axis).unwrap_or(0.0);
+        let step = bit_fields::step(&self.device, takt_rt::ReplyValue::Velocity, &self.axis).unwrap_or(0.0);
         STANDING.max(1.5 * step)
     }
 

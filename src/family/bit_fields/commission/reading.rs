@@ -1,9 +1,9 @@
 //! What the drive says of itself.
 
 use takt_rt::{FieldMode, LifeState, Nanoseconds, ReplyValue};
+use takt_wire::bit_fields::ReplyMoment;
 
 use super::FieldTask;
-use crate::config::bit_fields::ReplyMoment;
 use crate::family::commission::polling;
 use crate::family::commission::{Failure, Report};
 use crate::procedure::AxisReading;

@@ -3,10 +3,10 @@
 use takt_rt::{
     CommandValue as CommandField, CommandValues, FieldMode, Frame, LifeCycle, LifeState, LifeWish, Setting,
 };
+use takt_wire::bit_fields::{DescribedLifeCycle, FieldDevice, Setting as DriveSetting};
 
 use super::reading::{self, mode_word};
 use super::{FieldTask, PERIODS_FOR_A_STEP};
-use crate::config::bit_fields::{DescribedLifeCycle, FieldDevice, Setting as DriveSetting};
 use crate::family::commission::{Failure, GainFactors, Report, Task};
 
 /// Refuses what this drive lacks.

@@ -3,9 +3,9 @@
 use std::ops::RangeInclusive;
 
 use takt_rt::{Frame, FrameKind, Id};
+use takt_wire::bit_fields::{HeartbeatScan, IdExpression};
 
 use super::Make;
-use crate::config::bit_fields::{HeartbeatScan, IdExpression};
 use crate::family::scan::{Answered, FoundDevice, Likeness, OwnProtocol, Reading, ScanSession};
 
 /// Drives with the same heartbeats.

@@ -13,11 +13,11 @@ use std::sync::LazyLock;
 use takt_rt::{CommandValue, FieldMode};
 
 use super::{FROM_FILE, SHIPPED, shipped};
-use crate::config::bit_fields::{DescribedScan, Description, FieldDevice, Settings};
 use crate::family::scan::{FoundDevice, OwnProtocol, StartingKeys};
 pub use chinese::PHRASES as CHINESE_PHRASES;
 use heartbeat::HeartbeatDrives;
 use registers::RegisterDrives;
+use takt_wire::bit_fields::{DescribedScan, Description, FieldDevice, Settings};
 
 /// A description that comes with takt.
 #[derive(Debug)]

@@ -3,11 +3,11 @@
 use std::ops::RangeInclusive;
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
-
-use super::Make;
-use crate::config::bit_fields::{
+use takt_wire::bit_fields::{
     FieldDevice, RegisterByte, RegisterFrame, RegisterProtocol, RegisterScan, Setting,
 };
+
+use super::Make;
 use crate::family::scan::{Answered, FoundDevice, OwnProtocol, Reading, ScanSession};
 
 /// So long a drive may take for a reply.

@@ -1,10 +1,10 @@
 //! Receives and sends frames.
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
+use takt_wire::quirks::PowerUpState;
 
 use super::YzAimJoint;
 use super::access::{Objects, write_field};
-use crate::config::PowerUpState;
 use crate::sim::drive::NodeState;
 use crate::sim::loops::ControlLoops;
 use crate::sim::mailbox::Mailbox;

@@ -1,15 +1,10 @@
 //! Quirks of a drive: in what it deviates from its electronic data sheet and from CiA 402. They are data, in a small file
 //! beside the data sheet (`drives/*.toml`).
 
-mod read;
-
 use takt_rt::{Nanoseconds, OperationMode};
-use takt_wire::canopen::object::ObjectAddress;
 
-use super::PowerUpState;
-
-pub use super::data_file::Confirmation;
-pub use read::{load, parse};
+use crate::canopen::object::ObjectAddress;
+use crate::described_drive::Confirmation;
 
 /// The drive that a quirk file is about.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -50,12 +45,21 @@ impl ObjectPattern {
 
 /// What one unit of a velocity or acceleration object is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum MotionUnit {
     /// Position units per second (per second²), times this factor.
     PositionUnits(f64),
     /// Revolutions of the motor per minute (per minute and second), times this factor.
     RevolutionsPerMinute(f64),
+}
+
+/// The NMT state of a simulated drive after power-up. Not every manual says which one real units have.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PowerUpState {
+    /// Pre-operational, as CiA 301 has it.
+    #[default]
+    PreOperational,
+    /// Operational, as published programs for some drives seem to expect.
+    Operational,
 }
 
 /// How long the drive takes.
@@ -105,12 +109,12 @@ pub struct Quirks {
 
 impl Quirks {
     /// Whether the drive lacks an object that its data sheet may list.
-    pub(crate) fn is_missing(&self, address: ObjectAddress) -> bool {
+    pub fn is_missing(&self, address: ObjectAddress) -> bool {
         self.missing.iter().any(|pattern| pattern.matches(address))
     }
 
     /// Whether the drive refuses to write an object that its data sheet may call writable.
-    pub(crate) fn is_constant(&self, address: ObjectAddress) -> bool {
+    pub fn is_constant(&self, address: ObjectAddress) -> bool {
         self.constant.iter().any(|pattern| pattern.matches(address))
     }
 

@@ -6,16 +6,19 @@ use std::path::Path;
 use takt_rt::{Nanoseconds, OperationMode};
 use takt_wire::canopen::object::ObjectAddress;
 use takt_wire::canopen::objects::PROFILE_ACCELERATION;
+use takt_wire::described_drive::DescribedDrive;
 use toml::de::DeTable;
 
-use super::{Delays, MotionUnit, ObjectPattern, Quirks, QuirkyDrive};
 use crate::config::ConfigError;
-use crate::config::data_file::{self, DescribedDrive, each, each_of_some, optional};
+use crate::config::MODES;
+use crate::config::data_file::{self, each, each_of_some, optional};
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::spot::Problems;
-use crate::config::{MODES, PowerUpState};
+
+pub use takt_wire::described_drive::Confirmation;
+pub use takt_wire::quirks::{Delays, MotionUnit, ObjectPattern, PowerUpState, Quirks, QuirkyDrive};
 
 /// The longest delay; a longer one is a mistake in the unit.
 const LONGEST_S: f64 = 600.0;

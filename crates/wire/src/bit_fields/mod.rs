@@ -1,12 +1,9 @@
 //! Drives that are spoken to by frames of fixed bit fields, without an object dictionary: what a description file says of a make of
 //! drive ([`Description`]), and what the configuration of an axis says of one drive ([`Settings`]).
 //!
-//! A description is data alone. The cycle gets it compiled ([`FieldDevice::compile`]); the simulated drive reads the same data by itself.
+//! A description is data alone. The cycle gets it compiled; the simulated drive reads the same data by itself.
 
-mod compile;
 mod expression;
-mod read;
-mod read_scan;
 mod scan;
 mod settings;
 
@@ -17,12 +14,11 @@ use takt_rt::{
     Number, OwnFrame, PositionReference, ReplyValue, StateCodes,
 };
 
+use crate::described_drive::DescribedDrive;
+
 pub use expression::{IdExpression, PayloadByte};
-pub use read::{load, parse};
 pub use scan::{DescribedScan, HeartbeatScan, RegisterByte, RegisterFrame, RegisterProtocol, RegisterScan};
 pub use settings::{Setting, Settings};
-
-pub use super::data_file::DescribedDrive;
 
 /// One drive: its description, and what the configuration says of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -180,7 +176,7 @@ pub enum FieldUnit {
 
 impl FieldUnit {
     /// The word for it in a description.
-    const WORDS: [(&'static str, Self); 11] = [
+    pub const WORDS: [(&'static str, Self); 11] = [
         ("turn", Self::Turns),
         ("rad", Self::Radians),
         ("rad/s", Self::RadiansPerSecond),
