@@ -13,6 +13,7 @@
 //! grows with their root. So if the two-step motion that meets the velocity misses the position, the next one that meets
 //! the position is taken, as far as the drift of the velocities explains the difference.
 
+use super::super::choice::{larger, smaller};
 use super::ROUNDING;
 use super::motion::{Motion, SevenPhases, VelocityStep, square_positive};
 
@@ -20,6 +21,8 @@ use super::motion::{Motion, SevenPhases, VelocityStep, square_positive};
 struct Drift {
     distance: f64,
     velocity: f64,
+    /// The most by which the drift of the velocities changes the times of both steps.
+    times: f64,
 }
 
 impl Drift {
@@ -27,10 +30,14 @@ impl Drift {
     fn of(motion: &Motion, rounding: f64) -> Self {
         let Motion { a0, af, vmax, vmin, up, down, .. } = *motion;
         let speed = vmax.max(-vmin);
-        let braking_distance = speed * VelocityStep::over(speed, up.min(down)).duration();
+        let limit = smaller(up, down);
+        let braking_distance = speed * VelocityStep::over(speed, limit).duration();
+        let velocity = ROUNDING * (vmax - vmin + a0 * a0 + af * af);
         Self {
             distance: rounding + ROUNDING * braking_distance,
-            velocity: ROUNDING * (vmax - vmin + a0 * a0 + af * af),
+            velocity,
+            // The times grow with the velocity step ever more slowly, so they grow most from zero on.
+            times: VelocityStep::over(2.0 * velocity, limit).duration(),
         }
     }
 }
@@ -49,35 +56,58 @@ pub(super) struct TwoStep {
 ///
 /// Each step is a phase of full jerk. Count its time from where its acceleration is zero, or would be zero if the step were
 /// longer. The sum of both times is proportional to the distance.
-struct TwoSteps<'a> {
-    motion: &'a Motion,
+struct TwoSteps {
     mirrored: bool,
     /// 1 or −1.
     sign: f64,
+    /// The velocities between which both steps lead, counted where the acceleration is zero.
+    first: f64,
+    last: f64,
+    /// The smallest and the largest velocity step to which the real one may have drifted.
+    low: f64,
+    high: f64,
 }
 
-impl TwoSteps<'_> {
-    /// The two-step motion that is nearest to the wanted distance, its error of the distance, and its duration.
-    fn nearest(&self, drift: &Drift) -> Option<(TwoStep, f64, f64)> {
-        let Motion { a0, vf, af, up, distance, .. } = *self.motion;
-        let (first, last) = (self.motion.start_root(), vf + 0.5 * af * af);
-        let outer = a0.max(af);
-        // Both accelerations must be below the peak. Until the limit is reached, the velocity step is the square of the peak.
-        let (least, most, limit) = if self.sign > 0.0 {
-            (square_positive(outer), f64::INFINITY, up)
-        } else {
-            (0.0, -outer * outer.abs(), f64::INFINITY)
-        };
+impl TwoSteps {
+    /// The two-step motions of this motion or its mirror image; `None` if their peak cannot have this sign.
+    #[inline]
+    fn of(motion: &Motion, mirrored: bool, sign: f64, drift: &Drift) -> Option<Self> {
+        let Motion { a0, af, v0, vf, .. } = *motion;
+        let (side, outer) = if mirrored { (-1.0, -smaller(a0, af)) } else { (1.0, larger(a0, af)) };
+        let (first, last) = (side * v0 - 0.5 * a0 * a0, side * vf + 0.5 * af * af);
         let step = last - first;
-        let (low, high) = ((step - drift.velocity).max(least), (step + drift.velocity).min(most));
-        if low > high {
-            return None;
-        }
+        // Both accelerations must be below the peak. Until the limit is reached, the velocity step is the square of the peak.
+        let (least, most) =
+            if sign > 0.0 { (square_positive(outer), f64::INFINITY) } else { (0.0, -outer * outer.abs()) };
+        let (low, high) = (larger(step - drift.velocity, least), smaller(step + drift.velocity, most));
+        (low <= high).then_some(Self { mirrored, sign, first, last, low, high })
+    }
+
+    /// The two-step motion that explains `fastest` as a detour, and its duration.
+    #[inline(never)]
+    fn explaining(&self, motion: &Motion, drift: &Drift, fastest: f64) -> Option<(TwoStep, f64)> {
+        let (two_step, error, duration) = self.nearest(motion, drift)?;
+        // At rest, an error of the distance costs its third root in time. That is no detour.
+        let lost = fastest - duration;
+        let is_detour = lost * lost * lost > DETOUR * (error + f64::EPSILON * drift.distance);
+        (error <= drift.distance && is_detour).then_some((two_step, duration))
+    }
+
+    /// The two-step motion that is nearest to the wanted distance, its error of the distance, and its duration; `None` if it
+    /// is further away than any drift.
+    fn nearest(&self, motion: &Motion, drift: &Drift) -> Option<(TwoStep, f64, f64)> {
+        let Self { mirrored, sign, first, last, low, high } = *self;
+        let Motion { a0, af, up, distance, .. } = if mirrored { motion.mirrored() } else { *motion };
+        let limit = if sign > 0.0 { up } else { f64::INFINITY };
         let speed = 0.5 * (first + last);
         let beside = first * a0 + a0 * a0 * a0 / 6.0 + last * af - af * af * af / 6.0;
-        let times = |step: f64| self.sign * VelocityStep::over(step, limit).duration();
-        let exact = times(step.clamp(low, high));
+        let times = |step: f64| sign * VelocityStep::over(step, limit).duration();
+        let exact = times((last - first).clamp(low, high));
         let miss = |times: f64| speed * times - beside - distance;
+        // Nearly every motion misses by far more than its drift.
+        if miss(exact).abs() > 2.0 * (drift.distance + speed.abs() * drift.times) {
+            return None;
+        }
         // The velocities are changed no more than needed, because that change is drift in the next cycle.
         let tolerated = 0.5 * drift.distance;
         let beyond = miss(exact) - miss(exact).clamp(-tolerated, tolerated);
@@ -88,7 +118,7 @@ impl TwoSteps<'_> {
             (exact - beyond / speed).min(one.max(other)).max(one.min(other))
         };
         let peak = (0.5 * times).min(limit);
-        let two_step = TwoStep { mirrored: self.mirrored, peak, hold: times - 2.0 * peak };
+        let two_step = TwoStep { mirrored, peak, hold: times - 2.0 * peak };
         Some((two_step, miss(times).abs(), times - a0 - af))
     }
 }
@@ -109,19 +139,20 @@ impl TwoStep {
 /// the fastest exact motion, is no detour in place of it. `rounding` is the rounding error of the distance.
 pub(super) fn but_for_drift(motion: &Motion, rounding: f64, fastest: f64) -> Option<(TwoStep, f64)> {
     let drift = Drift::of(motion, rounding);
-    let mirrored = motion.mirrored();
-    let seen = [(motion, false), (&mirrored, true)];
-    let motions = seen.into_iter().flat_map(|(motion, mirrored)| {
-        [1.0, -1.0].map(|sign| TwoSteps { motion, mirrored, sign }.nearest(&drift))
-    });
-    let explained = motions.flatten().filter(|(_, error, duration)| {
-        // At rest, an error of the distance costs its third root in time. That is no detour.
-        let lost = fastest - duration;
-        *error <= drift.distance && lost * lost * lost > DETOUR * (error + f64::EPSILON * drift.distance)
-    });
-    explained
-        .map(|(two_step, _, duration)| (two_step, duration))
-        .min_by(|one, other| one.1.total_cmp(&other.1))
+    let explained = |mirrored: bool, sign: f64| {
+        TwoSteps::of(motion, mirrored, sign, &drift)?.explaining(motion, &drift, fastest)
+    };
+    let seen = earlier(explained(false, 1.0), explained(false, -1.0));
+    earlier(seen, earlier(explained(true, 1.0), explained(true, -1.0)))
+}
+
+/// The motion with the shorter duration.
+#[inline]
+fn earlier(one: Option<(TwoStep, f64)>, other: Option<(TwoStep, f64)>) -> Option<(TwoStep, f64)> {
+    match (one, other) {
+        (Some(a), Some(b)) if b.1 < a.1 => other,
+        _ => one.or(other),
+    }
 }
 
 /// The third power of the duration of a motion from rest to rest with full jerk (UDDU without plateaus), divided by its
