@@ -320,6 +320,17 @@ impl Profile {
         (self.end, self.duration_s, self.count) = (end, time_s, count);
     }
 
+    /// Removes all phases but the first ones, which last this long and reach this state.
+    pub(super) fn return_to(&mut self, count: usize, duration_s: f64, reached: State) {
+        self.starts_s.iter_mut().skip(count).for_each(|start_s| *start_s = f64::INFINITY);
+        (self.count, self.duration_s, self.end) = (count, duration_s, reached);
+    }
+
+    /// How many phases there are.
+    pub(super) fn phase_count(&self) -> usize {
+        self.count
+    }
+
     /// Completes the profile. Its end is exactly the target.
     pub(super) fn finish(&mut self, target: State) -> Result<(), PlanError> {
         self.finish_at(target, self.duration_s)

@@ -6,6 +6,7 @@
 //! 4. Where a profile leaves a position limit, `travel` replaces it.
 
 use super::error::PlanError;
+use super::jerk_limited::Inside;
 use super::options::{PlanOptions, Return, Synchronisation};
 use super::problem::{Limits, Problem, State};
 use super::profile::{BLOCKED_MAX, Profile};
@@ -152,7 +153,7 @@ pub fn position(problem: &Problem) -> Result<Profile, PlanError> {
 /// As [`synchronised`], with axis 0.
 pub fn velocity(problem: &Problem) -> Result<Profile, PlanError> {
     let mut profile = Profile::hold(0.0);
-    fastest(Interface::Velocity, problem, 0.0, &mut profile)?;
+    fastest(Interface::Velocity, problem, 0.0, &mut None, &mut profile)?;
     Ok(profile)
 }
 
@@ -165,7 +166,7 @@ fn halt(
     let problems = axes.map(|(start, limits)| Problem { start, target, limits });
     let mut duration_s: f64 = 0.0;
     for (axis, (problem, profile)) in problems.clone().zip(profiles.iter_mut()).enumerate() {
-        let fastest_s = fastest(Interface::Velocity, &problem, duration_s, profile)
+        let fastest_s = fastest(Interface::Velocity, &problem, duration_s, &mut None, profile)
             .map_err(|error| error.on_axis(axis))?;
         duration_s = duration_s.max(fastest_s);
     }
@@ -173,7 +174,7 @@ fn halt(
     let mut longest_s = duration_s;
     for (axis, (problem, profile)) in problems.clone().zip(profiles.iter_mut()).enumerate() {
         let on_axis = |error: PlanError| error.on_axis(axis);
-        lasting(Interface::Velocity, &problem, duration_s, profile).map_err(on_axis)?;
+        lasting(Interface::Velocity, &problem, duration_s, &mut None, profile).map_err(on_axis)?;
         if travel::limit_left(&problem, profile).is_some() {
             travel::stop_within(problem.start, &problem.limits, profile).map_err(on_axis)?;
             longest_s = longest_s.max(profile.duration_s());
@@ -194,10 +195,15 @@ fn plan(
     expect_length(problems.len(), profiles.len())?;
     timing.validate()?;
     let mut longest_s = timing.minimum_duration_s;
+    // Not a constant, all of whose bytes would be written.
+    let mut kept: [Option<Inside>; KEPT_MAX] = core::array::from_fn(|_| None);
     for (axis, (problem, profile)) in problems.iter().zip(profiles.iter_mut()).enumerate() {
         // An axis that must last longer than this needs no phases yet.
         let least_s = if timing.synchronisation == Synchronisation::Independent { 0.0 } else { longest_s };
-        let fastest_s = fastest(interface, problem, least_s, profile).map_err(|error| error.on_axis(axis))?;
+        let mut spare = None;
+        let kept = kept.get_mut(axis).unwrap_or(&mut spare);
+        let fastest_s =
+            fastest(interface, problem, least_s, kept, profile).map_err(|error| error.on_axis(axis))?;
         longest_s = longest_s.max(fastest_s);
     }
     let common_s = match timing.synchronisation {
@@ -211,7 +217,9 @@ fn plan(
         let own_s = common_s.unwrap_or_else(|| {
             unblocked(profile.duration_s(), core::slice::from_ref(profile), timing.cycle_s)
         });
-        lasting(interface, problem, own_s, profile).map_err(|error| error.on_axis(axis))?;
+        let mut spare = None;
+        let kept = kept.get_mut(axis).unwrap_or(&mut spare);
+        lasting(interface, problem, own_s, kept, profile).map_err(|error| error.on_axis(axis))?;
         duration_s = duration_s.max(own_s);
     }
     match (timing.synchronisation, interface) {
@@ -245,10 +253,11 @@ fn straight(
     let projected = line.projected(problems);
     let on_line = |error: PlanError| error.on_axis(line.reference());
     let mut profile = Profile::hold(0.0);
-    let fastest_s = fastest(interface, &projected, 0.0, &mut profile).map_err(on_line)?;
+    let mut kept = None;
+    let fastest_s = fastest(interface, &projected, 0.0, &mut kept, &mut profile).map_err(on_line)?;
     let least_s = fastest_s.max(timing.minimum_duration_s);
     let duration_s = unblocked(least_s, core::slice::from_ref(&profile), timing.cycle_s);
-    lasting(interface, &projected, duration_s, &mut profile).map_err(on_line)?;
+    lasting(interface, &projected, duration_s, &mut kept, &mut profile).map_err(on_line)?;
     line.follow(&profile, problems, profiles);
     Ok(duration_s)
 }
@@ -257,11 +266,13 @@ fn expect_length(expected: usize, received: usize) -> Result<(), PlanError> {
     if expected == received { Ok(()) } else { Err(PlanError::LengthMismatch { expected, received }) }
 }
 
-/// Plans the fastest profile of one axis and returns its duration in s. A profile shorter than `least_s` gets no phases.
+/// Plans the fastest profile of one axis and returns its duration in s. A profile shorter than `least_s` gets no phases. `kept`
+/// receives what [`lasting`] needs again.
 fn fastest(
     interface: Interface,
     problem: &Problem,
     least_s: f64,
+    kept: &mut Option<Inside>,
     profile: &mut Profile,
 ) -> Result<f64, PlanError> {
     problem.validate()?;
@@ -272,18 +283,20 @@ fn fastest(
         (Interface::Position(_), true) => trapezoid::fastest_position(problem, least_s, profile),
         (Interface::Velocity, true) => trapezoid::fastest_velocity(problem, profile),
         (Interface::Position(return_to_limits), false) => {
-            jerk_limited::fastest_position(problem, return_to_limits, least_s, profile)
+            jerk_limited::fastest_position(problem, return_to_limits, least_s, kept, profile)
         }
         (Interface::Velocity, false) => jerk_limited::fastest_velocity(problem, least_s, profile),
     }?;
     Ok(profile.minimum_duration_s())
 }
 
-/// Plans the profile of one axis that lasts this long. `profile` must hold what [`fastest`] has made of it.
+/// Plans the profile of one axis that lasts this long. `profile` must hold what [`fastest`] has made of it, and `kept`
+/// what it has kept, or nothing.
 fn lasting(
     interface: Interface,
     problem: &Problem,
     duration_s: f64,
+    kept: &mut Option<Inside>,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
     if profile.duration_s() == duration_s {
@@ -293,11 +306,15 @@ fn lasting(
         (Interface::Position(_), true) => trapezoid::position_lasting(problem, duration_s, profile),
         (Interface::Velocity, true) => trapezoid::velocity_lasting(problem, duration_s, profile),
         (Interface::Position(return_to_limits), false) => {
-            jerk_limited::position_lasting(problem, return_to_limits, duration_s, profile)
+            jerk_limited::position_lasting(problem, return_to_limits, duration_s, kept, profile)
         }
         (Interface::Velocity, false) => jerk_limited::velocity_lasting(problem, duration_s, profile),
     }
 }
+
+/// How many axes of a plan keep from their fastest profile what the profile of the common duration needs again. Further axes
+/// compute it twice.
+const KEPT_MAX: usize = 8;
 
 /// A duration above a multiple of the cycle by this much, relative to it, counts as that multiple: the rest is rounding.
 const GRID_ROUNDING: f64 = 1e-11;

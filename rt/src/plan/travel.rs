@@ -59,7 +59,7 @@ pub(super) fn motion_within(
         if limits.is_second_order() {
             trapezoid::fastest_position(problem, 0.0, profile)
         } else {
-            jerk_limited::fastest_position(problem, return_to_limits, 0.0, profile)
+            jerk_limited::fastest_position(problem, return_to_limits, 0.0, &mut None, profile)
         }
     };
     fastest(problem, profile)?;

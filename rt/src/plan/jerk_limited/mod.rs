@@ -51,7 +51,7 @@ mod uddu;
 mod udu;
 mod velocity;
 
-pub(super) use position::{fastest_position, position_lasting};
+pub(super) use position::{Inside, fastest_position, position_lasting};
 pub(super) use reversing_stop::reversing_stop;
 pub(super) use velocity::{fastest_velocity, velocity_lasting};
 

@@ -3,25 +3,30 @@
 use super::super::choice::larger;
 use super::super::error::PlanError;
 use super::super::options::Return;
-use super::super::problem::Problem;
+use super::super::problem::{Problem, State};
 use super::super::profile::Profile;
 use super::motion::{Scale, SevenPhases};
-use super::step1::{Candidate, Edges};
+use super::step1::{Candidate, Candidates, Edges};
 use super::step2::Slower;
 use super::{ROUNDING, brake};
 
 /// A duration this close to a blocked interval, relative to the duration, is at its edge.
 const EDGE: f64 = 3e-11;
 
-/// The problem behind the brake, without units.
-struct Inside {
+/// The problem behind the brake, without units. Both steps need it, and it is a third of the work of each.
+#[derive(Clone, Copy, Debug)]
+pub(in super::super) struct Inside {
     edges: Edges,
     scale: Scale,
     brake_s: f64,
+    reached: State,
+    brake_phases: usize,
 }
 
 impl Inside {
-    fn of(problem: &Problem, return_to_limits: Return, profile: &mut Profile) -> Result<Self, PlanError> {
+    /// Begins the profile with the brake, and poses the problem behind it.
+    #[inline]
+    fn of(problem: &Problem, return_to_limits: Return, profile: &mut Profile) -> Self {
         let Problem { start, target, limits } = problem;
         let reached = match return_to_limits {
             Return::Fastest => brake::brake(start, limits, profile),
@@ -29,29 +34,25 @@ impl Inside {
         };
         let scale = Scale::of(limits);
         let distance = target.position - reached.position;
-        let motion = scale.motion(&reached, distance, target, limits);
-        let mut edges = Edges::of(&motion);
+        let mut edges = Edges::of(&scale.motion(&reached, distance, target, limits));
         // A rounding error of the direct motion must not become a detour.
         edges.round(ROUNDING * (reached.position.abs() + target.position.abs()) / scale.distance);
-        let representable = scale.distance > 0.0
-            && scale.distance.is_finite()
-            && distance.is_finite()
-            && motion.distance.is_finite();
-        if representable {
-            Ok(Self { edges, scale, brake_s: profile.duration_s() })
-        } else {
-            Err(PlanError::NotRepresentable { axis: 0 })
-        }
+        Self { edges, scale, brake_s: profile.duration_s(), reached, brake_phases: profile.phase_count() }
+    }
+
+    fn is_representable(&self) -> bool {
+        self.scale.distance > 0.0 && self.scale.distance.is_finite() && self.edges.motion.distance.is_finite()
     }
 
     /// Appends these phases to the profile, in the units of the problem.
     fn append(&self, phases: &SevenPhases, jerk_max: f64, profile: &mut Profile) {
         let durations_s = phases.durations.map(|duration| duration * self.scale.time_s);
-        profile.shift_all(profile.reached(), &durations_s, &phases.jerks.map(|jerk| jerk * jerk_max));
+        profile.shift_all(self.reached, &durations_s, &phases.jerks.map(|jerk| jerk * jerk_max));
     }
 }
 
 /// Plans the fastest profile to the target state, with its blocked intervals. A profile shorter than `least_s` gets no phases.
+/// `kept` receives what [`position_lasting`] needs again.
 ///
 /// # Errors
 /// [`PlanError::NotRepresentable`] with axis 0.
@@ -59,10 +60,15 @@ pub(in super::super) fn fastest_position(
     problem: &Problem,
     return_to_limits: Return,
     least_s: f64,
+    kept: &mut Option<Inside>,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
-    let inside = Inside::of(problem, return_to_limits, profile)?;
-    let candidates = inside.edges.candidates();
+    let inside = kept.insert(Inside::of(problem, return_to_limits, profile));
+    if !inside.is_representable() {
+        return Err(PlanError::NotRepresentable { axis: 0 });
+    }
+    let mut candidates = Candidates::new();
+    inside.edges.find(&mut candidates);
     let Some((fastest, others)) = candidates.split_first() else {
         return Err(PlanError::NotRepresentable { axis: 0 });
     };
@@ -85,7 +91,8 @@ pub(in super::super) fn fastest_position(
     Ok(())
 }
 
-/// Plans the profile to the target state that lasts this long. `profile` must hold what [`fastest_position`] has made of it.
+/// Plans the profile to the target state that lasts this long. `profile` must hold what [`fastest_position`] has made of it, and
+/// `kept`, if there is something, what it has kept of this problem.
 ///
 /// # Errors
 /// [`PlanError::NotRepresentable`] with axis 0.
@@ -93,6 +100,7 @@ pub(in super::super) fn position_lasting(
     problem: &Problem,
     return_to_limits: Return,
     duration_s: f64,
+    kept: &mut Option<Inside>,
     profile: &mut Profile,
 ) -> Result<(), PlanError> {
     let edge = profile.blocked().iter().any(|blocked| {
@@ -100,18 +108,27 @@ pub(in super::super) fn position_lasting(
         (blocked.before_s - duration_s).abs() <= rounding_s
             || (blocked.after_s - duration_s).abs() <= rounding_s
     });
-    let inside = Inside::of(problem, return_to_limits, profile)?;
+    let inside = match kept {
+        Some(inside) => {
+            profile.return_to(inside.brake_phases, inside.brake_s, inside.reached);
+            inside
+        }
+        None => kept.insert(Inside::of(problem, return_to_limits, profile)),
+    };
     let duration = (duration_s - inside.brake_s) / inside.scale.time_s;
     let jerk_max = problem.limits.jerk_max;
     // At the edge of a blocked interval, the motion is the candidate there.
-    let candidates = if edge { inside.edges.candidates() } else { Default::default() };
+    let mut candidates = Candidates::new();
+    if edge {
+        inside.edges.find(&mut candidates);
+    }
     let apart = |candidate: &Candidate| (candidate.duration - duration).abs();
     match candidates.iter().min_by(|one, other| apart(one).total_cmp(&apart(other))) {
         Some(candidate) => inside.append(&inside.edges.phases(candidate), jerk_max, profile),
         None => match inside.edges.lasting(duration) {
             Slower::Plain(phases) => inside.append(&phases, jerk_max, profile),
             Slower::Mixture { first, second, share } => {
-                mix(&inside, &first, &second, share, jerk_max, profile);
+                mix(inside, &first, &second, share, jerk_max, profile);
             }
         },
     }

@@ -89,6 +89,7 @@ pub(super) struct Edges {
 }
 
 impl Edges {
+    #[inline]
     pub(super) fn of(original: &Motion) -> Self {
         let mirrored = original.velocity_before_target() < original.velocity_behind_start();
         let motion = if mirrored { original.mirrored() } else { *original };
@@ -152,13 +153,12 @@ impl Edges {
         }
     }
 
-    /// Every motion on an edge over the wanted distance, the fastest first.
-    pub(super) fn candidates(&self) -> Candidates {
-        let mut candidates = Candidates::new();
+    /// Finds every motion on an edge over the wanted distance, the fastest first. `candidates` are empty before.
+    pub(super) fn find(&self, candidates: &mut Candidates) {
         let direct_is_above = self.direct_distance > self.motion.distance;
-        self.same_sign_candidates(&mut candidates);
-        self.upper_candidates(direct_is_above, &mut candidates);
-        self.lower_candidates(direct_is_above, &mut candidates);
+        self.same_sign_candidates(candidates);
+        self.upper_candidates(direct_is_above, candidates);
+        self.lower_candidates(direct_is_above, candidates);
         candidates.sort_unstable_by(|one, other| one.duration.total_cmp(&other.duration));
         let fastest = candidates.first().map_or(f64::INFINITY, |candidate| candidate.duration);
         if let Some((two_step, duration)) = drift::but_for_drift(&self.motion, self.rounding, fastest) {
@@ -170,7 +170,6 @@ impl Edges {
                 }
             }
         }
-        candidates
     }
 
     fn upper_candidates(&self, direct_is_above: bool, candidates: &mut Candidates) {
