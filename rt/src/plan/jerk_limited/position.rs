@@ -25,7 +25,6 @@ pub(in super::super) struct Inside {
 
 impl Inside {
     /// Begins the profile with the brake, and poses the problem behind it.
-    #[inline]
     fn of(problem: &Problem, return_to_limits: Return, profile: &mut Profile) -> Self {
         let Problem { start, target, limits } = problem;
         let reached = match return_to_limits {
@@ -34,10 +33,17 @@ impl Inside {
         };
         let scale = Scale::of(limits);
         let distance = target.position - reached.position;
-        let mut edges = Edges::of(&scale.motion(&reached, distance, target, limits));
+        let mut inside = Self {
+            edges: Edges::of(&scale.motion(&reached, distance, target, limits)),
+            scale,
+            brake_s: profile.duration_s(),
+            reached,
+            brake_phases: profile.phase_count(),
+        };
         // A rounding error of the direct motion must not become a detour.
-        edges.round(ROUNDING * (reached.position.abs() + target.position.abs()) / scale.distance);
-        Self { edges, scale, brake_s: profile.duration_s(), reached, brake_phases: profile.phase_count() }
+        let rounding = ROUNDING * (reached.position.abs() + target.position.abs()) / scale.distance;
+        inside.edges.round(rounding);
+        inside
     }
 
     fn is_representable(&self) -> bool {

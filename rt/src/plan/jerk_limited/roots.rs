@@ -1,6 +1,6 @@
 //! Roots of functions that are monotone between two points: Newton's method, kept in its bracket.
 
-use super::super::choice::select;
+use super::super::choice::{larger, select, smaller};
 
 /// The most evaluations for one root. Newton's method inside a bracket ends after about five. A step out of the bracket
 /// halves it instead, and 64 halvings exhaust the 53 bits of a number.
@@ -21,14 +21,6 @@ pub(super) fn excess(distance: f64, size: f64, wanted: f64) -> f64 {
     select(excess.abs() <= 4.0 * f64::EPSILON * (size + wanted.abs()), 0.0, excess)
 }
 
-/// An end of the bracket of a root.
-#[derive(Clone, Copy)]
-struct End {
-    at: f64,
-    /// True if the function has been evaluated there.
-    seen: bool,
-}
-
 /// The root of `function`, which must rise from `low` (value not above 0) to `high` (value not below 0).
 ///
 /// A step of Newton's method that leaves the bracket goes to the end of the bracket instead. The root is often there, and
@@ -37,40 +29,45 @@ struct End {
 pub(super) fn rising_root(low: f64, high: f64, guess: f64, function: impl Fn(f64) -> Point) -> f64 {
     /// Newton's method doubles the right digits with each step. After a relative step this small, all digits are right.
     const LAST_STEP: f64 = 1e-9;
-    let mut x = guess.clamp(low.min(high), high.max(low));
+    let rises = low <= high;
+    let (mut least, mut most) = if rises { (low, high) } else { (high, low) };
+    // Whether the function has been evaluated there.
+    let (mut least_seen, mut most_seen) = (false, false);
+    let mut x = larger(smaller(guess, most), least);
     #[cfg(test)]
     work::search();
-    let (mut low, mut high) = (End { at: low, seen: false }, End { at: high, seen: false });
     for _ in 0..EVALUATIONS_MAX {
         #[cfg(test)]
         work::evaluate();
         let Point { value, slope } = function(x);
-        let (this, other) = if value > 0.0 {
-            (&mut high, &low)
-        } else if value < 0.0 {
-            (&mut low, &high)
-        } else {
-            break;
-        };
-        // The sign is wrong at the end of the bracket: rounding has put the root beyond it.
-        if x == other.at {
+        if value == 0.0 || value.is_nan() {
             break;
         }
-        *this = End { at: x, seen: true };
-        let newton = x - value / slope;
-        let (least, most) = (low.at.min(high.at), low.at.max(high.at));
-        let inside = newton > least && newton < most;
-        let next = if inside {
-            newton
+        // Where the sign is wrong at an end of the bracket, rounding has put the root beyond that end.
+        if (value > 0.0) == rises {
+            if x == least {
+                break;
+            }
+            (most, most_seen) = (x, true);
         } else {
-            let end = if (newton <= least) == (low.at <= high.at) { low } else { high };
-            if end.seen { 0.5 * (low.at + high.at) } else { end.at }
-        };
-        let step = (next - x).abs();
-        let exhausted = (next == low.at && low.seen) || (next == high.at && high.seen);
-        x = next;
-        if exhausted || (inside && step <= LAST_STEP * x.abs()) {
-            break;
+            if x == most {
+                break;
+            }
+            (least, least_seen) = (x, true);
+        }
+        let newton = x - value / slope;
+        if newton > least && newton < most {
+            let step = (newton - x).abs();
+            x = newton;
+            if step <= LAST_STEP * x.abs() {
+                break;
+            }
+        } else {
+            let (end, seen) = if newton <= least { (least, least_seen) } else { (most, most_seen) };
+            x = if seen { 0.5 * (least + most) } else { end };
+            if seen && (x == least || x == most) {
+                break;
+            }
         }
     }
     x

@@ -5,7 +5,7 @@
 //! the duration by `H = v + A·B/2`, where `A` and `B` are the largest accelerations on the way up and down. (`H` is the
 //! Hamiltonian of the optimal control problem.) `H` grows with `v`, so the distance has at most one minimum.
 
-use super::super::choice::smaller;
+use super::super::choice::{larger, smaller};
 use super::motion::{Motion, SevenPhases, VelocityStep};
 use super::roots::{Point, excess, rising_root};
 
@@ -116,7 +116,7 @@ impl Uddu {
         let (mut low, mut low_distance) = (0.0, base_distance);
         if base_is_above {
             // The distance is met only if it has a minimum in between, and then it is met twice.
-            if self.at(0.0).hamiltonian >= 0.0 {
+            if self.base >= 0.0 || !self.may_fall_by(base_distance - distance) {
                 return;
             }
             low = self.lowest();
@@ -166,6 +166,16 @@ impl Uddu {
     /// How far above the base a phase of full jerk takes this much longer.
     fn higher_by(&self, time: f64) -> f64 {
         time * (time + 2.0 * libm::sqrt(smaller(self.first_step, self.second_step)))
+    }
+
+    /// Whether the distance can become shorter by this much, as far as can be known without the parameter of the shortest one.
+    ///
+    /// The distance changes with the duration by `H`, which is lowest at the base. `H` grows faster than the parameter, so it is
+    /// not negative where the parameter is `−H` of the base.
+    fn may_fall_by(&self, distance: f64) -> bool {
+        let base = self.at(0.0);
+        let end = self.at(larger(0.0, -base.hamiltonian));
+        base.hamiltonian < 0.0 && base.hamiltonian * (base.duration - end.duration) > distance
     }
 
     /// The parameter of the shortest distance, where the distance falls at the base.
