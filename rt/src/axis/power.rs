@@ -190,7 +190,7 @@ impl Axis {
 
     /// Returns `true` if the drive has been taken out of operation enabled for good.
     pub(super) fn is_latched_off(&self) -> bool {
-        self.power == Power::Releasing(SetPoint::Kept)
+        matches!(self.power, Power::Releasing(SetPoint::Kept))
     }
 
     /// Returns `true` if the drive is known to have no torque.
@@ -204,6 +204,7 @@ impl Axis {
     }
 
     /// Returns `true` if the drive follows set-points.
+    #[inline]
     pub fn is_enabled(&self) -> bool {
         self.drive_state() == DriveState::OperationEnabled && !self.is_latched_off()
     }
