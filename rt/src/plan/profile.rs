@@ -326,7 +326,7 @@ impl Profile {
         (self.count, self.duration_s, self.end) = (count, duration_s, reached);
     }
 
-    /// How many phases there are.
+    /// Returns the number of phases.
     pub(super) fn phase_count(&self) -> usize {
         self.count
     }

@@ -168,7 +168,7 @@ impl Uddu {
         time * (time + 2.0 * libm::sqrt(smaller(self.first_step, self.second_step)))
     }
 
-    /// Whether the distance can become shorter by this much, as far as can be known without the parameter of the shortest one.
+    /// Returns `true` if the distance may become shorter by this much, as far as can be known without the parameter of the shortest one.
     ///
     /// The distance changes with the duration by `H`, which is lowest at the base. `H` grows faster than the parameter, so it is
     /// not negative where the parameter is `−H` of the base.
