@@ -2,7 +2,7 @@
 //!
 //! - [`canopen`]: the services of CiA 301, the layer settings of CiA 305, and the device descriptions of CiA 306 (EDS, DCF).
 //! - [`erob_can`]: the CAN protocol of ZeroErr eRob drives.
-//! - [`modbus`]: the requests and replies of Modbus-RTU.
+//! - [`modbus`]: the frames of Modbus-RTU, its master and its slave.
 //! - [`hollow_lines`]: the serial lines of the hollow-shaft motors.
 //! - [`quirks`] and [`bit_fields`]: the data that describes a drive, as its files say it.
 //! - [`bus_log`]: logs of frames, in the formats of other programs.

@@ -1,10 +1,10 @@
 //! Logs of the frames of buses, as other programs write and read them.
 //!
 //! - [`frame_text`]: a frame as `cansend` takes it: `181#3712`, `123##1DEAD`, `701#R`.
-//! - `candump`: `candump -l`; `candump_text`: what candump prints.
+//! - [`candump`]: `candump -l`; `candump_text`: what candump prints.
 //! - `pcapng`: Wireshark, which decodes CANopen by itself.
 //! - `csv`: a table with a header, for spreadsheets.
-//! - `reader`: tells them apart; `writer`: writes one of them.
+//! - [`read`] tells them apart; [`LogWriter`] writes one of them.
 
 pub mod candump;
 mod candump_text;

@@ -35,7 +35,7 @@ pub fn instead_of_the_disk<T>(files: Vec<TextFile>, body: impl FnOnce() -> T) ->
 /// Reads a whole file.
 ///
 /// # Errors
-/// An error of the system; or there is no such file among those that stand in for the disk.
+/// The file cannot be read, is no regular file, or is longer than 64 MiB; or there is no such file among those that stand in for the disk.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     let given = GIVEN.with_borrow(|files| {
         let files = files.as_ref()?;
