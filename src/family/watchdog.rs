@@ -143,8 +143,10 @@ pub fn unreached_words(config: &Config, unreached: &[usize]) -> Vec<String> {
     }
     let words = |(fact, names): (Result<Watchdog, Unwatched>, Vec<&str>)| {
         let fact = match fact {
-            Ok(watchdog) => format!("each {watchdog}"),
-            Err(unwatched) => format!("none stops by itself ({unwatched})"),
+            Ok(watchdog) => {
+                format!("if it was brought up and obeys its watchdog, it {watchdog}, which nobody has seen")
+            }
+            Err(unwatched) => format!("it does not stop by itself ({unwatched})"),
         };
         format!(
             "{}: the drive has not confirmed that it has no torque, so that the axis may still move; {fact}. Make sure that it stands \

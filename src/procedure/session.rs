@@ -142,6 +142,11 @@ impl<C> ProcedureSession<C> {
         state.failing_step = state.failing_step.or(Some(state.step));
     }
 
+    /// Returns `true` if a step is kept as the failing one.
+    pub(crate) fn has_failed_step(&self) -> bool {
+        self.state().failing_step.is_some()
+    }
+
     /// The step in which a failure belongs that ends the procedure now.
     pub(super) fn failing_step(&self) -> &'static str {
         let state = self.state();

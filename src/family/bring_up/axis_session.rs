@@ -178,6 +178,11 @@ impl<'a> AxisSession<'a> {
         }
     }
 
+    /// Returns `true` if an access to the node, for any of its axes, has failed and the procedure goes on.
+    pub fn has_failed(&self) -> bool {
+        self.bus.has_failed_step()
+    }
+
     /// The axes of the same node, in the order of the configuration.
     pub(super) fn siblings(&self) -> impl Iterator<Item = &Axis> {
         let is_of_node = |axis: &&Axis| (axis.bus, axis.node) == (self.axis.bus, self.axis.node);

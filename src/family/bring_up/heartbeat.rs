@@ -24,7 +24,12 @@ pub async fn watch_master(c: &AxisSession<'_>) -> StepResult {
 }
 
 /// Lets the drive watch the master no longer.
+///
+/// A drive whose shut-down has failed may still have torque, and obeys nothing: its watchdog alone may still stop it. So it keeps it.
 pub async fn end_watch(c: &AxisSession<'_>, advice: &'static str) -> StepResult {
+    if c.has_failed() {
+        return Ok(());
+    }
     c.step("end of heartbeats", advice);
     c.write_and_read_back(CONSUMER_HEARTBEAT_TIME, 0).await
 }

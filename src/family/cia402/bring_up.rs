@@ -91,8 +91,9 @@ impl Sheet<'_> {
             heartbeat::end_watch(c, "expect a communication fault of the drive; the next bring-up clears it")
                 .await?;
         }
-        // The drive watches for the requests from the first one on.
-        if let Supervision::Guarding { .. } = c.axis.supervision(&c.config.master) {
+        // The drive watches for the requests from the first one on, and goes on with it as with heartbeats.
+        if let (Supervision::Guarding { .. }, false) = (c.axis.supervision(&c.config.master), c.has_failed())
+        {
             self.set(GUARD_TIME, 0).await?;
             self.set(LIFE_TIME_FACTOR, 0).await?;
         }
