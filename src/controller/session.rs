@@ -74,8 +74,8 @@ pub struct Session {
     /// The target of the last move of each axis (rad or m); `None` where that has no target position. Empty if the program did
     /// not finish.
     pub targets: Vec<Option<f64>>,
-    /// The axes whose drives were brought up and did not confirm in the end that they have no torque. It is unknown whether they have
-    /// stopped.
+    /// The axes whose drives did not confirm in the end that they have no torque, also where the bring-up failed. It is unknown whether
+    /// they have stopped.
     pub unreached: Vec<usize>,
     /// The axes whose drives showed an error during the shut-down, with its code. A drive without an error code in its process
     /// data tells it there alone.

@@ -8,8 +8,8 @@ use crate::channels::HostSide;
 use crate::controller::arrival::ARRIVAL_NS;
 use crate::controller::outcome::{Interrupt, Outcome};
 
-/// The drives of serial lines have this time for the last requests, of which a silent one gets one every 500 ms.
-const LINES_NS: u64 = 1_000_000_000;
+/// Drives without PDOs have this time for the last requests, of which a silent one on a serial line gets one every 500 ms.
+const WITHOUT_PDOS_NS: u64 = 1_000_000_000;
 /// The drives settle on their last set-point for this time, before they are disabled and the brakes engage.
 const SETTLE_NS: u64 = 300_000_000;
 
@@ -21,6 +21,7 @@ impl Supervisor {
                 self.end_bring_up_again();
                 self.request(Request::InhibitEnable);
                 self.request(Request::Stop(StopCategory::Zero));
+                self.make_active_for_the_end();
                 self.outcome.get_or_insert(Outcome::Interrupted);
                 self.enter(Stage::RemovePower, now_ns);
             }
@@ -33,22 +34,32 @@ impl Supervisor {
         }
     }
 
-    /// The loop does not run any more: nobody has confirmed anything of the drives that were brought up.
+    /// The loop does not run any more: no drive has confirmed anything.
     pub fn abandon(&mut self) {
-        self.unreached = if self.facts.is_empty() { vec![] } else { (0..self.axes).collect() };
+        self.unreached = (0..self.axes).collect();
     }
 
     /// Begins the end of the run, from any stage.
     pub(super) fn end(&mut self, now_ns: u64, outcome: Outcome) {
         let was_running = matches!(self.stage, Stage::Run);
-        let has_been_active = !matches!(self.stage, Stage::Configure | Stage::Start);
+        let is_active = !matches!(self.stage, Stage::Configure | Stage::Start);
         self.outcome.get_or_insert(outcome);
         if was_running && !matches!(self.outcome, Some(Outcome::Stopped(_))) {
             self.enter(Stage::Settle { until_ns: now_ns + SETTLE_NS }, now_ns);
-        } else if has_been_active {
+        } else if is_active {
             self.begin_disable(now_ns);
         } else {
+            self.request(Request::InhibitEnable);
+            self.make_active_for_the_end();
             self.begin_shut_down(now_ns);
+        }
+    }
+
+    /// Has drives without process data told that they have no torque, although the bring-up has not come to an end: they may have it
+    /// from an earlier run. The others are told by their shut-down.
+    fn make_active_for_the_end(&mut self) {
+        if matches!(self.stage, Stage::Configure | Stage::Start) && self.has_pdos.contains(&false) {
+            self.request(Request::Activate);
         }
     }
 
@@ -131,7 +142,7 @@ impl Supervisor {
         self.shutdown.poll(now_ns, &mut service_sender(host));
         let outcome = self.shutdown.outcome();
         let unsettled = self.off_cycle.lines().unsettled();
-        let is_awaited = !unsettled.is_empty() && elapsed_ns <= LINES_NS;
+        let is_awaited = !unsettled.is_empty() && elapsed_ns <= WITHOUT_PDOS_NS;
         let not_shut_down = [self.shutdown.not_done(), unsettled].concat();
         let unconfirmed = self.unconfirmed(snapshot, Some(&not_shut_down));
         let is_over =
@@ -163,34 +174,29 @@ impl Supervisor {
         }
     }
 
-    /// The axes whose drives have been brought up and have not confirmed that they have no torque, in their order. A drive with PDOs
-    /// confirms it by its part of the shut-down, which ends its reports, and every drive by its newest report, if that is not old.
-    /// `not_shut_down` are those that have not carried out their part, where there is a shut-down.
+    /// The axes whose drives have not confirmed that they have no torque, in their order. A drive with PDOs confirms it by its part of the
+    /// shut-down, which ends its reports, and every drive by its newest report, if that is not old. `not_shut_down` are those that have not carried out their part, where there is a shut-down.
     fn unconfirmed(&self, snapshot: &Snapshot, not_shut_down: Option<&[usize]>) -> Vec<usize> {
-        if self.facts.is_empty() {
-            return vec![];
-        }
         let is_unconfirmed = |axis: &usize| match not_shut_down {
             Some(axes) if axes.contains(axis) => true,
             Some(_) if self.has_pdos.get(*axis) == Some(&true) => false,
-            _ => self.has_been_active && snapshot.axes.get(*axis).is_some_and(|own| !own.is_confirmed_off),
+            _ => snapshot.axes.get(*axis).is_some_and(|own| !own.is_confirmed_off),
         };
         (0..self.axes).filter(is_unconfirmed).collect()
     }
 
-    /// Whether the drives that do not stop by themselves have been told to stop for long enough, and the last report of none shows
-    /// torque, however old it is. What a drive with PDOs confirms is no misheard reply.
+    /// Returns `true` if every drive has been told to stop for long enough. One that does not stop by itself is told until its last report
+    /// shows no torque, however old it is. What a drive with PDOs confirms is no misheard reply.
     fn are_told_to_stop(&self, elapsed_ns: u64, snapshot: &Snapshot, unconfirmed: &[usize]) -> bool {
-        if !self.has_been_active {
-            return true;
-        }
         let axes = self.axes_of(snapshot).iter().zip(&self.has_pdos).zip(&self.least_shut_down_ns);
-        axes.enumerate().filter(|(_, (_, least_ns))| **least_ns > 0).all(
-            |(index, ((axis, has_pdos), least_ns))| {
-                let is_confirmed = !unconfirmed.contains(&index);
-                let may_have_torque = !is_confirmed && axis.drive_state.has_torque();
-                is_confirmed && *has_pdos || elapsed_ns >= *least_ns && !may_have_torque
-            },
-        )
+        axes.enumerate().all(|(index, ((axis, has_pdos), least_ns))| {
+            let is_confirmed = !unconfirmed.contains(&index);
+            let may_have_torque = !is_confirmed && axis.drive_state.has_torque();
+            match (has_pdos, *least_ns) {
+                (true, 0) => true,
+                (false, 0) => is_confirmed || elapsed_ns >= WITHOUT_PDOS_NS,
+                (_, least_ns) => is_confirmed && *has_pdos || elapsed_ns >= least_ns && !may_have_torque,
+            }
+        })
     }
 }

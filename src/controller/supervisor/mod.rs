@@ -16,8 +16,7 @@ mod start_up;
 use std::collections::VecDeque;
 
 use takt_rt::{
-    AxisSnapshot, BusState, Frame, Phase, Request, RequestEnvelope, RequestId, RequestTarget, Snapshot,
-    StopCategory,
+    AxisSnapshot, BusState, Frame, Request, RequestEnvelope, RequestId, RequestTarget, Snapshot, StopCategory,
 };
 use tracing::{info, warn};
 
@@ -33,7 +32,7 @@ use crate::config::Config;
 use crate::family;
 use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
-use phases::{fault_stop, is_any};
+use phases::fault_stop;
 
 /// A stage must be completed within this time, where every drive can be enabled at once. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
@@ -120,8 +119,6 @@ pub struct Supervisor {
     duration_ns: Option<u64>,
     /// Whether a client commands the group, in place of the program.
     is_serving: bool,
-    /// Whether any group has left the passive phase: before that no drive has been told to start.
-    has_been_active: bool,
     after_bring_up: AfterBringUp,
     /// The buses, and their states as `tracing` knows them.
     buses: Vec<(String, BusState)>,
@@ -164,7 +161,6 @@ impl Supervisor {
             deadline_ns: None,
             duration_ns,
             is_serving: false,
-            has_been_active: false,
             after_bring_up: AfterBringUp::Enable,
             buses: config.buses.iter().map(|bus| (bus.name.clone(), BusState::default())).collect(),
         }
@@ -203,8 +199,9 @@ impl Supervisor {
         if self.stage == Stage::Done { self.outcome.as_ref() } else { None }
     }
 
-    /// The axes whose drives were brought up and did not confirm in the end that they have no torque: their newest report is old, or
-    /// shows torque, or they did not carry out the shut-down. It is unknown whether they have stopped.
+    /// The axes whose drives did not confirm in the end that they have no torque: their newest report is old, or shows torque, or they
+    /// did not carry out the shut-down. It is unknown whether they have stopped. Of a bring-up that failed they are those that it did
+    /// not reach.
     pub fn unreached(&self) -> &[usize] {
         &self.unreached
     }
@@ -245,7 +242,6 @@ impl Supervisor {
         }
         let mut snapshot = self.seen.take().unwrap_or_default();
         host.read_snapshot(&mut snapshot);
-        self.has_been_active |= is_any(&snapshot, |phase| phase != Phase::Passive);
         self.tell_of_buses(&snapshot);
         self.numbers = host.numbers();
         self.handle_interrupt(now_ns);

@@ -207,6 +207,86 @@ fn a_drive_that_refuses_to_be_shut_down_is_named() {
 }
 
 #[test]
+fn after_a_bring_up_that_fails_the_others_are_told_to_stop_and_those_not_reached_are_named() {
+    let config = config(MIXED);
+    let mut port = Refusing { bus: SimulatedBus::new(&config, 0), node: 1, is_refusing: true };
+    // An earlier run has left it with torque.
+    let enable = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
+    for at_ms in 0..20 {
+        port.send(at_ms * 1_000_000, &[Frame::of(Id::canopen(0, 9), enable)]);
+        port.receive(at_ms * 1_000_000, &mut ReceiveBatch::new());
+    }
+    assert!(port.bus.observe(9).unwrap().state.has_torque());
+    let (mut run, _) = VirtualRun::new(&config, vec![port]).unwrap();
+    let outcome = run.run(120_000, |_| {});
+    assert!(matches!(outcome, Some(Outcome::BringUpFailed(_))), "{outcome:?}");
+    assert_eq!(run.supervisor().unreached(), [0]);
+    assert!(!run.ports()[0].bus.observe(9).unwrap().state.has_torque());
+}
+
+#[test]
+fn after_an_interrupted_bring_up_every_axis_that_has_confirmed_nothing_is_named() {
+    let config = config(&OWN_PROTOCOL.replace("erob-can", "erob-canopen"));
+    for (interrupt, unreached) in [(Interrupt::Controlled, vec![]), (Interrupt::Immediate, vec![0])] {
+        let (mut run, _) = VirtualRun::new(&config, vec![SimulatedBus::new(&config, 0)]).unwrap();
+        run.interrupt(interrupt);
+        assert_eq!(run.run(120_000, |_| {}), Some(Outcome::Interrupted));
+        assert_eq!(run.supervisor().unreached(), unreached, "{interrupt:?}");
+    }
+}
+
+/// Runs to the end with a joint whose drive stops to obey in motion, and returns the axes named at the end and the speed of the joint and
+/// whether it has torque a second later.
+fn after_disobedience(config: &Config, how: &str) -> (Vec<usize>, f64, bool) {
+    let text = format!(
+        "[[fault]]\nkind = \"disobedience\"\nhow = {how:?}\naxis = \"joint\"\nwhen = \"moving\"\nat = \"100 ms\"\n"
+    );
+    let injector = Arc::new(FaultInjector::new(scenario(&text, config)));
+    let (mut run, _) = VirtualRun::<Port>::with_faults(config, injector).unwrap();
+    let outcome = run.run(120_000, |_| {});
+    assert!(matches!(outcome, Some(Outcome::Stopped(_))), "{how}: {outcome:?}");
+    let end_ns = run.snapshot().at_ns;
+    let unreached = run.supervisor().unreached().to_vec();
+    let port = &mut run.ports()[0];
+    for at_ms in 1..=1000 {
+        port.receive(end_ns + at_ms * 1_000_000, &mut ReceiveBatch::new());
+    }
+    let drive = port.simulated_mut().unwrap().observe(1).unwrap();
+    (unreached, drive.velocity, drive.state.has_torque())
+}
+
+#[test]
+fn a_drive_that_has_not_shown_that_it_has_no_torque_keeps_its_watchdog() {
+    let erob = r#"
+name = "one"
+[[bus]]
+name = "can"
+[[axis]]
+name = "joint"
+bus = "can"
+node = 1
+drive = "erob-canopen"
+limits = { position = [-2, 2], velocity = 1, acceleration = 6, torque = 31 }
+[[program.move]]
+to = 1
+[[program.move]]
+to = 0
+"#;
+    let sheet = folder().join("eds/erob-canopen.eds").display().to_string();
+    let by_sheet = erob.replace(
+        "drive = \"erob-canopen\"",
+        &format!("drive = \"cia402\"\neds = {sheet:?}\ncounts_per_turn = 524288"),
+    );
+    for text in [erob, &by_sheet] {
+        for how in ["keeps-state", "local", "enables-itself"] {
+            let (unreached, velocity, has_torque) = after_disobedience(&config(text), how);
+            assert!(velocity == 0.0 && !has_torque, "{how}: {velocity} rad/s, {has_torque}\n{text}");
+            assert_eq!(unreached, [0], "{how}");
+        }
+    }
+}
+
+#[test]
 fn each_drive_stops_by_its_own_watchdog_or_not_at_all() {
     let fact = |config: &Config, axis: usize| stops_by_itself_after(&config.axes[axis], config);
     let by = |sign, ms: u64| Ok(Watchdog::new(sign, Some(ms * 1_000_000)));
@@ -254,7 +334,7 @@ fn the_last_message_names_together_the_axes_that_stop_for_the_same_reason() {
     let [elbow, jaws] = &words[..] else { panic!("{words:?}") };
     assert!(elbow.starts_with("elbow: ") && elbow.contains("after the last heartbeat"), "{elbow}");
     assert!(
-        jaws.starts_with("jaws: ") && jaws.contains("none stops by itself (its drive has no watchdog)"),
+        jaws.starts_with("jaws: ") && jaws.contains("it does not stop by itself (its drive has no watchdog)"),
         "{jaws}"
     );
     assert_eq!(unreached_words(&config(MIXED), &[]), [""; 0]);
