@@ -17,6 +17,8 @@ use crate::sleep_alignment;
 const LOOK: Duration = Duration::from_millis(100);
 /// Looks without a cycle in between after which the loop is given up: a second, which is longer than the usual heartbeat time-outs.
 const LOOKS: u32 = 10;
+/// The same for a loop that others keep from its CPU: one of them may be a loop that stands still, and is given up first.
+const LOOKS_IF_STARVED: u32 = 3 * LOOKS;
 
 /// What the loop shows of itself.
 #[derive(Debug, Default)]
@@ -104,11 +106,36 @@ impl Watchdog {
     }
 }
 
+/// What the system shows of a thread of this process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct ThreadUse {
+    /// It runs, or waits for nothing but a processor.
+    is_ready: bool,
+    /// The time for which it has had a processor, in ticks of 10 ms.
+    ticks: u64,
+}
+
+impl ThreadUse {
+    fn of(thread: i32) -> Option<Self> {
+        Self::parse(&std::fs::read_to_string(format!("/proc/self/task/{thread}/stat")).ok()?)
+    }
+
+    /// Reads `/proc/pid/task/tid/stat` (proc_pid_stat(5)), whose second field is a name in parentheses.
+    fn parse(stat: &str) -> Option<Self> {
+        let (_, behind_name) = stat.rsplit_once(')')?;
+        let mut fields = behind_name.split_ascii_whitespace();
+        let is_ready = fields.next()? == "R";
+        let mut ticks = fields.skip(10).map(str::parse::<u64>);
+        Some(Self { is_ready, ticks: ticks.next()?.ok()? + ticks.next()?.ok()? })
+    }
+}
+
 impl Shared {
     fn watch(&self, last_resort: &LastResort, period_ns: Nanoseconds) {
         let look = LOOK.max(Duration::from_nanos(period_ns.saturating_mul(2)));
         let mut clock = MonotonicClock::default();
         let (mut cycles, mut since_ns, mut looks) = (0, clock.now_ns(), 0);
+        let mut used = None;
         loop {
             let before_ns = clock.now_ns();
             thread::park_timeout(sleep_alignment::pause(look, period_ns));
@@ -123,7 +150,12 @@ impl Shared {
                 continue;
             }
             looks += 1;
-            if looks >= LOOKS {
+            let shown = ThreadUse::of(self.watch.thread.load(Ordering::Relaxed));
+            if looks == 1 {
+                used = shown;
+            }
+            let is_starved = shown.is_some_and(|shown| shown.is_ready) && shown == used;
+            if looks >= if is_starved { LOOKS_IF_STARVED } else { LOOKS } {
                 let after = Duration::from_nanos(clock.now_ns().saturating_sub(since_ns));
                 return self.give_up(after, last_resort);
             }
@@ -137,5 +169,31 @@ impl Shared {
         let told = last_resort.stop_drives();
         error!(target: "takt::realtime", ?after, ?told, "the real-time loop stands still, and is given up");
         let _ = self.done.set(Stalled { after, told });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thread_that_has_used_its_processor_or_waits_for_something_else_is_not_starved() {
+        let stat =
+            "12 (a) R (b) R 1 12 12 0 -1 4194304 93 0 0 0 7 5 0 0 -51 0 3 0 4710 22 1 18446744073709551615";
+        assert_eq!(ThreadUse::parse(stat), Some(ThreadUse { is_ready: true, ticks: 12 }));
+        assert_eq!(ThreadUse::parse("12 (a"), None);
+        let own = ThreadUse::of(nix::unistd::gettid().as_raw()).unwrap();
+        assert!(own.is_ready);
+        let (send, receive) = std::sync::mpsc::channel();
+        let waiting = thread::spawn(move || {
+            send.send(nix::unistd::gettid().as_raw()).unwrap();
+            thread::park();
+        });
+        let number = receive.recv().unwrap();
+        while ThreadUse::of(number).unwrap().is_ready {
+            thread::yield_now();
+        }
+        waiting.thread().unpark();
+        waiting.join().unwrap();
     }
 }
