@@ -301,7 +301,8 @@ fn the_shutdown_continues_after_a_refusal_and_reports_it() {
     world.drive().flaws.refused.insert(at(0x6040, 0), AbortCode::General);
     let error = world.run(&mut Shutdown::new(&config)).unwrap_err();
     assert_eq!((error.failures.len(), error.failures[0].step), (1, "standstill without torque"));
-    assert_eq!(world.drive().number(0x1016, 1), 0, "the heartbeat consumer was disabled nevertheless");
+    assert_eq!(world.drive().number(0x1017, 0), 0, "its own heartbeat was switched off nevertheless");
+    assert_ne!(world.drive().number(0x1016, 1), 0, "a drive that may have torque keeps its watchdog");
 }
 
 #[test]

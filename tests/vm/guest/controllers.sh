@@ -11,7 +11,7 @@ first_bus_only "$folder/arm.toml" > "$half"
 without_first_move "$half"
 sed "/^name = \"base\"/a restart_ms = $restart_ms" "$half" > "$restarting"
 
-errors() { echo "$1 $2 $3" > /sys/module/error_counters/parameters/errors; } # INTERFACE transmit|receive COUNT
+errors() { echo "$1 $2 $3" > /sys/module/error_counters/parameters/errors; } # INTERFACE transmit|receive|alone COUNT
 
 # What the kernel says of an interface: its state, its error counters, how soon it restarts, its bit rate.
 controller() { # INTERFACE
@@ -54,6 +54,61 @@ passive() { # transmit|receive ERRORS
     end bus_error_passive
     expect "$name, in the report" "error passive" "$(reported_state)"
     errors can0 "$1" -"$((8 * $2))"
+}
+
+# While another process replaces the queue of the interface, for some cycles, the kernel throws frames away. That may stop the axes; the drives
+# are reached in either case.
+frames_thrown_away() { # COMMAND...
+    begin "frames thrown away by ${*:1:2}" 4 "$half" base=can0
+    in_motion can0
+    breaks_now
+    "$@"
+    end borne not_transmitted
+    ! grep -q "has not confirmed" "$folder/$name.txt" || fails "$name: $(grep -m 1 "has not confirmed" "$folder/$name.txt")"
+}
+
+# told NAME WORDS: a run that cannot begin says so while it tries. It is interrupted when it has, after ten seconds at the latest.
+told() {
+    local attempt
+    name=$1
+    "$TAKT" run "$half" --bus base=can0 --duration 2 > "$folder/told.txt" 2>&1 & run=$!
+    for attempt in $(seq 100); do
+        ! grep -q "$2" "$folder/told.txt" || break
+        kill -0 $run 2>/dev/null || break
+        sleep 0.1
+    done
+    kill -INT $run 2>/dev/null
+    if wait $run; then
+        fails "$name: the run has found nothing wrong"
+    elif grep -q "$2" "$folder/told.txt"; then
+        passes "$name: $(grep -m 1 "$2" "$folder/told.txt")"
+    else
+        fails "$name: $(tail -n 1 "$folder/told.txt")"
+    fi
+}
+
+begins_passive() {
+    errors can0 transmit 16
+    expect "controller before the run" "ERROR-PASSIVE 128 0 $restart_ms 1000000" "$(controller can0)"
+    told "run that begins on an error-passive controller" "error-passive"
+    errors can0 transmit -128
+}
+
+nobody_acknowledges() {
+    errors can0 alone 1
+    errors can0 transmit 16
+    told "bus on which nobody acknowledges" "no node acknowledges a frame"
+    errors can0 alone 0
+    errors can0 transmit -128
+}
+
+unfit_mode() { # MODE
+    ip link set can0 down
+    ip link set can0 up type can bitrate 1000000 restart-ms $restart_ms "$1" on
+    told "interface with $1" "$1 off"
+    ip link set can0 down
+    ip link set can0 up type can bitrate 1000000 restart-ms $restart_ms "$1" off
+    interrupts_first
 }
 
 # How often the kernel has seen an interface leave its bus, and how often it has restarted it, since there were so many of each.
@@ -133,6 +188,16 @@ configured_by_takt
 in_a_long_run warned
 in_a_long_run passive transmit 16
 in_a_long_run passive receive 128
+for length in 100 64; do
+    frames_thrown_away ip link set can0 txqueuelen $length
+    frames_thrown_away tc qdisc replace dev can0 root pfifo limit $length
+    tc qdisc del dev can0 root
+done
+begins_passive
+nobody_acknowledges
+unfit_mode listen-only
+unfit_mode loopback
+unfit_mode one-shot
 bus_off "bus-off, restart after $restart_ms ms" 1 "ERROR-ACTIVE 0 0"
 moves_again "bus-off and restart"
 in_a_long_run goes_on_after_bus_off

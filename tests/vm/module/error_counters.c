@@ -14,6 +14,11 @@
  * does on each what its data sheet says: from 96 on it warns, from 128 on it is error-passive, and beyond 255
  * transmit errors it enters the reset mode and is off the bus until its driver ends that mode. It comes back at once:
  * there is no wire on which to wait for 128 times eleven recessive bits.
+ *
+ *	echo "can0 alone 1" > /sys/module/error_counters/parameters/errors
+ *
+ * lets no other node acknowledge what can0 sends, so that its frame waits in the transmit buffer until "can0 alone 0".
+ * The errors that this costs are to be counted beside it.
  */
 #include <linux/can/dev.h>
 #include <linux/if_arp.h>
@@ -26,11 +31,17 @@
 
 /* Registers and bits of the PeliCAN mode, by their names in the data sheet. */
 #define REGISTER_MOD 0
+#define REGISTER_CMR 1
 #define REGISTER_SR 2
 #define REGISTER_IR 3
 #define REGISTER_RXERR 14
 #define REGISTER_TXERR 15
 #define MOD_RM 0x01
+/* Transmission requests, also of a frame that is to be received by its sender. */
+#define CMR_TR 0x01
+#define CMR_SRR 0x10
+#define SR_TBS 0x04
+#define SR_TCS 0x08
 #define SR_ES 0x40
 #define SR_BS 0x80
 #define IR_RI 0x01
@@ -62,6 +73,9 @@ struct chip {
 	int transmit_errors;
 	int receive_errors;
 	bool is_off;
+	bool is_alone;
+	/* The transmission request that nobody has acknowledged yet. */
+	u8 request;
 	/* Interrupts that the driver has not read yet: reading them clears them. */
 	u8 interrupts;
 };
@@ -100,6 +114,8 @@ static u8 read_reg(const struct sja1000_priv *priv, int reg)
 			value |= SR_BS | SR_ES;
 		if (worse_counter(chip) >= WARNING_LIMIT)
 			value |= SR_ES;
+		if (chip->request)
+			value &= ~(SR_TBS | SR_TCS);
 		return value;
 	case REGISTER_IR:
 		value = chip->read_reg(priv, reg);
@@ -118,13 +134,33 @@ static void write_reg(const struct sja1000_priv *priv, int reg, u8 value)
 {
 	struct chip *chip = chip_of(priv);
 
-	if (reg == REGISTER_TXERR)
+	if (reg == REGISTER_TXERR) {
 		chip->transmit_errors = value;
-	else if (reg == REGISTER_RXERR)
+	} else if (reg == REGISTER_RXERR) {
 		chip->receive_errors = value;
-	else if (reg == REGISTER_MOD && !(value & MOD_RM))
+	} else if (reg == REGISTER_MOD && !(value & MOD_RM)) {
 		chip->is_off = false;
+		chip->request = 0;
+	} else if (reg == REGISTER_CMR && value & (CMR_TR | CMR_SRR) && chip->is_alone) {
+		chip->request = value;
+		return;
+	}
 	chip->write_reg(priv, reg, value);
+}
+
+/* Others acknowledge again, or do not any more. */
+static void set_alone(struct chip *chip, bool is_alone)
+{
+	u8 request;
+
+	disable_irq(chip->dev->irq);
+	request = chip->request;
+	chip->is_alone = is_alone;
+	if (!is_alone && request) {
+		chip->request = 0;
+		chip->write_reg(chip->priv, REGISTER_CMR, request);
+	}
+	enable_irq(chip->dev->irq);
 }
 
 /* One transmission or reception more, as the driver sees it: with an interrupt where a limit is passed. */
@@ -173,6 +209,10 @@ static int set_errors(const char *text, const struct kernel_param *parameter)
 			chip = &chips[i];
 	if (!chip)
 		return -ENODEV;
+	if (!strcmp(direction, "alone")) {
+		set_alone(chip, times > 0);
+		return 0;
+	}
 	if (!strcmp(direction, "transmit")) {
 		counter = &chip->transmit_errors;
 		step = times > 0 ? 8 : -1;
@@ -209,7 +249,7 @@ static int get_errors(char *text, const struct kernel_param *parameter)
 
 static const struct kernel_param_ops errors_ops = { .set = set_errors, .get = get_errors };
 module_param_cb(errors, &errors_ops, NULL, 0644);
-MODULE_PARM_DESC(errors, "INTERFACE transmit|receive COUNT: so many errors, or successes where it is negative");
+MODULE_PARM_DESC(errors, "INTERFACE transmit|receive COUNT: so many errors, or successes where it is negative; INTERFACE alone 1|0");
 
 static bool is_ours(struct net_device *dev)
 {
