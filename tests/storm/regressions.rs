@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 28] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 29] = [
     (34_714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27_432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11_882, "The same in profile velocity"),
@@ -306,6 +306,10 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 28] = [
     (20_099, "The feedback of a bus that is too slow did not come in time, and the joint moved unseen"),
     (7_771, "A fault was reset in the cycle in which a drive that had been silent confirmed that it is off"),
     (200_041_973, "The reset of the bring-up hid a fault that had stopped the group"),
+    (
+        300_039_251,
+        "A stream led a joint back from beyond a position limit, which turned outward and inward again within a cycle, and was stopped",
+    ),
 ];
 
 /// The same of those whose streams command every kind of point.
