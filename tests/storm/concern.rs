@@ -10,7 +10,7 @@ use takt::schedule::analyse;
 use takt::sim::Defect;
 use takt_wire::canopen::nmt::{NmtCommand, NmtTarget};
 
-use crate::heartbeat::MissedHeartbeat;
+use crate::heartbeat::{Heartbeats, MissedHeartbeat};
 use crate::off_cycle::is_beside_the_cycle;
 
 /// What can no longer be expected of a joint.
@@ -38,6 +38,8 @@ pub struct Concern {
     pub is_loaded: bool,
     /// Whether its drive has missed the heartbeat, and stops by itself.
     pub missed_heartbeat: MissedHeartbeat,
+    /// Its drive has taken its power after it missed the heartbeat, and has not been enabled since.
+    pub has_cut_itself: bool,
     /// Since when nothing that is sent to its drive gets there any more: ns.
     pub unreachable_since_ns: Option<u64>,
 }
@@ -56,6 +58,7 @@ impl Concern {
             is_neglected: self.is_neglected || other.is_neglected,
             is_loaded: self.is_loaded || other.is_loaded,
             missed_heartbeat: self.missed_heartbeat.max(other.missed_heartbeat),
+            has_cut_itself: self.has_cut_itself || other.has_cut_itself,
             unreachable_since_ns: self.unreachable_since_ns.or(other.unreachable_since_ns),
         }
     }
@@ -137,10 +140,11 @@ impl Concerns {
         }
     }
 
-    /// Takes which drives have missed the heartbeat, an entry an axis.
-    pub fn note_missed_heartbeats(&mut self, missed: impl Iterator<Item = MissedHeartbeat>) {
-        for (concern, missed) in self.by_axis.iter_mut().zip(missed) {
-            concern.missed_heartbeat = missed;
+    /// Takes which drives have missed the heartbeat.
+    pub fn note_missed_heartbeats(&mut self, heartbeats: &Heartbeats) {
+        let shown = heartbeats.missed().zip(heartbeats.cut_themselves());
+        for (concern, (missed, has_cut_itself)) in self.by_axis.iter_mut().zip(shown) {
+            (concern.missed_heartbeat, concern.has_cut_itself) = (missed, has_cut_itself);
         }
     }
 
@@ -253,6 +257,7 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
             || is_flooded_by_commands,
         is_loaded: is_own && fault.kind == "load",
         missed_heartbeat: MissedHeartbeat::No,
+        has_cut_itself: false,
         unreachable_since_ns: None,
     }
 }

@@ -4,7 +4,7 @@
 
 use takt::config::{Axis, Config};
 use takt::sim::Observation;
-use takt_rt::Frame;
+use takt_rt::{DriveState, Frame};
 
 /// For so many cycles after its fault is gone, reports of it may still be under way.
 const REPORTED_CYCLES: u64 = 12;
@@ -39,6 +39,8 @@ struct Drive {
     missed: MissedHeartbeat,
     /// Cycles since that was so last.
     since_missed: u64,
+    /// True if it has shown that it missed the heartbeat, and has not been enabled since.
+    has_cut_itself: bool,
 }
 
 impl Heartbeats {
@@ -51,6 +53,7 @@ impl Heartbeats {
             },
             missed: MissedHeartbeat::No,
             since_missed: 0,
+            has_cut_itself: false,
         };
         Self {
             id: HEARTBEAT + u32::from(config.master.node),
@@ -78,6 +81,8 @@ impl Heartbeats {
                 drive.missed = MissedHeartbeat::No;
             }
             drive.since_missed += 1;
+            drive.has_cut_itself = drive.missed == MissedHeartbeat::Shown
+                || drive.has_cut_itself && truth.state != DriveState::OperationEnabled;
         }
         for (last_ns, frames) in self.sent_ns.iter_mut().zip(sent) {
             if frames.iter().any(|frame| frame.id().value() == self.id && !frame.id().is_extended()) {
@@ -90,6 +95,11 @@ impl Heartbeats {
     pub fn missed(&self) -> impl Iterator<Item = MissedHeartbeat> {
         self.drives.iter().map(|drive| drive.missed)
     }
+
+    /// Which drives have taken their power after they missed the heartbeat and have not been enabled since, an entry an axis.
+    pub fn cut_themselves(&self) -> impl Iterator<Item = bool> {
+        self.drives.iter().map(|drive| drive.has_cut_itself)
+    }
 }
 
 #[cfg(test)]
@@ -97,7 +107,7 @@ mod tests {
     use super::*;
     use crate::machine::load;
     use takt::sim::NodeState;
-    use takt_rt::{DriveState, Id};
+    use takt_rt::Id;
 
     const MILLISECOND_NS: u64 = 1_000_000;
 

@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 29] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 31] = [
     (34_714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27_432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11_882, "The same in profile velocity"),
@@ -307,16 +307,25 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 29] = [
     (7_771, "A fault was reset in the cycle in which a drive that had been silent confirmed that it is off"),
     (200_041_973, "The reset of the bring-up hid a fault that had stopped the group"),
     (
+        300_011_217,
+        "A group was enabled while one that it stops with coasted after a heartbeat was missed, and the storm blamed the controller",
+    ),
+    (300_023_254, "The same, with a fault of another drive"),
+    (
         300_039_251,
         "A stream led a joint back from beyond a position limit, which turned outward and inward again within a cycle, and was stopped",
     ),
 ];
 
 /// The same of those whose streams command every kind of point.
-const FAILED_WITH_POINTS: [(u64, &str); 3] = [
+const FAILED_WITH_POINTS: [(u64, &str); 4] = [
     (15_037, "A stream of velocities turned a joint outward again beyond its position limit"),
     (14_174, "A group that began to enable its drives took the power from those of another one"),
     (6_095, "A stream that began with an impedance was stopped in its first cycle"),
+    (
+        300_000_045,
+        "A group was enabled while one that it stops with coasted after a heartbeat was missed, and the storm blamed the controller",
+    ),
 ];
 
 /// The same of those on machines of bit fields.

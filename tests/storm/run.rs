@@ -231,7 +231,7 @@ fn play_in(world: &mut World, case: &Case) -> Result<Done, String> {
             *was_stopped = !is_led && (*was_stopped || !world.truth[axis].state.has_torque());
         }
         heartbeats.observe(&world.sent, world.snapshot.at_ns, &world.truth);
-        concerns.note_missed_heartbeats(heartbeats.missed());
+        concerns.note_missed_heartbeats(&heartbeats);
         concerns.observe(&fault_injector, |fault| {
             let phase = before.groups()[concerned_group(config, &case.scenario.faults[fault])].phase;
             outcomes

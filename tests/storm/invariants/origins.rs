@@ -24,6 +24,8 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             .get(usize::from(axis))
             .is_some_and(|concern| concern.missed_heartbeat != MissedHeartbeat::No)
     };
+    let has_cut_itself =
+        |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.has_cut_itself);
     let is_crowded = |axis: u8| {
         let is_overloaded =
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus]);
@@ -104,6 +106,8 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::DriveDisabled,
             Origin::Axis(axis),
         ) if has_missed_heartbeat(axis) => true,
+        // A group that has been enabled since stops with one whose joint coasts to rest without power, long after the alarm.
+        (Rule::DriveDisabled, Origin::Axis(axis)) if has_cut_itself(axis) => true,
         (Rule::NodeNotOperational, Origin::Axis(axis)) if has_missed_heartbeat(axis) => {
             is_troubled(axis)
                 || reason.cause == StopCause::Fault(Fault::NodeNotOperational { state: STOPPED })
