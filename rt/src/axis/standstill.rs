@@ -2,6 +2,10 @@
 //!
 //! A low velocity alone is no rest. A joint that turns round is slow for a moment, and so is one that a torque has only begun to
 //! move. How far such a joint goes in a known time bounds how fast it is in the end.
+//!
+//! A position is known to some counts of the encoder: it flickers by that much at rest. A place is no smaller than that, and where
+//! the velocity limit is low and the encoder coarse, it takes longer to show that a joint stands there: as long as a joint at
+//! the mean speed that is allowed would take to leave the place.
 
 use super::reception::ReportSpan;
 use super::{AT_REST, SETTLED_CYCLES};
@@ -13,6 +17,14 @@ pub(super) const STANDING_REPORTS: u32 = 5 * SETTLED_CYCLES;
 /// in the middle of them is four times as fast at their end as its mean speed from end to end of its place. Until its drive has
 /// obeyed the command that takes its power it gets faster by up to half of that again.
 const PLACE: f64 = AT_REST / 6.0;
+
+/// How large a place is at least, in counts of the encoder: noise of three counts either way, and the rounding of a position
+/// between two counts.
+const NOISE_COUNTS: f64 = 8.0;
+
+/// A joint that has been in a place of the size of the noise for this long is at rest, in seconds. The encoder shows no lower
+/// speed sooner: 8 counts of 2^17 a turn in this time are a mean speed of 0.0015 rad/s.
+const LONGEST_S: f64 = 0.25;
 
 /// The place where a joint has been reported lately.
 #[derive(Clone, Copy, Debug, Default)]
@@ -29,14 +41,15 @@ pub(super) struct Standstill {
 }
 
 impl Standstill {
-    /// Takes a reported position. `count` is the resolution of the drive's encoder, by which the position of a standing joint may
-    /// change. Over slots that were missed it is not known in which time the joint has moved how far: such a report does not count.
+    /// Takes a reported position. `count` is the resolution of the drive's encoder, by some of which the position of a standing joint
+    /// changes. Over slots that were missed it is not known in which time the joint has moved how far: such a report does not count.
     #[inline]
     pub(super) fn note(&mut self, position: f64, span: ReportSpan, velocity_limit: f64, count: f64) {
-        let farthest = PLACE * velocity_limit * f64::from(STANDING_REPORTS) * span.cycle_s;
+        let reach = |reports: u32| PLACE * velocity_limit * f64::from(reports) * span.cycle_s;
+        let farthest = reach(STANDING_REPORTS).max(NOISE_COUNTS * count);
         let (lowest, highest) = self.place.unwrap_or((position, position));
         let (lowest, highest) = (lowest.min(position), highest.max(position));
-        if highest - lowest > farthest.max(1.5 * count) {
+        if highest - lowest > farthest {
             let left_at = (highest - lowest) / (f64::from(self.reports + 1) * span.cycle_s);
             *self = Self { place: Some((position, position)), reports: 0, is_at_rest: false, left_at };
             return;
@@ -44,7 +57,9 @@ impl Standstill {
         let has_counted = self.place.is_some() && span.is_known;
         self.reports += u32::from(has_counted);
         self.place = Some((lowest, highest));
-        if self.reports >= STANDING_REPORTS {
+        let is_shown =
+            |reports: u32| reach(reports) >= farthest || f64::from(reports) * span.cycle_s >= LONGEST_S;
+        if self.reports >= STANDING_REPORTS && is_shown(self.reports) {
             // From here on anew: a joint may creep out of a place in a long time.
             *self = Self { place: Some((position, position)), reports: 0, is_at_rest: true, left_at: 0.0 };
         }
@@ -68,7 +83,7 @@ mod tests {
 
     const CYCLE_S: f64 = 1e-3;
     const VELOCITY_LIMIT: f64 = 1.0;
-    const COUNT: f64 = 1.2e-5;
+    const COUNT: f64 = 2e-6;
 
     fn note(standstill: &mut Standstill, position: f64, is_known: bool) {
         let counts = (position / COUNT).round();
@@ -103,6 +118,75 @@ mod tests {
     fn a_joint_is_at_rest_that_its_encoder_reports_one_count_to_and_fro() {
         let flickering = |at_s: f64| COUNT * f64::from((at_s / CYCLE_S).round() as u32 % 2);
         assert!(speed_at_rest(flickering).is_some());
+    }
+
+    /// A joint whose encoder has this many counts a turn, behind a gear of this ratio, and noise of up to so many counts either way.
+    #[derive(Clone, Copy, Debug)]
+    struct Noisy {
+        counts_per_turn: f64,
+        gear_ratio: f64,
+        noise: i32,
+        cycle_s: f64,
+    }
+
+    impl Noisy {
+        const VELOCITY_LIMIT: f64 = 5.0 * core::f64::consts::PI / 180.0;
+
+        fn all() -> impl Iterator<Item = Self> {
+            let encoders =
+                [17, 19, 20].into_iter().flat_map(|bits| [1.0, 50.0, 100.0].map(|ratio| (bits, ratio)));
+            let noisy = encoders.flat_map(|encoder| [0, 1, 2, 3].map(|noise| (encoder, noise)));
+            noisy.flat_map(|((bits, gear_ratio), noise)| {
+                [1e-3, 2e-3].map(|cycle_s| Self {
+                    counts_per_turn: f64::from(1 << bits),
+                    gear_ratio,
+                    noise,
+                    cycle_s,
+                })
+            })
+        }
+
+        /// The times at which a joint that is there is taken to be at rest, within so many seconds.
+        fn rests(self, position: impl Fn(f64) -> f64, duration_s: f64) -> impl Iterator<Item = f64> {
+            let count = core::f64::consts::TAU / (self.counts_per_turn * self.gear_ratio);
+            let (mut standstill, mut random) = (Standstill::default(), 1_u32);
+            let cycles = (duration_s / self.cycle_s) as u32;
+            (0..cycles).filter_map(move |cycle| {
+                random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let noise = (random >> 8) as i32 % (2 * self.noise + 1) - self.noise;
+                let at_s = f64::from(cycle) * self.cycle_s;
+                let counts = (position(at_s) / count).round() + f64::from(noise);
+                let span = ReportSpan { longest_s: self.cycle_s, cycle_s: self.cycle_s, is_known: true };
+                standstill.note(counts * count, span, Self::VELOCITY_LIMIT, count);
+                standstill.is_at_rest().then_some(at_s)
+            })
+        }
+    }
+
+    #[test]
+    fn a_joint_stands_however_its_encoder_flickers_by_some_counts() {
+        for noisy in Noisy::all() {
+            // Half way between two counts.
+            let place = 0.3 + 0.5 * core::f64::consts::TAU / (noisy.counts_per_turn * noisy.gear_ratio);
+            let mut rests = noisy.rests(|_| place, 20.0);
+            let first_s = rests.next().unwrap_or(f64::INFINITY);
+            assert!(first_s <= LONGEST_S + noisy.cycle_s, "{noisy:?}: at rest after {first_s} s");
+            let (count, cycles) = (rests.count() + 3, ((20.0 - first_s) / noisy.cycle_s) as usize);
+            assert!(count >= cycles, "{noisy:?}: at rest in {count} of {cycles} cycles");
+        }
+    }
+
+    #[test]
+    fn a_joint_that_drifts_or_swings_by_more_than_the_noise_is_not_at_rest() {
+        for noisy in Noisy::all() {
+            for drift in [0.01, -0.01, 0.03] {
+                assert_eq!(noisy.rests(|at_s| drift * at_s, 5.0).next(), None, "{noisy:?}: {drift} rad/s");
+            }
+            for frequency_hz in [5.0, 20.0, 50.0, 100.0] {
+                let swinging = |at_s: f64| 1e-3 * (core::f64::consts::TAU * frequency_hz * at_s + 0.1).sin();
+                assert_eq!(noisy.rests(swinging, 5.0).next(), None, "{noisy:?}: {frequency_hz} Hz");
+            }
+        }
     }
 
     #[test]
