@@ -367,6 +367,10 @@ fn put_trajectory_error(error: &TrajectoryError, put: &mut Put) {
         TrajectoryError::NoRoomToStop { axis, rest, limit } => {
             put.word(11).index(axis).number(rest).number(limit)
         }
+        TrajectoryError::Excursion { point, axis, time_s, position, nearest, present, velocity } => {
+            put.word(12).index(point).index(axis).number(time_s).number(position);
+            put.number(nearest).number(present).number(velocity)
+        }
     };
 }
 
@@ -415,6 +419,15 @@ fn take_trajectory_error(take: &mut Take<'_>) -> Result<TrajectoryError, Malform
         11 => {
             TrajectoryError::NoRoomToStop { axis: take.index()?, rest: take.number()?, limit: take.number()? }
         }
+        12 => TrajectoryError::Excursion {
+            point: take.index()?,
+            axis: take.index()?,
+            time_s: take.number()?,
+            position: take.number()?,
+            nearest: take.number()?,
+            present: take.number()?,
+            velocity: take.number()?,
+        },
         _ => return Err(Malformed),
     })
 }

@@ -88,6 +88,33 @@ fn position_violation(
     })
 }
 
+/// How far a polynomial leads outside of the positions at its ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Excursion {
+    /// Since the beginning of the polynomial, in seconds.
+    pub time_s: f64,
+    pub position: f64,
+    /// The position at the nearer end.
+    pub nearest: f64,
+}
+
+impl Excursion {
+    pub(super) fn distance(&self) -> f64 {
+        (self.position - self.nearest).abs()
+    }
+}
+
+/// Returns the position that is farthest outside of those at both ends, if the axis turns round on its way.
+pub(super) fn excursion(polynomial: &Polynomial, duration_s: f64) -> Option<Excursion> {
+    let of = Derivatives::of(polynomial);
+    let [first, last] = [0.0, duration_s].map(|time_s| value(&of.position, time_s));
+    let turns = sign_changes(&of.velocity, duration_s).into_iter().map(|time_s| {
+        let position = value(&of.position, time_s);
+        Excursion { time_s, position, nearest: position.max(first.min(last)).min(first.max(last)) }
+    });
+    turns.max_by(|one, other| one.distance().total_cmp(&other.distance()))
+}
+
 /// A position that is beyond a limit, and the limit.
 pub(super) fn position_beyond(position: f64, limits: &AxisLimits) -> Option<(BrokenLimit, f64, f64)> {
     let room = TOLERANCE * (limits.position_max - limits.position_min);

@@ -134,6 +134,24 @@ pub enum TrajectoryError {
         /// The limit, with the sign of the value.
         limit: f64,
     },
+    /// The way to the first point leads far out of the positions at both ends: by more than twice the shortest stop from the velocity
+    /// at its beginning and the shortest run-up to that of the point.
+    Excursion {
+        /// The point.
+        point: usize,
+        /// The axis.
+        axis: usize,
+        /// When the axis is farthest out, in seconds after the beginning.
+        time_s: f64,
+        /// Where it is then.
+        position: f64,
+        /// The position at the nearer end of the way.
+        nearest: f64,
+        /// The velocity at the beginning.
+        present: f64,
+        /// The velocity at the point.
+        velocity: f64,
+    },
     /// A waypoint cannot be reached from the present motion within the limits.
     Unreachable {
         /// The waypoint.
@@ -169,6 +187,7 @@ impl TrajectoryError {
             | Self::Time { point, .. }
             | Self::TimeOrder { point, .. }
             | Self::Limit { point, .. }
+            | Self::Excursion { point, .. }
             | Self::Unreachable { point, .. } => Some(point),
             Self::Start { .. } => Some(0),
             Self::NoPoint | Self::EndAcceleration { .. } | Self::NoRoomToStop { .. } => None,
@@ -182,6 +201,7 @@ impl TrajectoryError {
             | Self::NotFinite { axis, .. }
             | Self::Start { axis, .. }
             | Self::Limit { axis, .. }
+            | Self::Excursion { axis, .. }
             | Self::Unreachable { axis, .. }
             | Self::EndAcceleration { axis, .. }
             | Self::NoRoomToStop { axis, .. } => Some(axis),
@@ -236,6 +256,15 @@ impl TrajectoryError {
                     limit = Shown(limit)
                 )
             }
+            Self::Excursion { time_s, position, nearest, present, velocity, .. } => format!(
+                "from the velocity {present:.6} to its velocity {velocity:.6}, the way to it turns round at {position:.6} \
+                 ({time_s:.6} s), beyond {nearest:.6}; give it an earlier time, the velocity 0, or points on the way to it",
+                present = Shown(present),
+                velocity = Shown(velocity),
+                position = Shown(position),
+                time_s = Shown(time_s),
+                nearest = Shown(nearest)
+            ),
             Self::Unreachable { .. } => {
                 "it cannot be reached from the present motion within the limits".to_owned()
             }

@@ -49,6 +49,9 @@ pub use time_law::RateError;
 const SAME_POSITION: f64 = 1e-6;
 /// The same for its velocity, relative to the limit; and for its acceleration.
 const SAME_RATE: f64 = 1e-6;
+/// How far the way to the first point may lead out of the positions at its ends, as a multiple of the shortest stop and the shortest
+/// run-up: polynomials do not use the limits to the full.
+const EXCURSION: f64 = 2.0;
 
 /// What a trajectory has to begin from and to keep, an axis each.
 #[derive(Clone, Copy, Debug)]
@@ -84,7 +87,10 @@ impl Trajectory {
     /// A trajectory through these points, from the present set-points.
     ///
     /// A first point at the time 0 must be where the axes are. With a later one the trajectory goes there first, from the present
-    /// position, velocity and acceleration. Without velocities it ends at rest, and is nowhere beyond the points on both sides of it
+    /// position, velocity and acceleration. An axis that stands at this point waits there. On this way no axis goes farther out of its
+    /// present position and that of the point than twice the shortest stop from its velocity and the shortest run-up to that of the
+    /// point: a point that is passed in motion does not make it swing far back in a long time before
+    /// ([`TrajectoryError::Excursion`]). Without velocities the trajectory ends at rest, and is nowhere beyond the points on both sides of it
     /// ([`Interpolation::Monotone`]).
     ///
     /// # Errors
@@ -146,6 +152,9 @@ impl Trajectory {
             .collect();
         let path = Path::new(&knot_times, &of_axes, first);
         path.check(conditions.limits)?;
+        if is_from_here {
+            path.check_way_to_first_point(&columns, interpolation, conditions)?;
+        }
         for (axis, (points, limits)) in columns.iter().zip(conditions.limits).enumerate() {
             check_end(axis, points, limits, conditions.period_s)?;
         }
@@ -238,6 +247,47 @@ impl Path {
         }
         Ok(())
     }
+
+    /// Checks that the way to the first point turns round no farther out than the velocities at its ends ask for. The time before
+    /// that point would be the lever of an excursion. A spline may swing: that is what it is chosen for.
+    fn check_way_to_first_point(
+        &self,
+        axes: &[AxisPoints],
+        interpolation: Interpolation,
+        conditions: &TrajectoryConditions<'_>,
+    ) -> Result<(), TrajectoryError> {
+        let duration_s = self.times_s.get(1).copied().unwrap_or(0.0);
+        let ways = axes.iter().zip(&self.polynomials).zip(conditions.start.iter().zip(conditions.limits));
+        for (axis, ((points, polynomial), (start, limits))) in ways.enumerate() {
+            if points.velocities.is_none() && interpolation == Interpolation::Spline {
+                continue;
+            }
+            let Some(found) = check::excursion(polynomial, duration_s) else { continue };
+            let velocity = polynomial.state(duration_s).velocity;
+            if found.distance() > EXCURSION * stop_and_run_up(start, velocity, limits) + SAME_POSITION {
+                let check::Excursion { time_s, position, nearest } = found;
+                let (point, present) = (self.point(0), start.velocity);
+                return Err(TrajectoryError::Excursion {
+                    point,
+                    axis,
+                    time_s,
+                    position,
+                    nearest,
+                    present,
+                    velocity,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns the distance of a stop from this state and of a run-up to this velocity. A run-up is a stop that is played backwards.
+fn stop_and_run_up(start: &State, velocity: f64, limits: &AxisLimits) -> f64 {
+    let AxisLimits { acceleration, deceleration, .. } = *limits;
+    let backwards = AxisLimits { acceleration: deceleration, deceleration: acceleration, ..*limits };
+    braking_distance(limits, start.velocity.abs(), start.acceleration.abs())
+        + braking_distance(&backwards, velocity.abs(), 0.0)
 }
 
 fn check_times(times_s: &[f64]) -> Result<(), TrajectoryError> {

@@ -92,6 +92,47 @@ fn a_trajectory_goes_on_from_an_axis_in_motion_without_a_step() {
     }
 }
 
+/// How far an axis is outside of its first position and the first point, at most, before that point.
+fn excursion(trajectory: &Trajectory, first_s: f64) -> f64 {
+    let position = |step: i32| trajectory.sample(first_s * f64::from(step) / 1_000.0).states[0].position;
+    let (lowest, highest) = (position(0).min(position(1_000)), position(0).max(position(1_000)));
+    (0..=1_000).map(|step| (position(step) - highest).max(lowest - position(step))).fold(0.0, f64::max)
+}
+
+#[test]
+fn a_wait_is_no_part_of_the_run_up_to_a_first_point_in_motion() {
+    for wait_s in [1.0, 2.0, 5.0, 10.0, 20.0, 60.0] {
+        let points = [with_velocity(wait_s, 0.0, 0.3), with_velocity(wait_s + 1.5, 0.3, 0.0)];
+        let error = from_rest(&points).unwrap_err();
+        assert_eq!((error.point(), error.axis()), (Some(0), Some(0)), "{wait_s} s: {error}");
+        // The axis that goes on for so long leaves its way, too, with velocities at the points or without.
+        let start = [State { position: 0.2, velocity: 0.3, acceleration: 0.0 }];
+        for points in [[point(wait_s, &[0.2])], [with_velocity(wait_s, 0.2, 0.0)]] {
+            let error = from(&start, &points).unwrap_err();
+            assert_eq!((error.point(), error.axis()), (Some(0), Some(0)), "{wait_s} s: {error}");
+        }
+        // Standing, it waits and then begins.
+        let waiting = from_rest(&[with_velocity(wait_s, 0.0, 0.0), with_velocity(wait_s + 1.5, 0.3, 0.0)]);
+        assert_eq!(excursion(&waiting.unwrap(), wait_s), 0.0);
+    }
+}
+
+#[test]
+fn a_first_point_in_motion_is_reached_by_a_run_up_that_its_velocity_asks_for() {
+    let most = EXCURSION * stop_and_run_up(&State::rest(0.0), 0.3, &LIMITS);
+    for (time_s, position) in [(0.3, 0.0), (0.3, 0.03), (1.0, 0.15), (1.0, 0.12), (4.0, 1.0)] {
+        let points = [with_velocity(time_s, position, 0.3), with_velocity(time_s + 1.5, position + 0.3, 0.0)];
+        let trajectory = from_rest(&points).unwrap();
+        assert!(excursion(&trajectory, time_s) <= most + SAME_POSITION, "{time_s} s, {position}");
+    }
+    // As a planner sends them: from the present state, at rest or in motion, at the time 0.
+    for velocity in [0.0, 0.4] {
+        let start = [State { position: 0.1, velocity, acceleration: 0.0 }];
+        let points = [with_velocity(0.0, 0.1, velocity), with_velocity(1.5, 0.4, 0.0)];
+        assert!(from(&start, &points).is_ok(), "{velocity}");
+    }
+}
+
 #[test]
 fn the_way_to_the_first_point_and_each_later_one_is_checked() {
     let limit_of = |points: &[TrajectoryPoint]| match from_rest(points).unwrap_err() {

@@ -125,7 +125,7 @@ class Group:
 
         Without `qd` a smooth curve leads through the points and ends at rest; nowhere is it beyond the points on both sides of it. All of
         it is checked before anything moves: `TrajectoryError` has the first point, axis and limit. A first point at 0 must be where the
-        axes are. While another trajectory is under way, this one takes its place without a step.
+        axes are; with a later one they go there first, unless that way would swing far out for a velocity at the point or now. While another trajectory is under way, this one takes its place without a step.
         """
 
     def follow(self) -> Stream:
