@@ -102,6 +102,12 @@ impl Client {
         is_held.then_some(LeaseHolder { process: lease.process, expires_in: Duration::from_nanos(left_ns) })
     }
 
+    /// Returns the number of times that the lease has changed hands. If it is another one than before, another client has commanded since
+    /// then, or this one has taken the lease.
+    pub fn lease_generation(&self) -> u64 {
+        self.0.shown.lease().generation
+    }
+
     /// See [`Handle::state`](crate::Handle::state). An ordinary thread shows it to other processes, shortly after it is complete.
     pub fn state(&self) -> Snapshot {
         self.0.shown.state().snapshot

@@ -1,26 +1,24 @@
 //! The session in zenoh, and the controller of another process.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use takt::rt::linux::MonotonicClock;
-use takt::rt::{Clock, StopCategory};
+use takt::rt::{RequestTarget, StopCategory};
 use takt::telemetry::CdrEncoder;
-use takt::{Client, CommandError, ConnectError, Snapshot, WaitError};
+use takt::{Client, ConnectError, RunningController, Snapshot, WaitError};
 use thiserror::Error;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::{Session, Wait};
 
+use crate::arrival::{Arrival, Stops};
 use crate::attachment::attachment;
-use crate::inbox::{Inbox, Taken};
+use crate::carrier::{Carrier, LOOK, Message};
+use crate::clock::{day_ns_of, time_of_day_ns};
+use crate::inbox::Inbox;
 use crate::messages::{JointState, JointTrajectory};
-use crate::motion::{AxisPlace, Unfit, Wanted, wanted};
+use crate::motion::AxisPlace;
 use crate::names::{Gid, JOINT_STATE, JOINT_TRAJECTORY, Kind, Node, gid, is_topic};
-
-/// How often the end is looked for.
-const LOOK: Duration = Duration::from_millis(100);
 
 /// Where the controller is, and what it is in the graph.
 #[derive(Clone, Debug)]
@@ -93,7 +91,8 @@ pub struct Bridge {
     axes: Vec<AxisPlace>,
     publisher: Publisher<'static>,
     gid: Gid,
-    inbox: Arc<Inbox>,
+    inbox: Arc<Inbox<Message>>,
+    stops: Mutex<Stops>,
     // In the graph for as long as they are here. The session closes after what it has declared.
     _subscriber: Option<Subscriber<()>>,
     _tokens: Vec<LivelinessToken>,
@@ -133,10 +132,12 @@ impl Bridge {
             .declare_publisher(node.topic(&options.states, &JOINT_STATE))
             .wait()
             .map_err(refused("the topic of the joint states"))?;
+        // Before a trajectory can come.
+        let stops = Mutex::new(Stops::new(&controller));
         let inbox = Arc::new(Inbox::default());
         let subscriber = options.trajectories.as_ref().map(|topic| {
-            let (receiving, stopping) = (Arc::clone(&inbox), controller.clone());
-            subscribe(&session, node.topic(topic, &JOINT_TRAJECTORY), receiving, stopping, lost)
+            let (receiving, controller) = (Arc::clone(&inbox), controller.clone());
+            subscribe(&session, node.topic(topic, &JOINT_TRAJECTORY), receiving, controller, lost)
         });
         let subscriber = subscriber.transpose()?;
         let token = |key: String| {
@@ -154,6 +155,7 @@ impl Bridge {
             publisher,
             gid,
             inbox,
+            stops,
             _subscriber: subscriber,
             _tokens: tokens,
             _session: session,
@@ -203,83 +205,9 @@ impl Bridge {
     }
 
     fn carry_out(&self, is_over: &impl Fn() -> bool, tell: &impl Fn(&str)) {
-        let mut later: Vec<Later> = vec![];
-        while !is_over() {
-            let next = later.iter().map(|later| later.due.saturating_duration_since(Instant::now())).min();
-            let taken = self.inbox.take(next.map_or(LOOK, |next| next.min(LOOK)));
-            if let Some(Taken { message, stops }) = taken {
-                match JointTrajectory::decode(&message) {
-                    Some(trajectory) => self.receive(trajectory, stops, &mut later, tell),
-                    None => tell(&format!("a trajectory was refused: {}", Unfit::NotCdr)),
-                }
-            }
-            // Whatever waits at the time of a stop is discarded.
-            later.retain(|later| later.stops == self.inbox.stops());
-            let now = Instant::now();
-            for Later { trajectory, stops, .. } in later.extract_if(.., |later| later.due <= now) {
-                self.carry_out_now(&trajectory, stops, tell);
-            }
-        }
-    }
-
-    /// Begins a trajectory, or lets it wait for its time. It takes the place of those of its group that wait.
-    fn receive(&self, trajectory: JointTrajectory, stops: u64, later: &mut Vec<Later>, tell: &impl Fn(&str)) {
-        if let Ok(Wanted::Execute { group, delay, .. }) = self.wanted(&trajectory) {
-            later.retain(|later| later.group != group);
-            if !delay.is_zero() {
-                tell(&format!("a trajectory begins in {:.3} s", delay.as_secs_f64()));
-                let due = Instant::now() + delay;
-                later.push(Later {
-                    due,
-                    group,
-                    stops,
-                    trajectory: JointTrajectory { at_ns: 0, ..trajectory },
-                });
-                return;
-            }
-        }
-        self.carry_out_now(&trajectory, stops, tell);
-    }
-
-    fn carry_out_now(&self, trajectory: &JointTrajectory, stops: u64, tell: &impl Fn(&str)) {
-        match self.wanted(trajectory) {
-            Err(reason) => tell(&format!("a trajectory was refused: {reason}")),
-            Ok(wanted) => match self.begin(&wanted) {
-                Err(reason) => {
-                    let reason = reason.naming(&self.axes_of(&wanted));
-                    tell(&format!("a trajectory was refused: {reason}"));
-                }
-                Ok(()) => tell(&words_of(&wanted)),
-            },
-        }
-        // A stop that has come meanwhile may have overtaken what has just begun.
-        if self.inbox.stops() != stops {
-            let _ = self.controller.stop(StopCategory::Two);
-        }
-    }
-
-    fn wanted(&self, trajectory: &JointTrajectory) -> Result<Wanted, Unfit> {
-        let groups = &self.controller.machine().groups;
-        wanted(trajectory, &self.axes, groups, &self.controller.state(), time_of_day_ns())
-    }
-
-    /// The names of the axes that it is for.
-    fn axes_of(&self, wanted: &Wanted) -> Vec<&str> {
-        let is_for = |axis: &&AxisPlace| match wanted {
-            Wanted::Stop => true,
-            Wanted::Execute { group, .. } => axis.group == *group,
-        };
-        self.axes.iter().filter(is_for).map(|axis| axis.name.as_str()).collect()
-    }
-
-    fn begin(&self, wanted: &Wanted) -> Result<(), CommandError> {
-        match wanted {
-            Wanted::Stop => self.controller.stop(StopCategory::Two),
-            Wanted::Execute { group, points, .. } => match self.controller.machine().groups.get(*group) {
-                Some(group) => self.controller.group(group)?.execute(points).map(drop),
-                None => self.controller.execute(points).map(drop),
-            },
-        }
+        // A panic of another holder of the lock leaves the stops as they are.
+        let mut stops = self.stops.lock().unwrap_or_else(PoisonError::into_inner);
+        Carrier::new(&self.controller, &self.axes, &self.inbox, &mut stops, tell).run(is_over);
     }
 }
 
@@ -287,19 +215,22 @@ impl Bridge {
 fn subscribe(
     session: &Session,
     topic: String,
-    receiving: Arc<Inbox>,
-    stopping: Client,
+    receiving: Arc<Inbox<Message>>,
+    controller: Client,
     lost: impl Fn() + Send + Sync + 'static,
 ) -> Result<Subscriber<()>, BridgeError> {
     session
         .declare_subscriber(topic)
         .callback(move |sample| {
-            let message = sample.payload().to_bytes().into_owned();
-            if JointTrajectory::decode(&message).is_some_and(|trajectory| trajectory.points.is_empty()) {
-                receiving.put_stop(message);
-                // It waits for nobody. The thread that carries commands out stops once more, and says why it cannot.
-                let _ = stopping.stop(StopCategory::Two);
-            } else if !receiving.put(message) {
+            let message = match JointTrajectory::decode(&sample.payload().to_bytes()) {
+                Some(trajectory) if trajectory.points.is_empty() => {
+                    receiving.stop();
+                    return stop_at_once(&controller, &receiving);
+                }
+                Some(trajectory) => Message::Trajectory(trajectory, Arrival::now(&controller)),
+                None => Message::Unreadable,
+            };
+            if !receiving.put(message) {
                 lost();
             }
         })
@@ -307,22 +238,17 @@ fn subscribe(
         .map_err(refused("the topic of the trajectories"))
 }
 
-/// A trajectory that waits for its time.
-struct Later {
-    due: Instant,
-    group: usize,
-    /// The stops that had come before it.
-    stops: u64,
-    trajectory: JointTrajectory,
-}
-
-fn words_of(wanted: &Wanted) -> String {
-    match wanted {
-        Wanted::Stop => "a trajectory without points: the axes come to rest and hold".to_owned(),
-        Wanted::Execute { points, .. } => {
-            let seconds = points.last().map_or(0.0, |point| point.time_s);
-            format!("a trajectory of {} points has begun, {seconds:.3} s", points.len())
-        }
+/// Stops the axes. It waits for no message before it, and until the stop shows: it discards none that comes after it.
+fn stop_at_once(controller: &Client, receiving: &Inbox<Message>) {
+    let newest = || controller.newest_stop(RequestTarget::All);
+    let before = newest();
+    let is_sent = controller.stop(StopCategory::Two).is_ok();
+    // The thread that carries messages out tries again, and says why it cannot.
+    let _ = receiving.put(Message::Stop { is_sent });
+    if is_sent {
+        let taken_in = |state: &Snapshot| (newest() != before).then_some(state.slot);
+        let slot = controller.wait_until(LOOK, taken_in);
+        let _ = slot.and_then(|slot| controller.cycle_after(slot, LOOK));
     }
 }
 
@@ -350,14 +276,5 @@ fn encode<'e>(encoder: &'e mut CdrEncoder, names: &[String], state: &Snapshot) -
     message.encode(encoder)
 }
 
-/// The time of day in ns since 1970.
-fn time_of_day_ns() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
-}
-
-/// The time of day of a moment on the clock of the controller, which is that of this computer.
-fn day_ns_of(monotonic_ns: u64) -> u64 {
-    let age_ns = MonotonicClock::default().now_ns().saturating_sub(monotonic_ns);
-    u64::try_from(time_of_day_ns()).unwrap_or_default().saturating_sub(age_ns)
-}
+#[cfg(test)]
+mod tests;
