@@ -5,7 +5,7 @@ use std::fmt;
 /// A process at the other end of a lock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Process {
-    /// Its process ID; 0 for a process in a container, which cannot be seen from here.
+    /// Its process ID; 0 for a process that cannot be seen from here: in a container, or of another user where it answers nothing.
     pub pid: i32,
     /// The user it belongs to.
     pub user: u32,
@@ -21,7 +21,7 @@ impl Process {
 impl fmt::Display for Process {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.pid {
-            0 => write!(f, "a process in a container (user {})", self.user),
+            0 => write!(f, "a process that cannot be seen from here (user {})", self.user),
             pid => write!(f, "process {pid} (user {})", self.user),
         }
     }

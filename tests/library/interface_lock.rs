@@ -4,10 +4,12 @@
 use std::env;
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
+use std::os::fd::{AsRawFd, OwnedFd};
 use std::os::unix::fs::PermissionsExt;
 use std::process::{Child, ChildStdout, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use nix::sys::socket::{AddressFamily, Backlog, SockFlag, SockType, UnixAddr, bind, connect, listen, socket};
 use nix::unistd::{geteuid, getuid};
 use takt::internals::link::ownership::{
     InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError,
@@ -125,6 +127,35 @@ fn process_that_takes_over() {
     }
 }
 
+/// A socket with the name of the lock.
+fn squatting(interface: &str) -> (OwnedFd, UnixAddr) {
+    let address = UnixAddr::new_abstract(format!("takt/master/{interface}").as_bytes()).unwrap();
+    let socket = unix_socket();
+    bind(socket.as_raw_fd(), &address).unwrap();
+    (socket, address)
+}
+
+fn unix_socket() -> OwnedFd {
+    socket(AddressFamily::Unix, SockType::Stream, SockFlag::SOCK_NONBLOCK, None).unwrap()
+}
+
+/// Connects until no further connection finds room.
+fn fill(address: &UnixAddr) -> Vec<OwnedFd> {
+    std::iter::from_fn(|| {
+        let connecting = unix_socket();
+        connect(connecting.as_raw_fd(), address).is_ok().then_some(connecting)
+    })
+    .collect()
+}
+
+#[test]
+#[ignore = "the other process of a test below"]
+fn squatter_that_does_not_listen() {
+    let _squatting = squatting(&env::var(INTERFACE).unwrap());
+    say("held");
+    let _ = std::io::stdin().read_line(&mut String::new());
+}
+
 #[track_caller]
 fn holder_of(interface: &str) -> Process {
     match InterfaceLock::take(Role::Master, interface) {
@@ -196,6 +227,44 @@ fn a_holder_that_gives_no_answer_keeps_its_lock_and_is_named() {
         other => panic!("{other:?}"),
     }
     assert_eq!(holder_of(&name).pid, other.pid());
+}
+
+#[test]
+fn a_socket_with_the_name_that_accepts_no_connection_keeps_nobody_waiting_and_its_owner_is_named() {
+    let name = interface("squatting");
+    let (socket, address) = squatting(&name);
+    let owner = Process { pid: i32::try_from(std::process::id()).unwrap(), user: geteuid().as_raw() };
+    let check = || {
+        let began = Instant::now();
+        assert_eq!(holder_of(&name), owner);
+        match InterfaceLock::take_over(Role::Master, &name) {
+            Err(TakeOverError::NotReleased { holder, error: ReleaseError::Unanswered }) => {
+                assert_eq!(holder, owner);
+            }
+            other => panic!("{other:?}"),
+        }
+        assert!(began.elapsed() < Duration::from_secs(10), "{:?}", began.elapsed());
+    };
+    check();
+    listen(&socket, Backlog::new(0).unwrap()).unwrap();
+    let connections = fill(&address);
+    assert!(!connections.is_empty());
+    check();
+    drop((socket, connections));
+    assert!(InterfaceLock::take(Role::Master, &name).is_ok());
+}
+
+#[test]
+fn another_user_that_has_the_name_and_does_not_listen_is_named() {
+    if !geteuid().is_root() {
+        eprintln!("skipped: only root can start a process of another user");
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let name = interface("stranger");
+    let mut other = Other::start_as_nobody(&folder, "squatter_that_does_not_listen", &name);
+    assert_eq!(other.line(), "held");
+    assert_eq!(holder_of(&name), Process { pid: other.pid(), user: NOBODY });
 }
 
 /// Whoever only wanted to know the holder, or says nothing, keeps nobody from asking.

@@ -4,16 +4,21 @@
 //! it when the process ends, also after `kill -9`. It needs no folder, no rights and no cleaning up, and it works across
 //! users. Like the interface itself, the name belongs to one network namespace. A second process that connects learns
 //! from the kernel which process holds the lock. It may ask that process to stop in control and to release the lock.
+//!
+//! Any process can bind the name and accept no connection, so nothing waits for a holder without a bound.
 
 use std::io::{self, ErrorKind, Read, Write};
+use std::os::fd::AsRawFd;
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixListener, UnixStream};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use nix::sys::socket::{getsockopt, sockopt::PeerCredentials};
+use nix::sys::socket::sockopt::PeerCredentials;
+use nix::sys::socket::{AddressFamily, SockFlag, SockType, UnixAddr, connect, getsockopt, socket};
 use nix::unistd::geteuid;
 
+use super::name_owner;
 use crate::link::process::Process;
 
 /// The request to the holder, and its answers.
@@ -23,6 +28,8 @@ const DENIED: u8 = b'n';
 
 /// The pause before the next attempt, when another process is just taking or releasing the lock.
 const RETRY: Duration = Duration::from_millis(5);
+/// How long to try to connect to the holder. A healthy one accepts connections about once in a millisecond.
+const CONNECT_PATIENCE: Duration = Duration::from_secs(1);
 /// How long to wait for the answer. A healthy holder polls for requests about once in a millisecond.
 const ANSWER_PATIENCE: Duration = Duration::from_secs(2);
 /// How long to wait for the release. A controlled stop takes a few seconds at most.
@@ -90,8 +97,18 @@ pub struct InterfaceLock {
     waiting: Vec<UnixStream>,
 }
 
-fn address(role: Role, interface: &str) -> io::Result<SocketAddr> {
-    SocketAddr::from_abstract_name(format!("takt/{}/{interface}", role.name()))
+fn socket_name(role: Role, interface: &str) -> String {
+    format!("takt/{}/{interface}", role.name())
+}
+
+/// What an attempt to take a lock has found.
+enum Found {
+    /// It was free.
+    Free(InterfaceLock),
+    /// Its holder, to which there is a connection.
+    Holder(Process, UnixStream),
+    /// A process that has its name and accepts no connection.
+    Silent(Process),
 }
 
 impl InterfaceLock {
@@ -100,25 +117,9 @@ impl InterfaceLock {
     /// # Errors
     /// See [`LockError`].
     pub fn take(role: Role, interface: &str) -> Result<Self, LockError> {
-        let address = address(role, interface)?;
-        let began = Instant::now();
-        loop {
-            match UnixListener::bind_addr(&address) {
-                Ok(listener) => {
-                    listener.set_nonblocking(true)?;
-                    return Ok(Self { listener, unread: vec![], waiting: vec![] });
-                }
-                Err(error) if error.kind() == ErrorKind::AddrInUse => {}
-                Err(error) => return Err(error.into()),
-            }
-            match UnixStream::connect_addr(&address) {
-                Ok(stream) => return Err(LockError::Held(peer(&stream)?)),
-                // The holder has bound the socket and does not listen yet, or it has just released it.
-                Err(error)
-                    if error.kind() == ErrorKind::ConnectionRefused && began.elapsed() < ANSWER_PATIENCE => {}
-                Err(error) => return Err(error.into()),
-            }
-            thread::sleep(RETRY);
+        match Self::attempt(&socket_name(role, interface))? {
+            Found::Free(lock) => Ok(lock),
+            Found::Holder(process, _) | Found::Silent(process) => Err(LockError::Held(process)),
         }
     }
 
@@ -128,15 +129,43 @@ impl InterfaceLock {
     /// # Errors
     /// [`TakeOverError`].
     pub fn take_over(role: Role, interface: &str) -> Result<Self, TakeOverError> {
+        let (name, began) = (socket_name(role, interface), Instant::now());
         loop {
-            let holder = match Self::take(role, interface) {
-                Ok(lock) => return Ok(lock),
-                Err(LockError::Held(holder)) => holder,
-                Err(LockError::System(error)) => return Err(TakeOverError::System(error)),
+            let (holder, released) = match Self::attempt(&name)? {
+                Found::Free(lock) => return Ok(lock),
+                // Whoever says that it has released the lock and does not is not asked for ever.
+                Found::Holder(holder, _) if began.elapsed() > RELEASE_PATIENCE => {
+                    (holder, Err(ReleaseError::Unfinished))
+                }
+                Found::Holder(holder, stream) => (holder, ask_for_release(stream)?),
+                Found::Silent(holder) => (holder, Err(ReleaseError::Unanswered)),
             };
-            ask_for_release(role, interface)
-                .map_err(TakeOverError::System)?
-                .map_err(|error| TakeOverError::NotReleased { holder, error })?;
+            released.map_err(|error| TakeOverError::NotReleased { holder, error })?;
+        }
+    }
+
+    fn attempt(name: &str) -> io::Result<Found> {
+        let address = SocketAddr::from_abstract_name(name)?;
+        let began = Instant::now();
+        loop {
+            match UnixListener::bind_addr(&address) {
+                Ok(listener) => {
+                    listener.set_nonblocking(true)?;
+                    return Ok(Found::Free(Self { listener, unread: vec![], waiting: vec![] }));
+                }
+                Err(error) if error.kind() == ErrorKind::AddrInUse => {}
+                Err(error) => return Err(error),
+            }
+            match connect_to(name) {
+                Ok(stream) => return Ok(Found::Holder(peer(&stream)?, stream)),
+                // The holder has bound the socket and does not listen yet, it has just released it, or too many connect.
+                Err(error) if is_silence(&error) && began.elapsed() < CONNECT_PATIENCE => {}
+                Err(error) if is_silence(&error) => {
+                    return name_owner::owner_of(name)?.map(Found::Silent).ok_or_else(unknown_holder);
+                }
+                Err(error) => return Err(error),
+            }
+            thread::sleep(RETRY);
         }
     }
 
@@ -187,6 +216,12 @@ pub enum TakeOverError {
     System(io::Error),
 }
 
+impl From<io::Error> for TakeOverError {
+    fn from(error: io::Error) -> Self {
+        Self::System(error)
+    }
+}
+
 enum Request {
     NotYet,
     Other,
@@ -209,14 +244,27 @@ fn peer(stream: &UnixStream) -> io::Result<Process> {
     Ok(Process { pid: credentials.pid(), user: credentials.uid() })
 }
 
+/// Connects, without waiting for room among the connections that have not been accepted.
+fn connect_to(name: &str) -> io::Result<UnixStream> {
+    let flags = SockFlag::SOCK_NONBLOCK | SockFlag::SOCK_CLOEXEC;
+    let stream = socket(AddressFamily::Unix, SockType::Stream, flags, None)?;
+    connect(stream.as_raw_fd(), &UnixAddr::new_abstract(name.as_bytes())?)?;
+    let stream = UnixStream::from(stream);
+    stream.set_nonblocking(false)?;
+    Ok(stream)
+}
+
+/// Returns `true` if nobody listens at the name, or too many connections have not been accepted.
+fn is_silence(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::ConnectionRefused | ErrorKind::WouldBlock)
+}
+
+fn unknown_holder() -> io::Error {
+    io::Error::other("another process has its name and accepts no connection; only root can find which one")
+}
+
 /// Asks the holder and waits until it has released the lock.
-fn ask_for_release(role: Role, interface: &str) -> io::Result<Result<(), ReleaseError>> {
-    let mut stream = match UnixStream::connect_addr(&address(role, interface)?) {
-        Ok(stream) => stream,
-        // The lock has just been released.
-        Err(error) if error.kind() == ErrorKind::ConnectionRefused => return Ok(Ok(())),
-        Err(error) => return Err(error),
-    };
+fn ask_for_release(mut stream: UnixStream) -> io::Result<Result<(), ReleaseError>> {
     stream.set_read_timeout(Some(ANSWER_PATIENCE))?;
     let mut answer = [0];
     // If the holder has just ended, the connection is reset: that is a release, and no error.

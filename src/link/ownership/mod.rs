@@ -6,6 +6,7 @@
 
 mod listening;
 mod lock;
+mod name_owner;
 
 use std::io;
 
