@@ -1,6 +1,5 @@
 //! `takt panel`, and the options of the panel that `takt run` has too.
 
-use std::fs::File;
 use std::io::{self, Read};
 use std::net::SocketAddr;
 use std::os::unix::fs::PermissionsExt;
@@ -9,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use clap::Args;
+use takt_wire::text_file;
 
 use crate::commission::{Bus, TargetDrive};
 use crate::config::Interface;
@@ -68,7 +68,8 @@ impl AccessArguments {
 fn token(path: &Path) -> Result<String, UsageError> {
     let path_shown = path.display();
     let failed = |error: io::Error| format!("the token cannot be read from {path_shown}: {error}");
-    let file = File::open(path).map_err(failed)?;
+    // A FIFO would keep the start waiting for ever.
+    let file = text_file::open(path).map_err(failed)?;
     let mode = file.metadata().map_err(failed)?.permissions().mode() & 0o777;
     if mode & 0o077 != 0 {
         let words = format!(

@@ -57,5 +57,9 @@ fn a_file_that_others_can_read_or_that_has_no_token_is_refused() {
     fs::write(&file, vec![0; 1 << 20]).unwrap();
     let said = refusal(name);
     assert!(said.contains("not printable ASCII"), "{said}");
-    refusal("/dev/zero");
+    assert!(refusal("/dev/zero").contains("a device"));
+    let fifo = folder.path().join("fifo");
+    nix::unistd::mkfifo(&fifo, nix::sys::stat::Mode::S_IRUSR).unwrap();
+    let said = refusal(fifo.to_str().unwrap());
+    assert!(said.contains("a FIFO (named pipe); only regular files are read"), "{said}");
 }

@@ -16,6 +16,14 @@ const LONGEST_MIB: u64 = 64;
 /// It cannot be read, is no regular file, or is longer than 64 MiB. Whoever reads a FIFO, a device or a file of the kernel
 /// may wait for ever.
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
+    read_at_most(open(path)?, LONGEST_MIB << 20)
+}
+
+/// Opens a file to read.
+///
+/// # Errors
+/// It cannot be opened, or is no regular file.
+pub fn open(path: &Path) -> io::Result<File> {
     // Opening a device may do something, so this is known before.
     only_regular(std::fs::metadata(path)?.file_type())?;
     let file = OpenOptions::new().read(true).custom_flags(libc::O_NONBLOCK).open(path)?;
@@ -24,7 +32,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     if fstatfs(&file)?.filesystem_type() == PROC_SUPER_MAGIC {
         return Err(refused("a file of the kernel (/proc)"));
     }
-    read_at_most(file, LONGEST_MIB << 20)
+    Ok(file)
 }
 
 fn read_at_most(file: File, longest: u64) -> io::Result<Vec<u8>> {

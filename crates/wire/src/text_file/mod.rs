@@ -3,6 +3,9 @@
 #[cfg_attr(not(target_os = "linux"), path = "no_disk.rs")]
 mod disk;
 
+#[cfg(target_os = "linux")]
+pub use disk::open;
+
 use std::cell::RefCell;
 use std::io;
 use std::path::{Path, PathBuf};
