@@ -311,7 +311,7 @@ fn what_an_axis_does_without_the_controller_is_told_for_its_mode() {
         ("csp", "holds its last set-point, 0.1024 rad (5.9 deg) away at most"),
         ("csv", "goes on for 100 ms, then brakes: at rest after 399 ms and 0.5964 rad (34.2 deg) at most"),
         ("cst", "goes on for 100 ms, then brakes"),
-        ("pp", "ends its move by itself"),
+        ("pp", "goes on for 100 ms, then brakes: at rest after 399 ms and 0.5964 rad (34.2 deg) at most"),
         ("pv", "goes on for 100 ms, then brakes"),
         ("pt", "goes on for 100 ms, then brakes"),
     ] {
@@ -330,6 +330,7 @@ fn what_an_axis_does_without_the_controller_is_told_for_its_mode() {
         std::fs::write(&path, text("[master]\nheartbeat = \"off\"\n")).unwrap();
         let told = standard_output(&check(&path, &[]));
         assert_eq!(told.contains("FOR EVER"), !matches!(mode, "csp" | "pp"), "{mode}: {told}");
+        assert_eq!(told.contains("ends its move by itself"), mode == "pp", "{mode}: {told}");
     }
 }
 

@@ -13,9 +13,9 @@ pub enum Unattended {
         /// rad (m)
         travel: f64,
     },
-    /// It ends its move by itself.
+    /// It ends its move by itself, and nothing stops it before.
     EndsItsMove,
-    /// It goes on until the drive misses the heartbeat or the requests of node guarding, and then brakes.
+    /// It goes on, along its move at most, until the drive misses the heartbeat or the requests of node guarding, and then brakes.
     GoesOn {
         /// The time until the drive misses them.
         timeout_ns: u64,
@@ -62,10 +62,12 @@ impl Unattended {
                 let cycle_s = config.bus_cycle(axis.bus).period_ns as f64 / 1e9;
                 Self::HoldsLastSetPoint { travel: axis.following_error.limit + limits.velocity * cycle_s }
             }
-            Control::ProfilePosition if off_cycle.is_none() => Self::EndsItsMove,
             control => {
+                // A drive that plans its moves itself needs no watchdog to come to rest.
+                let ends_its_move = control == Control::ProfilePosition && off_cycle.is_none();
                 let timeout_ns = match family::stops_by_itself_after(axis, config) {
                     Ok(Watchdog { timeout_ns: Some(timeout_ns), .. }) => timeout_ns,
+                    _ if ends_its_move => return Self::EndsItsMove,
                     Ok(_) => return Self::UntilItsWatchdog,
                     Err(unwatched) => return Self::GoesOnForEver { because: unwatched.words() },
                 };
