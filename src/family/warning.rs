@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
+use takt_rt::{Rule, StopCategory};
 use takt_wire::canopen::object::ObjectAddress;
 
 use crate::config::quantities::{Counting, Quantities};
@@ -40,6 +41,8 @@ pub enum WarningSubject {
     Axis(String),
     /// A bus.
     Bus(String),
+    /// The section `[stops]`.
+    Stops,
 }
 
 impl fmt::Display for WarningSubject {
@@ -47,6 +50,7 @@ impl fmt::Display for WarningSubject {
         match self {
             Self::Axis(name) => write!(f, "axis `{name}`"),
             Self::Bus(name) => write!(f, "bus `{name}`"),
+            Self::Stops => f.write_str("`[stops]`"),
         }
     }
 }
@@ -137,6 +141,8 @@ pub enum WarningKind {
         /// The command that sets it.
         mend: String,
     },
+    /// A value that is not renewed in time ends without torque.
+    CoastsWhenStale,
     /// The bus is behind an SLCAN adapter.
     Adapter {
         /// The interface.
@@ -252,6 +258,10 @@ impl fmt::Display for WarningKind {
                 "{interface} has restart-ms 0, and `restart_ms` is {wanted_ms}: after a bus-off it stays off the bus until somebody \
                  restarts it: {mend}"
             ),
+            Self::CoastsWhenStale => f.write_str(
+                "`stale_command = 0` removes the power at once when a stream or a velocity expires: a moving axis coasts until \
+                 friction or its brake stops it; use 2 (decelerate and hold) or 1 (decelerate and disable)",
+            ),
             Self::Adapter { interface } => write!(
                 f,
                 "its adapter is on USB, and USB is not hard real time: SYNC and set-points may be late by milliseconds, and \
@@ -293,6 +303,9 @@ impl Config {
                 adapter_warning::of_bus(self, index).into_iter().chain(adapter_warning::of_line(self, index));
             let kinds = kinds.chain(never_restarts(bus));
             warnings.extend(kinds.map(|kind| Warning { subject: subject.clone(), kind }));
+        }
+        if self.stops.of(Rule::StaleCommand) == StopCategory::Zero {
+            warnings.push(Warning { subject: WarningSubject::Stops, kind: WarningKind::CoastsWhenStale });
         }
         warnings
     }

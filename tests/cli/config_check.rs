@@ -349,6 +349,18 @@ fn groups_are_shown_with_their_axes_and_whose_stops_stop_them() {
     );
 }
 
+#[test]
+fn a_command_that_expires_and_ends_without_power_is_warned_of() {
+    let with_category =
+        |category: u8| warnings(|arm| format!("{arm}\n[stops]\nstale_command = {category}\n"));
+    let words = with_category(0);
+    assert!(
+        matches!(&words[..], [one] if one.starts_with("`[stops]`: `stale_command = 0` removes")),
+        "{words:?}"
+    );
+    assert_eq!((with_category(1), with_category(2)), (vec![], vec![]));
+}
+
 /// The warnings about the arm with a change.
 fn warnings(change: impl Fn(String) -> String) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
