@@ -98,16 +98,20 @@ impl Axis {
     }
 
     /// The temperature (°C) that the drive reports, if it does.
+    #[inline]
     pub fn temperature(&self) -> Option<f32> {
+        if self.has_pdos() { None } else { self.temperature_beside_pdos() }
+    }
+
+    fn temperature_beside_pdos(&self) -> Option<f32> {
         match &self.parameters.exchange {
-            Exchange::BitFields(by) => self.temperature_of_reply(by),
+            Exchange::BitFields(by) => {
+                let temperature = self.field_drive.reported(by, ReplyValue::Temperature);
+                temperature.map(|temperature| temperature as f32)
+            }
             Exchange::OffCycle { .. } => self.off_cycle_temperature,
             Exchange::Pdos(_) => None,
         }
-    }
-
-    fn temperature_of_reply(&self, by: &FieldDriveParameters) -> Option<f32> {
-        self.field_drive.reported(by, ReplyValue::Temperature).map(|temperature| temperature as f32)
     }
 }
 

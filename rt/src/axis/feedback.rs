@@ -158,7 +158,7 @@ impl Axis {
 
     /// The last value of an object that the drive reports; `None` if it does not report it, or has not reported yet.
     fn reported(&self, slot: FeedbackSlot) -> Option<i32> {
-        (self.is_heard() && self.reported_slots.contains(slot)).then(|| self.feedback.feedback(slot))
+        (self.reported_slots.contains(slot) && self.is_heard()).then(|| self.feedback.feedback(slot))
     }
 
     /// Returns `true` if the process data of the drive carry a number that it reports.
@@ -172,6 +172,7 @@ impl Axis {
     }
 
     /// Cycles of the bus since the drive last reported in time, with those in which it was not asked.
+    #[inline]
     pub fn cycles_since_report(&self) -> u16 {
         self.reception.cycles_since_report()
     }

@@ -290,26 +290,27 @@ impl Axis {
     #[inline]
     pub(crate) fn show(&self, shown: &mut AxisSnapshot) {
         let set_point = self.set_point();
+        // The values that depend on a condition come first, so that none of the others has to be kept meanwhile.
         *shown = AxisSnapshot {
+            temperature: self.temperature(),
+            is_confirmed_off: self.confirms_off(),
+            feedback_age: self.cycles_since_report(),
+            error_code: self.error_code(),
+            torque: self.torque(),
+            current_per_mille: self.current_per_mille(),
+            mode: self.mode(),
             position_set: set_point.position,
             velocity_set: set_point.velocity,
             torque_set: self.torque_set,
             position: self.joint.position(),
             velocity: self.joint.velocity(),
             following_error: self.following.error(),
-            torque: self.torque(),
-            current_per_mille: self.current_per_mille(),
-            mode: self.mode(),
             mode_set: self.mode_set(),
-            temperature: self.temperature(),
             controlword: self.controlword(),
             statusword: self.statusword(),
             drive_state: self.drive_state(),
-            error_code: self.error_code(),
             is_heard: self.is_heard(),
-            is_confirmed_off: self.confirms_off(),
             unanswered: self.unanswered(),
-            feedback_age: self.cycles_since_report(),
             feedback_slot: shown.feedback_slot,
             feedback_ns: shown.feedback_ns,
         };

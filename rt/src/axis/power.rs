@@ -210,6 +210,7 @@ impl Axis {
     }
 
     /// Returns `true` if the drive has confirmed that it has no torque since it was told to have none: by a report, or by SDO.
+    #[inline]
     pub(super) fn confirms_off(&self) -> bool {
         let is_told = self.is_told_to_switch_off() && !self.may_be_switching_on();
         is_told && !self.has_torque() && (self.is_reporting() || self.has_confirmed_by_service())

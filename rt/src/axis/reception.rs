@@ -48,6 +48,7 @@ impl Reception {
     }
 
     /// The time within which feedback is expected.
+    #[inline]
     fn report_s(&self) -> f64 {
         self.cycle_s * f64::from(self.report_cycles.max(1))
     }
@@ -137,7 +138,12 @@ impl Reception {
     }
 
     /// Cycles of the bus since the last complete feedback, with those in which none was asked for.
+    #[inline]
     pub(super) fn cycles_since_report(&self) -> u16 {
+        if self.span_s == 0.0 { 0 } else { self.cycles_in_span() }
+    }
+
+    fn cycles_in_span(&self) -> u16 {
         // The sum of many periods may be a little less than their multiple.
         const ROUNDING: f64 = 1e-6;
         (self.span_s / self.report_s() + ROUNDING) as u16

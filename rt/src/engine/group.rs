@@ -103,16 +103,17 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
     }
 
     /// Shows what the group did in the cycle.
+    #[inline]
     pub(super) fn show(&self, record: &mut GroupRecord, snapshot: &mut GroupSnapshot) {
         let phase = self.state.phase();
         let stop = self.stop.as_ref().map(RecordedStop::of);
         *record = GroupRecord { phase, stop, callback_ns: self.callback_ns };
         *snapshot = GroupSnapshot {
-            phase,
             remaining_s: self.remaining_s(),
+            stream: self.stream_report(),
+            phase,
             stop: self.stop,
             needs_bring_up: self.needs_bring_up,
-            stream: self.stream_report(),
             steps: self.steps,
         };
     }
