@@ -164,14 +164,8 @@ pub fn check(
     if !(next.position.is_finite() && next.velocity.is_finite() && next.acceleration.is_finite()) {
         return Err(Fault::NotFinite { position: next.position });
     }
-    let room = TOLERANCE * (limits.position_max - limits.position_min);
-    for (limit, beyond, deeper) in [
-        (limits.position_max, next.position > limits.position_max + room, next.position > last),
-        (limits.position_min, next.position < limits.position_min - room, next.position < last),
-    ] {
-        if beyond && deeper {
-            return Err(Fault::PositionLimit { position: next.position, limit });
-        }
+    if !limits.contain(next.position) {
+        check_outside(limits, last, next.position)?;
     }
     let velocity = (next.position - last) / period_s;
     if velocity.abs() > limits.velocity * (1.0 + TOLERANCE) {
@@ -179,12 +173,29 @@ pub fn check(
     }
     let last_velocity = (last - before_last) / period_s;
     let acceleration = (velocity - last_velocity) / period_s;
+    if acceleration.abs() <= limits.acceleration * (1.0 + TOLERANCE) {
+        return Ok(());
+    }
     let limit = limits.acceleration.max(limits.deceleration);
     // Positions of some radians are known to some 1e-16 of a radian, which the division by the squared period
     // turns into visible acceleration.
     let noise = 4.0 * f64::EPSILON * (1.0 + next.position.abs()) / (period_s * period_s);
     if acceleration.abs() > limit * (1.0 + TOLERANCE) + noise {
         return Err(Fault::AccelerationLimit { acceleration, limit });
+    }
+    Ok(())
+}
+
+/// Checks a set-point outside of the position limits: it must lead back.
+fn check_outside(limits: &AxisLimits, last: f64, position: f64) -> Result<(), Fault> {
+    let room = TOLERANCE * (limits.position_max - limits.position_min);
+    for (limit, beyond, deeper) in [
+        (limits.position_max, position > limits.position_max + room, position > last),
+        (limits.position_min, position < limits.position_min - room, position < last),
+    ] {
+        if beyond && deeper {
+            return Err(Fault::PositionLimit { position, limit });
+        }
     }
     Ok(())
 }
