@@ -30,9 +30,11 @@ impl DriveReport {
     /// A drive that was enabled counts as disabled only when a second statusword says so. One corrupted statusword would
     /// otherwise let the set-point follow the joint while the drive still obeys, and disable it. A fault counts at once.
     pub(super) fn note_state(&mut self, shown: DriveState) {
-        let contradicts = self.state == DriveState::OperationEnabled
-            && shown != DriveState::OperationEnabled
-            && !shown.is_faulted();
+        if shown == self.state {
+            self.contradictions = 0;
+            return;
+        }
+        let contradicts = self.state == DriveState::OperationEnabled && !shown.is_faulted();
         self.contradictions = if contradicts { self.contradictions.saturating_add(1) } else { 0 };
         if self.contradictions == 1 {
             return;

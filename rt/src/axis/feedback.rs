@@ -83,16 +83,15 @@ impl Axis {
         if !self.reception.is_in_time(at_ns) {
             return Ok(());
         }
-        match &self.parameters.exchange {
-            Exchange::Pdos(pdos) => {
-                let Some(parameters) = pdos.feedback.get(pdo) else { return Ok(()) };
-                // No remote frame is feedback: what has a length has as many bytes.
-                let unpacked =
-                    parameters.mapping.unpack(frame.first_word(), frame.length(), &mut self.feedback);
-                unpacked.map_err(NoFeedback::Pdo)?;
-            }
-            Exchange::BitFields(_) => self.receive_fields(frame).map_err(NoFeedback::Reply)?,
-            Exchange::OffCycle { .. } => return Err(NoFeedback::OffCycle),
+        if let Exchange::Pdos(pdos) = &self.parameters.exchange {
+            let Some(parameters) = pdos.feedback.get(pdo) else { return Ok(()) };
+            // No remote frame is feedback: what has a length has as many bytes.
+            let unpacked = parameters.mapping.unpack(frame.first_word(), frame.length(), &mut self.feedback);
+            unpacked.map_err(NoFeedback::Pdo)?;
+        } else if self.is_off_cycle() {
+            return Err(NoFeedback::OffCycle);
+        } else {
+            self.receive_fields(frame).map_err(NoFeedback::Reply)?;
         }
         if self.reception.note_arrival(pdo) {
             self.duplicate_node.note_repetition();
@@ -130,12 +129,9 @@ impl Axis {
         }
         let pdos = self.parameters.exchange.reports();
         let Some(span) = self.reception.complete(pdos, self.parameters.feedback_since) else { return false };
-        let scale = &self.parameters.scale;
         let counts = self.feedback.feedback(FeedbackSlot::Position);
-        let velocity = self
-            .reported_slots
-            .contains(FeedbackSlot::Velocity)
-            .then(|| scale.velocity_from_drive(self.feedback.feedback(FeedbackSlot::Velocity)));
+        let velocity =
+            self.reports(FeedbackSlot::Velocity).then_some(self.feedback.feedback(FeedbackSlot::Velocity));
         if self.joint.take_report(counts, velocity, span, JointFacts::of(&self.parameters)) {
             self.start_from_actual();
         }
@@ -283,8 +279,11 @@ impl Axis {
     /// that is late may still have come.
     #[inline]
     pub fn is_due_to_report(&mut self) -> bool {
+        if !self.answers_set_points() {
+            return true;
+        }
         let is_asked = core::mem::take(&mut self.is_asked_by_set_point);
-        !self.answers_set_points() || is_asked || self.reception.has_any()
+        is_asked || self.reception.has_any()
     }
 
     /// Returns `true` if the drive answers set-points.

@@ -24,6 +24,7 @@ impl<'a> JointFacts<'a> {
 
     /// Of all counts that the drive reports as this one, that which is nearest to the middle of the position limits: where the joint is
     /// if it has not been watched.
+    #[inline]
     fn by_limits(self, reported: i32) -> i64 {
         let AxisLimits { position_min, position_max, .. } = *self.limits;
         self.counter.nearest(reported, self.scale.counts_at(0.5 * (position_min + position_max)))
@@ -75,37 +76,38 @@ pub(super) struct JointEstimate {
 }
 
 impl JointEstimate {
-    /// Takes the position that a report gives in counts, and the velocity if it gives one. Where the joint cannot be it is
-    /// not taken to be. Returns whether the position has become known by this.
+    /// Takes the position that a report gives in counts, and the velocity in the drive's unit if it gives one. Where the joint cannot be
+    /// it is not taken to be. Returns whether the position has become known by this.
     #[inline]
     pub(super) fn take_report(
         &mut self,
         reported: i32,
-        velocity: Option<f64>,
+        velocity: Option<i32>,
         span: ReportSpan,
         facts: JointFacts<'_>,
     ) -> bool {
         let counted = self.counts + facts.counter.step(self.reported_counts, reported);
+        let position = facts.position(counted);
         let (velocity_limit, count) = (facts.limits.velocity, 1.0 / facts.scale.resolution());
         let half_lap = 0.5 * facts.counter.lap() as f64 * count;
         let bound = TravelBound { velocity: velocity_limit, count, half_lap };
         let by_limits = || facts.position(facts.by_limits(reported));
         let mut has_become_known = false;
-        match self.check.judge(facts.position(counted), by_limits, span.longest_s, bound) {
+        match self.check.judge(position, by_limits, span.longest_s, bound) {
             Plausibility::Plausible(meaning) => {
-                let counts = match meaning {
-                    Meaning::Counted => counted,
-                    Meaning::ByLimits => facts.by_limits(reported),
+                let (counts, position) = match meaning {
+                    Meaning::Counted => (counted, position),
+                    Meaning::ByLimits => (facts.by_limits(reported), by_limits()),
                 };
                 self.jump = None;
                 match velocity {
-                    Some(velocity) => {
-                        (self.velocity, self.velocity_uncertainty) =
-                            (velocity, facts.scale.velocity_resolution());
+                    Some(units) => {
+                        self.velocity = facts.scale.velocity_from_drive(units);
+                        self.velocity_uncertainty = facts.scale.velocity_resolution();
                     }
                     None => self.take_velocity(counts, meaning, span.longest_s, facts),
                 }
-                has_become_known = self.accept(reported, counts, facts);
+                has_become_known = self.accept(reported, counts, position);
                 self.standstill.note(self.position, span, velocity_limit, count);
             }
             Plausibility::Implausible { distance, reach } => self.jump = Some(Jump { distance, reach }),
@@ -134,13 +136,14 @@ impl JointEstimate {
         if self.is_heard() {
             return false;
         }
-        let has_become_known = self.accept(reported, facts.by_limits(reported), facts);
+        let counts = facts.by_limits(reported);
+        let has_become_known = self.accept(reported, counts, facts.position(counts));
         self.source = Source::Sdo;
         has_become_known
     }
 
-    fn accept(&mut self, reported: i32, counts: i64, facts: JointFacts<'_>) -> bool {
-        (self.reported_counts, self.counts, self.position) = (reported, counts, facts.position(counts));
+    fn accept(&mut self, reported: i32, counts: i64, position: f64) -> bool {
+        (self.reported_counts, self.counts, self.position) = (reported, counts, position);
         !self.is_known()
     }
 

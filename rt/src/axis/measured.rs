@@ -40,9 +40,25 @@ impl Measured {
         *self = Self { outside: outside(position, limits), ..Self::default() };
     }
 
-    fn allow_way_back(&mut self, position: f64, limits: &AxisLimits) {
+    /// Takes a position outside of the limits, with the following error that is allowed there.
+    fn take_outside(&mut self, position: f64, limits: &AxisLimits, margin: f64) {
+        let is_beyond = self.limit_beyond(position, limits, margin).is_some();
         let (below, above) = outside(position, limits);
         self.outside = (self.outside.0.min(below), self.outside.1.min(above));
+        count(&mut self.beyond_position, is_beyond);
+    }
+
+    /// The position limit beyond which the joint is by more than a following error may be.
+    fn limit_beyond(&self, position: f64, limits: &AxisLimits, margin: f64) -> Option<f64> {
+        let (below, above) = outside(position, limits);
+        let (allowed_below, allowed_above) = self.outside;
+        if below > allowed_below + margin {
+            Some(limits.position_min)
+        } else if above > allowed_above + margin {
+            Some(limits.position_max)
+        } else {
+            None
+        }
     }
 }
 
@@ -60,29 +76,16 @@ impl Axis {
             self.measured.restart(position, limits);
             return;
         }
-        let is_beyond_position = self.position_beyond().is_some();
+        if limits.contain(position) {
+            (self.measured.outside, self.measured.beyond_position) = ((0.0, 0.0), 0);
+        } else {
+            self.measured.take_outside(position, limits, self.parameters.following_error_limit);
+        }
         let is_beyond_velocity =
             self.velocity().abs() - self.joint.velocity_uncertainty() > OVERSHOOT * limits.velocity;
         let is_beyond_torque = self.torque().is_some_and(|torque| self.is_torque_beyond(torque));
-        self.measured.allow_way_back(position, &self.parameters.limits);
-        count(&mut self.measured.beyond_position, is_beyond_position);
         count(&mut self.measured.beyond_velocity, is_beyond_velocity);
         count(&mut self.measured.beyond_torque, is_beyond_torque);
-    }
-
-    /// The position limit beyond which the joint is by more than a following error may be.
-    fn position_beyond(&self) -> Option<f64> {
-        let limits = &self.parameters.limits;
-        let (below, above) = outside(self.joint.position(), limits);
-        let (allowed_below, allowed_above) = self.measured.outside;
-        let margin = self.parameters.following_error_limit;
-        if below > allowed_below + margin {
-            Some(limits.position_min)
-        } else if above > allowed_above + margin {
-            Some(limits.position_max)
-        } else {
-            None
-        }
     }
 
     fn is_torque_beyond(&self, torque: f64) -> bool {
@@ -96,16 +99,16 @@ impl Axis {
     #[inline]
     pub fn check_measured(&self) -> Result<(), Fault> {
         let measured = &self.measured;
-        if measured.beyond_position.max(measured.beyond_velocity).max(measured.beyond_torque) < REPORTS
-            || self.feedback_age() > 0
-        {
+        let reports = [measured.beyond_position, measured.beyond_velocity, measured.beyond_torque];
+        if reports.iter().all(|reports| *reports < REPORTS) || self.feedback_age() > 0 {
             return Ok(());
         }
         let patience = PATIENCE.saturating_mul(self.parameters.following_error_cycles).max(REPORTS);
         let velocity_reports = if self.is_profile() { REPORTS } else { patience };
         let limits = &self.parameters.limits;
         if measured.beyond_position >= REPORTS {
-            let limit = self.position_beyond().unwrap_or(f64::NAN);
+            let margin = self.parameters.following_error_limit;
+            let limit = measured.limit_beyond(self.position(), limits, margin).unwrap_or(f64::NAN);
             return Err(Fault::MeasuredPosition { position: self.position(), limit });
         }
         if measured.beyond_velocity >= velocity_reports {

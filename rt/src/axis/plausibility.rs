@@ -74,28 +74,27 @@ impl PlausibilityCheck {
             Some(from) if reach < bound.half_lap && (counted - from).abs() <= reach => {
                 self.accept(counted, Meaning::Counted)
             }
-            accepted => self.judge_anew(accepted, by_limits(), elapsed_s, bound),
+            accepted => self.judge_anew(accepted, by_limits(), reach, bound.within(elapsed_s)),
         }
     }
 
-    /// Takes a report that does not follow from the last position.
+    /// Takes a report that does not follow from the last position. The joint can have got so far since the accepted position, and so
+    /// far since the last report.
     #[cold]
     fn judge_anew(
         &mut self,
         accepted: Option<f64>,
         reported: f64,
-        elapsed_s: f64,
-        bound: TravelBound,
+        reach: f64,
+        reach_of_report: f64,
     ) -> Plausibility {
         let Some(accepted) = accepted else { return self.accept(reported, Meaning::ByLimits) };
-        let is_reached = |from: f64, seconds: f64| (reported - from).abs() <= bound.within(seconds);
-        let before = [Some((accepted, self.accepted_s)), self.rejected.map(|from| (from, elapsed_s))];
-        if before.into_iter().flatten().any(|(from, seconds)| is_reached(from, seconds)) {
+        let before = [Some((accepted, reach)), self.rejected.map(|from| (from, reach_of_report))];
+        if before.into_iter().flatten().any(|(from, reach)| (reported - from).abs() <= reach) {
             return self.accept(reported, Meaning::ByLimits);
         }
         self.rejected = Some(reported);
-        let distance = (reported - accepted).abs();
-        Plausibility::Implausible { distance, reach: bound.within(self.accepted_s) }
+        Plausibility::Implausible { distance: (reported - accepted).abs(), reach }
     }
 
     fn accept(&mut self, position: f64, meaning: Meaning) -> Plausibility {

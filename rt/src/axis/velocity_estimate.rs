@@ -47,22 +47,32 @@ impl VelocityEstimate {
     /// Takes a position that was reported so long after the last one.
     #[inline]
     pub(super) fn take(&mut self, counts: i64, elapsed_s: f64) -> CountRate {
-        let at_s = self.back(0).at_s + elapsed_s;
+        let last = self.back(0);
+        let at_s = last.at_s + elapsed_s;
         self.newest = (self.newest + 1) % REPORTS;
-        let newest = Sample { counts, at_s };
-        self.samples[self.newest % REPORTS] = newest;
-        self.known = (self.known + 1).min(REPORTS - 1);
-        self.span = (self.span + 1).min(self.known);
-        while self.span > 1 && counts.abs_diff(self.back(self.span - 1).counts) >= COUNTS {
-            self.span -= 1;
+        self.samples[self.newest % REPORTS] = Sample { counts, at_s };
+        if self.known < REPORTS - 1 {
+            self.known += 1;
         }
-        let from = self.back(self.span);
-        let span_s = newest.at_s - from.at_s;
+        // A joint that goes on as fast as that is measured from its last position, as it was before.
+        let is_fast = self.span <= 1 && counts.abs_diff(last.counts) >= COUNTS;
+        let from = if is_fast { last } else { self.begin_of_span(counts) };
+        self.span = if is_fast { 1 } else { self.span };
+        let span_s = at_s - from.at_s;
         if span_s > 0.0 {
             CountRate { rate: (counts - from.counts) as f64 / span_s, uncertainty: 1.0 / span_s }
         } else {
             CountRate::default()
         }
+    }
+
+    /// The sample from which the velocity to the newest one is measured.
+    fn begin_of_span(&mut self, counts: i64) -> Sample {
+        self.span = (self.span + 1).min(self.known);
+        while self.span > 1 && counts.abs_diff(self.back(self.span - 1).counts) >= COUNTS {
+            self.span -= 1;
+        }
+        self.back(self.span)
     }
 
     /// The sample so many before the newest.
