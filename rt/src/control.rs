@@ -240,6 +240,7 @@ impl ControlLaw {
 
     /// The error after a cycle without feedback. A joint that follows velocities is taken to do what it was told: the correction
     /// makes its error smaller. One that follows torques is taken to move as its set-point does: a load is held on.
+    #[inline]
     pub fn error_without_feedback(&self, error: TrackingError, cycle_s: f64) -> TrackingError {
         match *self {
             Self::Velocity { position_gain } => {

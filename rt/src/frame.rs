@@ -165,18 +165,14 @@ impl Frame {
         Ok(Self::filled(id, FrameKind::Data, bytes))
     }
 
-    /// A data frame of the first `length` of these bytes; of all of them if it is larger.
+    /// A data frame of the first `length` of these bytes, behind which the others are 0; of all of them if it is larger.
     #[inline]
     pub(crate) fn packed(id: Id, format: FrameFormat, bytes: [u8; 8], length: usize) -> Self {
-        let length = length.min(bytes.len());
-        let unused_bits = 64 - 8 * length as u32;
-        let kept = u64::MAX.checked_shr(unused_bits).unwrap_or(0);
-        let word = u64::from_le_bytes(bytes) & kept;
         let mut data = [0; Self::MAX_BYTES];
         if let Some(first) = data.first_chunk_mut() {
-            *first = word.to_le_bytes();
+            *first = bytes;
         }
-        Self { id, kind: format.kind(), length: length as u8, data }
+        Self { id, kind: format.kind(), length: length.min(bytes.len()) as u8, data }
     }
 
     /// This frame with the bits of the first eight bytes of another one set, too.

@@ -200,10 +200,13 @@ impl Scale {
     }
 }
 
+/// A sum with this number has no bits for a fraction: it is rounded to the nearest whole number, ties to even.
+const NO_FRACTION: f64 = 1.5 / f64::EPSILON;
+
 /// The nearest 32-bit integer. The cast saturates and takes NaN to 0, so no value can panic or wrap.
 #[inline]
 fn nearest(value: f64) -> i32 {
-    libm::rint(value) as i32
+    (value + NO_FRACTION - NO_FRACTION) as i32
 }
 
 /// A millionth less than half: a limit that is a whole number of units is reached, whatever the last digits say.
@@ -248,6 +251,16 @@ mod tests {
     }
 
     #[test]
+    fn the_nearest_integer_is_that_of_rint() {
+        let halves =
+            [0.0, 0.5, 1.5, 2.5, 0.499_999_999_999_999_94, 2_147_483_646.5, 2_147_483_647.5, 2_147_483_648.5];
+        let large = [1e10, 2f64.powi(51), 2f64.powi(52) + 1.0, 1e300, f64::MAX, f64::INFINITY, f64::NAN];
+        for value in halves.into_iter().chain(large).flat_map(|value| [value, -value]) {
+            assert_eq!(nearest(value), libm::rint(value) as i32, "{value}");
+        }
+    }
+
+    #[test]
     fn a_reversed_joint_turns_position_velocity_and_torque_round() {
         let scale = Scale::new(ScaleParameters { reversed: true, ..DRIVE }).unwrap();
         assert_eq!(scale.position_to_counts(TAU), -524_288);
@@ -289,6 +302,7 @@ mod tests {
                 counts_per_turn: turns, gear_ratio: gear, reversed, zero_counts: zero.into(), ..DRIVE
             }).unwrap();
             prop_assert_eq!(scale.position_to_counts(scale.position_from_counts(counts)), counts);
+            prop_assert_eq!(nearest(turns * gear), libm::rint(turns * gear) as i32);
             prop_assert_eq!(scale.velocity_to_drive(scale.velocity_from_drive(counts)), counts);
         }
 

@@ -191,6 +191,17 @@ impl Axis {
     /// The PDOs of this cycle's command; none while the position of the joint is not known.
     /// Each with the number of axes whose parts it is to have.
     pub fn frames(&self) -> impl Iterator<Item = (Frame, u8)> {
+        self.due_commands().map(|command| (self.frame_of(command), command.axes))
+    }
+
+    /// The frame of a PDO with the numbers of this cycle's command.
+    #[inline]
+    pub(crate) fn frame_of(&self, command: &CommandPdo) -> Frame {
+        command.pdo.frame(&self.command)
+    }
+
+    /// The PDOs of this cycle's command; none while the position of the joint is not known.
+    pub(crate) fn due_commands(&self) -> impl Iterator<Item = &CommandPdo> {
         let is_due = |command: &CommandPdo| {
             self.joint.is_known()
                 && match command.transmission {
@@ -198,7 +209,6 @@ impl Axis {
                     TransmissionType::OnControlword => self.controlwords.is_due(),
                 }
         };
-        let due = self.parameters.exchange.commands().iter().filter(move |command| is_due(command));
-        due.map(|command| (command.pdo.frame(&self.command), command.axes))
+        self.parameters.exchange.commands().iter().filter(move |command| is_due(command))
     }
 }

@@ -32,6 +32,14 @@ pub(super) struct SetPoints {
     sent: [State; 3],
 }
 
+/// Puts a state before the last ones, of which the oldest one goes.
+#[inline]
+fn shift_in(states: &mut [State; 3], newest: State) {
+    states[2] = states[1];
+    states[1] = states[0];
+    states[0] = newest;
+}
+
 impl SetPoints {
     /// From now on set-points wait for so many cycles before they are sent.
     pub(super) fn set_delay(&mut self, cycles: u32) {
@@ -66,7 +74,7 @@ impl SetPoints {
 
     /// Takes the next set-point.
     pub(super) fn push(&mut self, next: State) {
-        self.newest = [next, self.newest[0], self.newest[1]];
+        shift_in(&mut self.newest, next);
         self.delay.push(next);
     }
 
@@ -129,7 +137,7 @@ impl SetPoints {
     }
 
     fn note_sent(&mut self, state: State) {
-        self.sent = [state, self.sent[0], self.sent[1]];
+        shift_in(&mut self.sent, state);
     }
 
     /// The set-point that is sent in this cycle; it takes effect at the next SYNC.

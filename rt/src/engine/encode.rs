@@ -169,23 +169,24 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         }
         self.unsent.clear(bus);
         let mut shared_frames = SharedFrames::default();
+        let goal = self.state.goal();
         for place in shared.places_on(bus).iter() {
             let own_place = place.checked_sub(self.places.first);
             let Some(axis) = own_place.and_then(|place| axes.get_mut(place)) else { continue };
             let is_faulted = axis.drive_state().is_faulted();
             let reset_word = if is_faulted { self.fault_reset_word() } else { None };
-            axis.command(self.goal_of(axis, shared), reset_word);
+            axis.command(self.goal_of(axis, goal, shared), reset_word);
             if self.has_other_modes {
                 axis.command_other_modes();
             }
             if let Some(frame) = axis.field_frame() {
                 shared.dropped += u64::from(batch.try_push(*frame).is_err());
             }
-            for (frame, axes) in axis.frames() {
-                let is_taken = if axes == 1 {
-                    batch.try_push(frame).is_ok()
+            for command in axis.due_commands() {
+                let is_taken = if command.axes == 1 {
+                    batch.try_push(axis.frame_of(command)).is_ok()
                 } else {
-                    shared_frames.add(&frame, axes, batch)
+                    shared_frames.add(&axis.frame_of(command), command.axes, batch)
                 };
                 shared.dropped += u64::from(!is_taken);
             }
@@ -193,12 +194,12 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         shared_frames.leave_out_incomplete(batch);
     }
 
-    /// Where a drive is led in this cycle.
+    /// Where a drive is led in this cycle, in which the group has this goal.
     ///
     /// A drive that falls out of operation enabled is not enabled again by what the others are still to do. None is enabled
     /// before its joint is at rest with its target there, nor before it watches the controller by the heartbeat.
-    fn goal_of(&self, axis: &Axis, shared: &Shared<AXES, BUSES>) -> Goal {
-        let goal = self.state.goal();
+    #[inline]
+    fn goal_of(&self, axis: &Axis, goal: Goal, shared: &Shared<AXES, BUSES>) -> Goal {
         let is_shutting_down = matches!(self.state, GroupState::Disabling(PowerRemoval::Shutdown));
         if is_shutting_down && axis.must_quick_stop() {
             return Goal::QuickStop;

@@ -34,6 +34,7 @@ impl SharedFrames {
     }
 
     /// Takes the frames out of the batch in which a part is missing.
+    #[inline]
     pub(super) fn leave_out_incomplete(&self, batch: &mut SendBatch) {
         // From the last one on, so that the places before it stay what they are.
         for (place, _) in self.missing.iter().rev().filter(|(_, missing)| *missing > 0) {
