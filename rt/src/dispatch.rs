@@ -256,10 +256,10 @@ const fn destination_of(entry: u16) -> Destination {
     let place = entry.wrapping_sub(1);
     let (axis, pdo) = ((place / 8) as u8, (place % 8) as u8);
     match pdo {
-        EMERGENCY => Destination::Emergency { axis },
+        ..ERROR_CONTROL => Destination::Feedback { axis, pdo },
         ERROR_CONTROL => Destination::ErrorControl { axis },
         UNUSED => Destination::Unused,
-        _ => Destination::Feedback { axis, pdo },
+        _ => Destination::Emergency { axis },
     }
 }
 

@@ -114,6 +114,7 @@ impl<const BUSES: usize> Backlog<BUSES> {
     }
 
     /// Frames leave on a bus. If it has a trial, that is over.
+    #[inline]
     pub(super) fn note_leaving(&mut self, bus: usize) {
         if let Some(own) = self.buses.get_mut(bus).filter(|_| self.on_trial.take(bus)) {
             own.trial_cycles = own.behind_cycles.saturating_mul(2);

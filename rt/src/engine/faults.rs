@@ -31,7 +31,15 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
 
     /// Stops the groups that stop with one that does, for the same reason. A stop that begins in the step of a cycle stops the others
     /// in the next one, before its requests.
+    #[inline]
     pub(super) fn couple_stops(&mut self) {
+        if self.groups.iter().any(|group| group.untold.is_some()) {
+            self.couple_untold_stops();
+        }
+    }
+
+    #[cold]
+    fn couple_untold_stops(&mut self) {
         // A group that must stop harder than the one with which it stops makes others harder: there are three categories.
         while self.groups.iter().any(|group| group.untold.is_some()) {
             for number in 0..self.groups.len() as u8 {
@@ -80,11 +88,16 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         }
     }
 
+    #[inline]
     fn check_enable_timeout(&mut self) {
         let (cycles, limit) = (self.group.state_cycles, self.shared.enable_timeout_cycles);
-        if !matches!(self.group.state, GroupState::Enabling) || cycles <= limit {
-            return;
+        if matches!(self.group.state, GroupState::Enabling) && cycles > limit {
+            self.fail_to_enable(cycles, limit);
         }
+    }
+
+    #[cold]
+    fn fail_to_enable(&mut self, cycles: u32, limit: u32) {
         // One that is enabled already and has not been allowed to be is late, too.
         let late = self.axes.iter().find(|axis| !(axis.is_enabled() && axis.is_power_granted()));
         let origin = late.map_or(Origin::Group, |axis| Origin::Axis(axis.number()));
@@ -136,11 +149,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
         let mut expected = Expectation::of(self.group);
         for index in 0..self.axes.len() {
             let Some(axis) = self.axes.get_mut(index) else { break };
+            let shown = expected.state_of(axis);
             // Whatever else is wrong with the drive: it is not enabled again.
-            if expected.is_disabled(axis) || expected.is_faulted(axis) {
+            if shown.is_disabled || shown.is_faulted {
                 axis.latch_off();
             }
-            if let Some(fault) = expected.fault_of(axis, self.shared) {
+            if let Some(fault) = expected.fault_of(axis, shown, self.shared) {
                 let number = axis.number();
                 self.fail(Origin::Axis(number), fault);
                 expected = Expectation::of(self.group);
@@ -334,6 +348,15 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 }
 
+/// What a drive shows that is not expected of it. Taking its power changes neither: a drive with a fault is not enabled.
+#[derive(Clone, Copy)]
+struct Unexpected {
+    /// True if it is out of operation enabled.
+    is_disabled: bool,
+    /// True if it has a fault.
+    is_faulted: bool,
+}
+
 /// What is expected of the axes in the present state of their group.
 struct Expectation {
     /// True if the drives may be out of operation enabled.
@@ -362,32 +385,31 @@ impl Expectation {
     }
 
     #[inline]
-    fn is_disabled(&self, axis: &Axis) -> bool {
+    fn state_of(&self, axis: &Axis) -> Unexpected {
         let may_be_disabled = self.may_be_disabled || self.may_have_quick_stopped && axis.stops_by_itself();
-        !axis.is_enabled() && !may_be_disabled
+        Unexpected {
+            is_disabled: !axis.is_enabled() && !may_be_disabled,
+            is_faulted: axis.drive_state().is_faulted() && !(self.is_resetting && axis.is_being_reset()),
+        }
     }
 
-    #[inline]
-    fn is_faulted(&self, axis: &Axis) -> bool {
-        axis.drive_state().is_faulted() && !(self.is_resetting && axis.is_being_reset())
-    }
-
-    /// The first thing that is wrong with an axis.
+    /// The first thing that is wrong with an axis whose drive shows this.
     #[inline]
     fn fault_of<const AXES: usize, const BUSES: usize>(
         &self,
         axis: &Axis,
+        shown: Unexpected,
         shared: &Shared<AXES, BUSES>,
     ) -> Option<Fault> {
-        match self.communication_fault(axis) {
-            None if self.is_in_operation => self.operation_fault(axis, shared),
+        match self.communication_fault(axis, shown) {
+            None if self.is_in_operation => Self::operation_fault(axis, shown, shared),
             fault => fault,
         }
     }
 
     /// What must be right whenever a drive may have torque.
     #[inline]
-    fn communication_fault(&self, axis: &Axis) -> Option<Fault> {
+    fn communication_fault(&self, axis: &Axis, shown: Unexpected) -> Option<Fault> {
         let limit = axis.parameters().missed_feedback_cycles;
         if axis.feedback_age() > limit {
             return Some(Fault::MissedFeedback { cycles: axis.feedback_age(), limit });
@@ -395,7 +417,7 @@ impl Expectation {
         if axis.late_cycles() > 0 {
             return Some(Fault::LateFeedback { cycles: axis.late_cycles() });
         }
-        if self.is_faulted(axis) {
+        if shown.is_faulted {
             return Some(Fault::DriveFault { error_code: axis.error_code() });
         }
         if let Some(fault) = axis.node_fault() {
@@ -417,14 +439,14 @@ impl Expectation {
     /// What must be right while an axis is held or moved.
     #[inline]
     fn operation_fault<const AXES: usize, const BUSES: usize>(
-        &self,
         axis: &Axis,
+        shown: Unexpected,
         shared: &Shared<AXES, BUSES>,
     ) -> Option<Fault> {
         if let Some(code) = axis.unexplained_emergency() {
             return Some(Fault::EmergencyMessage { code });
         }
-        if self.is_disabled(axis) {
+        if shown.is_disabled {
             return Some(Fault::DriveDisabled { statusword: axis.statusword() });
         }
         if axis.is_torque_undefined() {

@@ -151,7 +151,7 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         }
         let in_cycle = self.shared.buses_in_cycle(input.slot);
         let with_sync =
-            if self.shared.requested.sync { self.shared.canopen_buses() } else { BitSet::default() };
+            if self.shared.requested.sync { self.shared.canopen_buses } else { BitSet::default() };
         self.shared.backlog.pass(input.behind, in_cycle, with_sync);
         let elapsed_s = self.shared.period_s * elapsed as f64;
         let asked_by_sync = core::mem::take(&mut self.shared.asked_by_sync);

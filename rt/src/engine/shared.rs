@@ -30,6 +30,10 @@ pub(super) struct Shared<const AXES: usize, const BUSES: usize> {
     pub(super) acknowledge_timeout_cycles: u32,
     pub(super) categories: StopCategories,
     pub(super) buses: ArrayVec<BusParameters, BUSES>,
+    /// The buses that are CANopen networks.
+    pub(super) canopen_buses: BitSet,
+    /// The buses with a cycle in each slot.
+    buses_of_every_slot: BitSet,
     /// The axes on each bus.
     places_on: [BitSet; BUSES],
     /// True if there are drives that are spoken to outside of the cycle.
@@ -101,6 +105,12 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
                 places.insert(place);
             }
         }
+        let numbers_of = |is_one: fn(&BusParameters) -> bool| {
+            let numbers = parameters.buses.iter().enumerate().filter(move |(_, bus)| is_one(bus));
+            numbers.map(|(number, _)| number).collect::<BitSet>()
+        };
+        let canopen_buses = numbers_of(|bus| bus.canopen.is_some());
+        let buses_of_every_slot = numbers_of(|bus| bus.divider == 1);
         let guards = NodeGuards::new(&parameters);
         let has_off_cycle =
             parameters.axes.iter().any(|axis| matches!(axis.exchange, Exchange::OffCycle { .. }));
@@ -130,6 +140,8 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
             snapshot: Snapshot { axis_count, bus_count, group_count, ..Snapshot::default() },
             buses: parameters.buses,
             has_off_cycle,
+            canopen_buses,
+            buses_of_every_slot,
             places_on,
         }
     }
@@ -158,19 +170,10 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         self.buses.get(usize::from(axis.parameters().bus)).map_or(1, |bus| bus.divider)
     }
 
-    /// The buses that are CANopen networks.
-    pub(super) fn canopen_buses(&self) -> BitSet {
-        let mut canopen = BitSet::default();
-        let numbers = self.buses.iter().enumerate().filter(|(_, bus)| bus.canopen.is_some());
-        numbers.for_each(|(number, _)| canopen.insert(number));
-        canopen
-    }
-
     /// The buses that have a cycle in this slot.
     pub(super) fn buses_in_cycle(&self, slot: u64) -> BitSet {
-        let mut in_cycle = BitSet::default();
-        let numbers = self.buses.iter().enumerate().filter(|(_, bus)| has_cycle(bus, slot));
-        numbers.for_each(|(number, _)| in_cycle.insert(number));
-        in_cycle
+        let others = BitSet::first(self.buses.len()).without(self.buses_of_every_slot);
+        let is_in_cycle = |number: &usize| self.buses.get(*number).is_some_and(|bus| has_cycle(bus, slot));
+        others.iter().filter(is_in_cycle).collect::<BitSet>().union(self.buses_of_every_slot)
     }
 }
