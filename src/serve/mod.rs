@@ -136,7 +136,7 @@ impl Served {
     }
 }
 
-/// When the newest stop that clients have asked for came, by `CLOCK_MONOTONIC`: of all axes, and of each group.
+/// When the newest stop came, of a client or of this process, by `CLOCK_MONOTONIC`: of all axes, and of each group.
 #[derive(Default)]
 struct Stops([AtomicU64; STOP_WORDS]);
 

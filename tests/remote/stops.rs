@@ -62,6 +62,26 @@ fn a_stop_overtakes_the_packets_that_wait() {
 }
 
 #[test]
+fn a_stop_of_the_own_process_overtakes_the_packets_that_wait() {
+    let served = Served::start("arm6-erob.toml");
+    let raw = Raw::connect(&served);
+    let command = || remote::Command::Move {
+        target: RequestTarget::All,
+        options: MoveOptions::default(),
+        positions: positions(&raw.client),
+    };
+    let own = served.controller.handle();
+    let asked_ns = ClientStream::now_ns();
+    thread::sleep(Duration::from_secs(1));
+    own.stop(StopCategory::Two).unwrap();
+    raw.client.cycle_after(own.state().slot + 5, LONG).unwrap();
+    assert_eq!(raw.ask(asked_ns, command()), Reply::Refused(CommandError::Overtaken));
+    own.wait_for(Phase::Holding, LONG).unwrap();
+    let reply = raw.ask(ClientStream::now_ns(), command());
+    assert!(matches!(reply, Reply::Motion(_)), "{reply:?}");
+}
+
+#[test]
 fn a_client_commands_again_right_after_its_own_stop() {
     let served = Served::start("arm6-erob.toml");
     let client = served.connect();
