@@ -13,7 +13,7 @@ use crate::remote::{LeaseShown, ShownWriter, now_ns};
 const SILENCE: Duration = Duration::from_millis(50);
 
 /// How late a stop of this process may be seen here. A command that a client asked for within this time before counts as one after the stop.
-const SEEN_WITHIN: Duration = Duration::from_millis(100);
+const SEEN_WITHIN: Duration = Duration::from_millis(20);
 
 /// The writer of the shared memory.
 pub struct Publisher {
