@@ -135,7 +135,7 @@ pub enum TrajectoryError {
         limit: f64,
     },
     /// The way to the first point leads far out of the positions at both ends: by more than twice the shortest stop from the velocity
-    /// at its beginning and the shortest run-up to that of the point.
+    /// at its beginning and the shortest run-up to that of the point, and by more than 0.01 rad (m) or a hundredth of its range.
     Excursion {
         /// The point.
         point: usize,

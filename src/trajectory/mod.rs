@@ -52,6 +52,9 @@ const SAME_RATE: f64 = 1e-6;
 /// How far the way to the first point may lead out of the positions at its ends, as a multiple of the shortest stop and the shortest
 /// run-up: polynomials do not use the limits to the full.
 const EXCURSION: f64 = 2.0;
+/// And beyond that, whatever the velocities: in rad (m), and as a share of the range of the axis.
+const SMALL_EXCURSION: f64 = 0.01;
+const SMALL_SHARE: f64 = 0.01;
 
 /// What a trajectory has to begin from and to keep, an axis each.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +92,7 @@ impl Trajectory {
     /// A first point at the time 0 must be where the axes are. With a later one the trajectory goes there first, from the present
     /// position, velocity and acceleration. An axis that stands at this point waits there. On this way no axis goes farther out of its
     /// present position and that of the point than twice the shortest stop from its velocity and the shortest run-up to that of the
-    /// point: a point that is passed in motion does not make it swing far back in a long time before
+    /// point, and by 0.01 rad (m) or a hundredth of its range: a point that is passed in motion does not make it swing far back in a long time before
     /// ([`TrajectoryError::Excursion`]). Without velocities the trajectory ends at rest, and is nowhere beyond the points on both sides of it
     /// ([`Interpolation::Monotone`]).
     ///
@@ -152,11 +155,11 @@ impl Trajectory {
             .collect();
         let path = Path::new(&knot_times, &of_axes, first);
         path.check(conditions.limits)?;
-        if is_from_here {
-            path.check_way_to_first_point(&columns, interpolation, conditions)?;
-        }
         for (axis, (points, limits)) in columns.iter().zip(conditions.limits).enumerate() {
             check_end(axis, points, limits, conditions.period_s)?;
+        }
+        if is_from_here {
+            path.check_way_to_first_point(&columns, interpolation, conditions)?;
         }
         Ok(Self::as_written(path))
     }
@@ -264,7 +267,7 @@ impl Path {
             }
             let Some(found) = check::excursion(polynomial, duration_s) else { continue };
             let velocity = polynomial.state(duration_s).velocity;
-            if found.distance() > EXCURSION * stop_and_run_up(start, velocity, limits) + SAME_POSITION {
+            if found.distance() > largest_excursion(start, velocity, limits) {
                 let check::Excursion { time_s, position, nearest } = found;
                 let (point, present) = (self.point(0), start.velocity);
                 return Err(TrajectoryError::Excursion {
@@ -282,12 +285,15 @@ impl Path {
     }
 }
 
-/// Returns the distance of a stop from this state and of a run-up to this velocity. A run-up is a stop that is played backwards.
-fn stop_and_run_up(start: &State, velocity: f64, limits: &AxisLimits) -> f64 {
+/// Returns how far a way from this state to a point that is passed at this velocity may lead out of both positions. A run-up is a stop
+/// that is played backwards.
+fn largest_excursion(start: &State, velocity: f64, limits: &AxisLimits) -> f64 {
     let AxisLimits { acceleration, deceleration, .. } = *limits;
     let backwards = AxisLimits { acceleration: deceleration, deceleration: acceleration, ..*limits };
-    braking_distance(limits, start.velocity.abs(), start.acceleration.abs())
-        + braking_distance(&backwards, velocity.abs(), 0.0)
+    let stop = braking_distance(limits, start.velocity.abs(), start.acceleration.abs());
+    let run_up = braking_distance(&backwards, velocity.abs(), 0.0);
+    let small = SMALL_EXCURSION.min(SMALL_SHARE * (limits.position_max - limits.position_min));
+    EXCURSION * (stop + run_up) + small
 }
 
 fn check_times(times_s: &[f64]) -> Result<(), TrajectoryError> {

@@ -23,8 +23,8 @@ const PLACE: f64 = AT_REST / 6.0;
 const NOISE_COUNTS: f64 = 8.0;
 
 /// A joint that has been in a place of the size of the noise for this long is at rest, in seconds. The encoder shows no lower
-/// speed sooner: 8 counts of 2^17 a turn in this time are a mean speed of 0.0015 rad/s.
-const LONGEST_S: f64 = 0.25;
+/// speed sooner: 8 counts of 2^17 a turn in this time are a mean speed of 0.004 rad/s.
+const LONGEST_S: f64 = 0.1;
 
 /// The place where a joint has been reported lately.
 #[derive(Clone, Copy, Debug, Default)]
