@@ -5,7 +5,7 @@
 //!
 //! A position is known to some counts of the encoder: it flickers by that much at rest. A place is no smaller than that, and where
 //! the velocity limit is low and the encoder coarse, it takes longer to show that a joint stands there: as long as a joint at
-//! the mean speed that is allowed would take to leave the place.
+//! the mean speed that is allowed would take for the counts that have been seen, and one for the rounding.
 
 use super::reception::ReportSpan;
 use super::{AT_REST, SETTLED_CYCLES};
@@ -57,9 +57,9 @@ impl Standstill {
         let has_counted = self.place.is_some() && span.is_known;
         self.reports += u32::from(has_counted);
         self.place = Some((lowest, highest));
-        let is_shown =
-            |reports: u32| reach(reports) >= farthest || f64::from(reports) * span.cycle_s >= LONGEST_S;
-        if self.reports >= STANDING_REPORTS && is_shown(self.reports) {
+        let is_slow = highest - lowest + count <= reach(self.reports);
+        let is_long = f64::from(self.reports) * span.cycle_s >= LONGEST_S;
+        if self.reports >= STANDING_REPORTS && (is_slow || is_long) {
             // From here on anew: a joint may creep out of a place in a long time.
             *self = Self { place: Some((position, position)), reports: 0, is_at_rest: true, left_at: 0.0 };
         }
