@@ -84,8 +84,9 @@ fn serves_a_controller_until_it_is_killed() {
 fn a_program_in_c_commands_a_controller_of_another_process_as_its_own_until_that_is_killed() {
     let takt = Installed::new();
     for sanitizer in [&MEMORY[..], &THREADS[..]] {
-        let mut served = Served::start("arm6-erob.toml");
+        // The compiler would take the processor from the loop.
         let compiled = takt.compile(&program("served.c"), sanitizer, Library::Shared);
+        let mut served = Served::start("arm6-erob.toml");
         let mut command = takt.command(&[], &compiled, &served.name());
         let mut running = command.stdout(Stdio::piped()).spawn().unwrap();
         let mut said = BufReader::new(running.stdout.take().unwrap());
