@@ -14,7 +14,7 @@ impl Abandonment {
         self.0.store(true, Ordering::Release);
     }
 
-    /// Whether the loop has been given up.
+    /// Returns `true` if the loop has been given up.
     pub fn has_begun(&self) -> bool {
         self.0.load(Ordering::Acquire)
     }

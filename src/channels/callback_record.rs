@@ -16,7 +16,7 @@ pub struct CallbackRecord {
     longest_ns: AtomicU64,
     /// The message of its panic.
     panic: OnceLock<String>,
-    /// Whether the function has been freed, or is about to be.
+    /// True if the function has been freed, or is about to be.
     is_over: AtomicBool,
 }
 
@@ -70,7 +70,7 @@ impl CallbackRecord {
         }
     }
 
-    /// Whether the function has been freed, or is about to be.
+    /// Returns `true` if the function has been freed, or is about to be.
     pub fn is_over(&self) -> bool {
         self.is_over.load(Ordering::Acquire)
     }

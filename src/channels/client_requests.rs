@@ -287,7 +287,7 @@ const fn place_of(target: RequestTarget) -> usize {
     }
 }
 
-/// Whether the stops at a place concern the requests for a target.
+/// Returns `true` if the stops at a place concern the requests for a target.
 fn concerns(place: usize, target: RequestTarget) -> bool {
     place == 0 || target == RequestTarget::All || place == place_of(target)
 }

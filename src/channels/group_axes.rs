@@ -6,7 +6,7 @@ use takt_rt::MAX_AXES;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct GroupAxes {
     places: Vec<usize>,
-    /// Whether each axis has the same number in the group as in the controller.
+    /// True if each axis has the same number in the group as in the controller.
     are_own: bool,
 }
 

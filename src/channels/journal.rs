@@ -32,7 +32,7 @@ pub enum HostInput {
     },
     /// Whether there was a callback that was asked for.
     CallbackTaken {
-        /// Whether there was.
+        /// True if there was.
         is_there: bool,
     },
     /// A call of a callback.

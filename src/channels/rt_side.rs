@@ -22,7 +22,7 @@ use super::words::put_snapshot;
 pub struct RtSide {
     pub(super) requests: Consumer<RequestEnvelope>,
     pub(super) clients: TakenRequests,
-    /// Whether a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
+    /// True if a client's request comes before the next one of the host. They alternate, so that no flood of the one holds up
     /// the other.
     pub(super) is_client_next: bool,
     pub(super) streams: Vec<StreamReceiver>,

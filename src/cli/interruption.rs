@@ -18,7 +18,7 @@ pub fn watch() -> io::Result<Arc<AtomicBool>> {
     Ok(arrived)
 }
 
-/// Whether a signal was set to be ignored when the process was started, from the kernel's status of the process.
+/// Returns `true` if a signal was set to be ignored when the process was started, from the kernel's status of the process.
 fn is_ignored(status: &str, signal: i32) -> bool {
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());

@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     }
 }
 
-/// Whether Ctrl-C, or another process that takes the interface over, has ended the measurement.
+/// Returns `true` if Ctrl-C, or another process that takes the interface over, has ended the measurement.
 fn is_broken_off(measurements: &[Measurement]) -> bool {
     measurements.iter().any(|measurement| !measurement.is_whole)
 }

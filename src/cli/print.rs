@@ -78,7 +78,7 @@ impl Collected {
         }
     }
 
-    /// Whether nobody reads it any more.
+    /// Returns `true` if nobody reads it any more.
     pub const fn has_no_reader(&self) -> bool {
         self.has_no_reader
     }

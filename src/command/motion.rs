@@ -91,8 +91,8 @@ pub(crate) fn result_in(
     Some(result)
 }
 
-/// Whether a stop has discarded a request that has no answer in this state. `newest_stop` is the newest one that the real-time thread has
-/// taken of those that concern the request.
+/// Returns `true` if a stop has discarded a request that has no answer in this state. `newest_stop` is the newest one that the real-time
+/// thread has taken of those that concern the request.
 pub(crate) fn is_discarded(state: &Snapshot, request: RequestId, newest_stop: RequestId) -> bool {
     // Every request that was taken before the stop has its answer in the first state that has that of the stop.
     let has_stopped =

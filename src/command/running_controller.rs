@@ -46,7 +46,7 @@ pub trait RunningController: Send + Sync {
     /// How punctual all cycles since the start were; a few milliseconds old. All times are 0 in virtual time.
     fn timing(&self) -> LoopTiming;
 
-    /// Whether the controller has ended, or the process that it runs in.
+    /// Returns `true` if the controller has ended, or the process that it runs in.
     fn has_ended(&self) -> bool;
 
     /// The newest of the stops that the real-time thread has taken, of those that concern a target. It discards what was asked before.

@@ -84,7 +84,7 @@ impl Bus {
         }
     }
 
-    /// Whether it carries CAN FD frames.
+    /// Returns `true` if it carries CAN FD frames.
     pub fn has_fd(&self) -> bool {
         match self {
             Self::Configured { config, bus } => {

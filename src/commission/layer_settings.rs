@@ -46,7 +46,7 @@ pub enum LayerSettingFailure {
     SeveralDevices {
         /// The number of replies.
         replies: usize,
-        /// Whether a node ID had been configured and was taken back.
+        /// True if a node ID had been configured and was taken back.
         is_undone: bool,
     },
     /// It was interrupted.

@@ -74,11 +74,11 @@ pub struct DriveFacts {
     pub highest_speed_rpm: Option<f64>,
     /// The bit rates that the drives know. Empty: any.
     pub bit_rates: &'static [u32],
-    /// Whether the controller can map their PDOs.
+    /// True if the controller can map their PDOs.
     pub has_fixed_process_data: bool,
-    /// Whether a PDO can carry the mode of operation that a drive shows (6061).
+    /// True if a PDO can carry the mode of operation that a drive shows (6061).
     pub reports_mode: bool,
-    /// Whether the drives can be told to answer set-points alone, and not SYNC (`answers_sync`).
+    /// True if the drives can be told to answer set-points alone, and not SYNC (`answers_sync`).
     pub may_ignore_sync: bool,
     /// The number of this axis among those of its drive, 1 where a drive has one axis. See [`Axis::node`](super::model::Axis::node).
     pub node_axis: u8,
@@ -86,11 +86,11 @@ pub struct DriveFacts {
     pub protocol: Protocol,
     /// How the drives show that they live, beside their feedback.
     pub error_control: ErrorControl,
-    /// Whether the drives can watch the heartbeat of the controller (object 1016).
+    /// True if the drives can watch the heartbeat of the controller (object 1016).
     pub consumes_heartbeat: bool,
-    /// Whether the drives have emergency objects.
+    /// True if the drives have emergency objects.
     pub sends_emergencies: bool,
-    /// Whether the drives may be operational after power-up, without an NMT command.
+    /// True if the drives may be operational after power-up, without an NMT command.
     pub may_power_up_operational: bool,
     /// How they use controlword and statusword.
     pub codec: Cia402Codec,
@@ -124,7 +124,7 @@ impl Protocol {
         }
     }
 
-    /// Whether the drives are on a serial line, and not on a CAN bus.
+    /// Returns `true` if the drives are on a serial line, and not on a CAN bus.
     pub const fn is_of_serial_line(self) -> bool {
         matches!(self, Self::SerialLine)
     }
@@ -174,7 +174,7 @@ impl ModeSet {
         Self(bits)
     }
 
-    /// Whether the mode is one of them.
+    /// Returns `true` if the mode is one of them.
     pub const fn contains(self, mode: OperationMode) -> bool {
         self.0 >> (mode as u32 - 1) & 1 == 1
     }
@@ -290,7 +290,7 @@ impl DriveFacts {
         }
     }
 
-    /// Whether the drives have the mode.
+    /// Returns `true` if the drives have the mode.
     pub(crate) fn has_mode(&self, control: &Control) -> bool {
         self.modes.contains(control.operation_mode())
     }
@@ -351,7 +351,7 @@ impl Deref for DriveFamily {
 }
 
 impl PartialEq for DriveFamily {
-    /// Whether they are drives of one family that look alike to a configuration.
+    /// Returns `true` if they are drives of one family that look alike to a configuration.
     fn eq(&self, other: &Self) -> bool {
         **self == **other
     }
@@ -372,7 +372,7 @@ pub trait ConfiguredFamily: Sync {
     /// the answer is `None`.
     fn read(&self, keys: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily>;
 
-    /// Whether its drives are on a serial line, and not on a CAN bus.
+    /// Returns `true` if its drives are on a serial line, and not on a CAN bus.
     fn is_on_serial_line(&self) -> bool {
         false
     }

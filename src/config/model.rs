@@ -85,7 +85,7 @@ impl Config {
         self.groups.iter().position(|group| group.axes.contains(&axis)).unwrap_or(0)
     }
 
-    /// Whether a bus is a serial line, and no CAN bus: by its interface, or, where it is simulated, by the drives on it.
+    /// Returns `true` if a bus is a serial line, and no CAN bus: by its interface, or, where it is simulated, by the drives on it.
     pub fn is_serial_line(&self, bus: usize) -> bool {
         match self.buses.get(bus).map(|bus| &bus.interface) {
             Some(Interface::Serial(_)) => true,
@@ -128,9 +128,9 @@ pub struct Realtime {
     pub priority: Option<u8>,
     /// The CPU to pin the thread to; `None`, the default, lets takt take the last one it may use.
     pub cpu: Option<usize>,
-    /// Whether to lock all memory. Default `true`.
+    /// True if to lock all memory. Default `true`.
     pub lock_memory: bool,
-    /// Whether to hold the CPU out of deep idle states. Default `true`.
+    /// True if to hold the CPU out of deep idle states. Default `true`.
     pub hold_dma_latency: bool,
     /// How long before a deadline to stop sleeping and spin; `None`, the default, measures the wake-up latency and
     /// chooses.
@@ -171,7 +171,7 @@ pub struct Bus {
     /// The most service frames (NMT, SDO …) sent in one cycle while the axes are enabled, beside the heartbeat.
     /// Default 1.
     pub service_frames_per_cycle: usize,
-    /// Whether SDO transfers go on while the axes are enabled. A request and its answer then need room in the
+    /// True if SDO transfers go on while the axes are enabled. A request and its answer then need room in the
     /// worst cycle; else they wait until the axes are disabled. Default `false`.
     pub sdo_while_enabled: bool,
     /// Whether axes share command frames. Default: each has its own. A file may leave it to the schedule; this is what that finds.
@@ -257,7 +257,7 @@ pub struct Axis {
     pub counts_per_turn: f64,
     /// Turns of the reported position for one turn of the joint. Default 1.
     pub gear_ratio: f64,
-    /// Whether positive counts are negative travel. Default `false`.
+    /// True if positive counts are negative travel. Default `false`.
     pub reversed: bool,
     /// The count at which the joint's position is zero. Default 0.
     pub zero_counts: i32,
@@ -290,7 +290,7 @@ pub struct Axis {
     /// What the drive reports every cycle beside statusword and position. Default: the mode of operation, where the PDOs are
     /// written.
     pub feedback: Vec<Feedback>,
-    /// Whether the drive answers SYNC with its position, the default, or set-points alone, which spares the bus a frame and makes
+    /// True if the drive answers SYNC with its position, the default, or set-points alone, which spares the bus a frame and makes
     /// the feedback a cycle older. Only drives with [`may_ignore_sync`](super::DriveFacts::may_ignore_sync) can do that; the
     /// others always answer SYNC.
     pub answers_sync: bool,
@@ -470,9 +470,9 @@ pub enum ProgramTarget {
 pub struct Telemetry {
     /// The folder for recordings. Default `runs`.
     pub directory: PathBuf,
-    /// Whether a recording is made. Default `true`.
+    /// True if a recording is made. Default `true`.
     pub is_recorded: bool,
-    /// Whether the frames of every bus are written as candump logs. Default `false`.
+    /// True if the frames of every bus are written as candump logs. Default `false`.
     pub is_candump_written: bool,
     /// How much of the past the black box keeps and writes at a fault; 100 ms to 60 s, `None` has no black box.
     /// Default 5 s.
@@ -489,7 +489,7 @@ pub struct Simulation {
     /// A pause of this process that is longer than this stops the simulated world too: the host's stalls are
     /// not the bus's. A period of the cycle at least; default 2 ms, or two periods where that is more.
     pub longest_gap_ns: u64,
-    /// Whether too many missed slots stop the group although every bus is simulated, as they do on a real one. Default no:
+    /// True if too many missed slots stop the group although every bus is simulated, as they do on a real one. Default no:
     /// the drives stand still while the process does, and nothing is lost by a slot that they miss as well.
     pub stops_for_missed_slots: bool,
 }

@@ -32,7 +32,7 @@ pub struct UrdfJoint {
     pub name: String,
     /// The file.
     pub file: PathBuf,
-    /// Whether it slides.
+    /// True if it slides.
     pub is_linear: bool,
     /// Lowest and highest position: rad (m), and where they are from; `None` for a joint that turns without end.
     pub position: Option<([f64; 2], LimitOrigin)>,
@@ -160,7 +160,7 @@ pub enum UrdfError {
         low: f64,
         /// Its highest position: rad (m).
         high: f64,
-        /// Whether its soft limits are the cause.
+        /// True if its soft limits are the cause.
         are_soft: bool,
     },
 }
@@ -224,7 +224,7 @@ impl Urdf {
         Ok(Self { path: path.to_owned(), robot })
     }
 
-    /// Whether there is a joint of this name.
+    /// Returns `true` if there is a joint of this name.
     pub fn has_joint(&self, name: &str) -> bool {
         self.robot.joints.iter().any(|joint| joint.name == name)
     }
@@ -316,7 +316,7 @@ impl Urdf {
     }
 }
 
-/// Whether elements are nested more than [`DEEPEST`] deep.
+/// Returns `true` if elements are nested more than [`DEEPEST`] deep.
 fn is_too_deep(text: &str) -> bool {
     let (mut rest, mut depth) = (text, 0_usize);
     while let Some((_, markup)) = rest.split_once('<') {
@@ -352,7 +352,7 @@ fn tag_end(markup: &str) -> Option<usize> {
     })
 }
 
-/// Whether a value is above another one, by more than the rounding of a unit.
+/// Returns `true` if a value is above another one, by more than the rounding of a unit.
 pub fn exceeds(value: f64, most: f64, scale: f64) -> bool {
     value - most > 1e-9 * scale.abs()
 }

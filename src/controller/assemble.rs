@@ -176,7 +176,7 @@ fn groups(config: &Config) -> ArrayVec<GroupParameters, MAX_GROUPS> {
     groups.collect()
 }
 
-/// Whether a bus has CANopen nodes: it has unless none of its drives has PDOs.
+/// Returns `true` if a bus has CANopen nodes: it has unless none of its drives has PDOs.
 pub(super) fn is_canopen(config: &Config, bus: usize) -> bool {
     let mut axes = config.axes.iter().filter(|axis| axis.bus == bus).peekable();
     axes.peek().is_none() || axes.any(|axis| family::has_pdos(axis, config))
@@ -293,7 +293,7 @@ fn feedback_since(feedback: &[PdoPlan]) -> FeedbackSince {
     }
 }
 
-/// Whether a drive of bit fields reports without being asked.
+/// Returns `true` if a drive of bit fields reports without being asked.
 fn reports_by_itself(axis: &Axis) -> bool {
     let device: Option<&FieldDevice> = axis.drive.description();
     device.is_some_and(|device| matches!(device.description.reply_moment, ReplyMoment::Cyclic { .. }))

@@ -176,6 +176,6 @@ pub struct Progress {
     pub what: String,
     /// 0 to 1, if it is known.
     pub fraction: Option<f64>,
-    /// Whether the run is on its way to its end.
+    /// True if the run is on its way to its end.
     pub is_ending: bool,
 }

@@ -93,7 +93,7 @@ pub struct LoopParts<P, H> {
     pub host: H,
     /// A fixed spin guard; `None` measures it, up to a tenth of the period.
     pub spin_guard_ns: Option<u64>,
-    /// Whether a refused step ends the thread before its first cycle.
+    /// True if a refused step ends the thread before its first cycle.
     pub is_realtime_required: bool,
     /// Where the answers of the clock are noted, for a replay.
     pub clock_journal: Option<Producer<ClockAnswer>>,
@@ -144,7 +144,7 @@ impl Running {
         self.begun
     }
 
-    /// Whether the thread has ended.
+    /// Returns `true` if the thread has ended.
     pub fn is_finished(&self) -> bool {
         self.thread.is_finished()
     }

@@ -49,7 +49,7 @@ pub struct SessionOptions {
     pub recording: Option<RecordingDestination>,
     /// How it is written: compressed, and in how many files.
     pub recording_options: RecordingOptions,
-    /// Whether a refused step of the real-time set-up ends the run before anything moves.
+    /// True if a refused step of the real-time set-up ends the run before anything moves.
     pub is_realtime_required: bool,
     /// Called by the logger's thread with the record of each cycle. It must not panic.
     pub each_cycle: Option<EachCycle>,

@@ -68,9 +68,9 @@ pub struct Finding {
     pub read: String,
     /// Where it was read.
     pub source: &'static str,
-    /// Whether this process is allowed to have it, or the boot command line asks for it; `None` where this does not apply.
+    /// True if this process is allowed to have it, or the boot command line asks for it; `None` where this does not apply.
     pub permitted: Option<bool>,
-    /// Whether it is in force; `None` where this does not apply or cannot be seen.
+    /// True if it is in force; `None` where this does not apply or cannot be seen.
     pub applied: Option<bool>,
     /// Why it matters.
     pub why: &'static str,

@@ -153,7 +153,7 @@ fn limit(limits: &str, name: &str) -> Option<Limit> {
     Some(Limit { soft: value()?, hard: value()? })
 }
 
-/// Whether a capability is in force, from `/proc/self/status`.
+/// Returns `true` if a capability is in force, from `/proc/self/status`.
 fn has_capability(status: &str, bit: u32) -> bool {
     let set = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
     set.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).is_some_and(|set| set >> bit & 1 == 1)

@@ -25,7 +25,7 @@ pub struct SelfTest {
     pub grade: Grade,
     /// The period of the cycle.
     pub cycle_ns: u64,
-    /// Whether it ran to its end.
+    /// True if it ran to its end.
     pub is_whole: bool,
     /// What was measured, sleeping, then spinning.
     #[serde(flatten)]

@@ -35,7 +35,7 @@ impl Source {
         Self { root: root.to_owned(), answers: Some(answers) }
     }
 
-    /// Whether this is the machine that the program runs on, whose kernel can be asked.
+    /// Returns `true` if this is the machine that the program runs on, whose kernel can be asked.
     pub(super) fn is_this_machine(&self) -> bool {
         self.answers.is_none()
     }
@@ -50,12 +50,12 @@ impl Source {
         Some(String::from_utf8_lossy(&bytes).trim().to_owned())
     }
 
-    /// Whether there is something with this name.
+    /// Returns `true` if there is something with this name.
     pub(super) fn exists(&self, path: &str) -> bool {
         self.path(path).symlink_metadata().is_ok()
     }
 
-    /// Whether this is a container, by the marks that Docker and Podman leave.
+    /// Returns `true` if this is a container, by the marks that Docker and Podman leave.
     pub(super) fn is_container(&self) -> bool {
         self.exists("/.dockerenv") || self.exists("/run/.containerenv")
     }

@@ -15,7 +15,7 @@ pub struct Subject {
     pub cpu: usize,
     /// The interfaces that it needs; empty without a configuration: those there are count then.
     pub buses: Vec<WantedBus>,
-    /// Whether there is a configuration.
+    /// True if there is a configuration.
     pub is_configured: bool,
 }
 

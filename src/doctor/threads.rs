@@ -29,7 +29,7 @@ pub struct Thread {
     pub id: u32,
     /// Its name, at most 15 characters.
     pub name: String,
-    /// Whether it belongs to the kernel.
+    /// True if it belongs to the kernel.
     pub is_kernel: bool,
     /// Its policy, by number.
     pub policy: u32,

@@ -5,7 +5,7 @@ use takt_wire::canopen::object::{DataType, ObjectAddress};
 
 /// The data sheet of one drive, as far as its commissioning and its error codes need it.
 pub trait DataSheet {
-    /// Whether the drive has an object.
+    /// Returns `true` if the drive has an object.
     fn has(&self, address: ObjectAddress) -> bool;
 
     /// The name of an object.
@@ -13,13 +13,13 @@ pub trait DataSheet {
         None
     }
 
-    /// Whether the drive lets an object be written.
+    /// Returns `true` if the drive lets an object be written.
     fn is_writable(&self, address: ObjectAddress) -> bool;
 
     /// The type of an object that holds a whole number of at most 32 bits.
     fn data_type(&self, address: ObjectAddress) -> Option<DataType>;
 
-    /// Whether the drive has a mode that its object 6502 may leave out.
+    /// Returns `true` if the drive has a mode that its object 6502 may leave out.
     fn adds_mode(&self, mode: OperationMode) -> bool;
 
     /// The drive's own error codes in words, where they deviate from the standard.

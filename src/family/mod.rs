@@ -140,7 +140,7 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
-    /// Whether a drive without a configuration is known by the keys that an axis has in one.
+    /// Returns `true` if a drive without a configuration is known by the keys that an axis has in one.
     fn is_named_by_keys(&self) -> bool {
         false
     }
@@ -192,7 +192,7 @@ pub trait Family: ConfiguredFamily {
         0
     }
 
-    /// Whether the drive of an axis can pass over a part of a frame by this dummy object.
+    /// Returns `true` if the drive of an axis can pass over a part of a frame by this dummy object.
     fn can_pass_over(&self, _axis: &Axis, _dummy: MappedObject) -> bool {
         false
     }
@@ -335,13 +335,13 @@ pub enum MappingMatch {
     ByNumber,
 }
 
-/// Whether the drive of an axis has PDOs.
+/// Returns `true` if the drive of an axis has PDOs.
 pub(crate) fn has_pdos(axis: &Axis, config: &Config) -> bool {
     let family = of(&axis.drive);
     family.field_drive(axis).is_none() && !is_off_cycle(axis, config)
 }
 
-/// Whether the drive of an axis is spoken to outside of the cycle.
+/// Returns `true` if the drive of an axis is spoken to outside of the cycle.
 pub(crate) fn is_off_cycle(axis: &Axis, config: &Config) -> bool {
     axis.drive.protocol.is_of_serial_line() || of(&axis.drive).off_cycle(axis, config).is_some()
 }

@@ -35,7 +35,7 @@ pub enum OffCycleWish {
 }
 
 impl OffCycleWish {
-    /// Whether it may have torque.
+    /// Returns `true` if it may have torque.
     pub(crate) const fn grants_torque(self) -> bool {
         matches!(self, Self::Enable | Self::Follow)
     }
@@ -102,7 +102,7 @@ pub trait OffCycleLine: Send {
         report: &mut dyn FnMut(usize, OffCycleReport),
     ) -> Option<Vec<u8>>;
 
-    /// Whether a drive has no torque, and does not watch for its master, as far as this side knows.
+    /// Returns `true` if a drive has no torque, and does not watch for its master, as far as this side knows.
     fn is_settled(&self, place: usize) -> bool;
 
     /// What has been sent and received since the beginning.

@@ -67,7 +67,7 @@ pub enum WarningKind {
         fastest: f64,
         /// `gear_ratio`
         gear_ratio: f64,
-        /// Whether the drive reports turns of its output, behind its own gear.
+        /// True if the drive reports turns of its output, behind its own gear.
         counts_output: bool,
     },
     /// A gear ratio as of the gear inside the drive, whose counts are behind that gear already.
@@ -377,7 +377,7 @@ impl Config {
     }
 }
 
-/// Whether a drive that gets `rounded` runs otherwise than commanded.
+/// Returns `true` if a drive that gets `rounded` runs otherwise than commanded.
 pub(crate) fn is_rounded(commanded: f64, rounded: f64) -> bool {
     (commanded - rounded).abs() > ROUNDING * commanded.abs()
 }

@@ -59,7 +59,7 @@ pub enum FrameEffect {
 }
 
 impl FrameEffect {
-    /// Whether this effect exists for sent frames only.
+    /// Returns `true` if this effect exists for sent frames only.
     pub(crate) const fn is_of_sending(self) -> bool {
         matches!(self, Self::EchoLoss | Self::FullQueue)
     }

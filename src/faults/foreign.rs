@@ -57,7 +57,7 @@ impl ForeignStation {
         Some((due_ns, frame))
     }
 
-    /// Whether every frame has been sent.
+    /// Returns `true` if every frame has been sent.
     pub fn is_finished(&self) -> bool {
         self.due_ns.is_none()
     }

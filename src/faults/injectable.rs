@@ -22,7 +22,7 @@ pub enum DriveEffect {
 }
 
 impl DriveEffect {
-    /// Whether this is a momentary event, so that nothing has to be undone later.
+    /// Returns `true` if this is a momentary event, so that nothing has to be undone later.
     pub(crate) const fn is_event(self) -> bool {
         match self {
             Self::Reboot | Self::Cause(_) => true,

@@ -30,7 +30,7 @@ impl LineFaults {
         }
     }
 
-    /// Whether the line is gone.
+    /// Returns `true` if the line is gone.
     pub fn is_gone(&self) -> bool {
         self.faults.iter().any(LineFault::is_gone)
     }
@@ -67,7 +67,7 @@ enum ReplyFate {
     Undecided,
     Untouched,
     Affected {
-        /// Whether its first byte, which is the address, has passed.
+        /// True if its first byte, which is the address, has passed.
         has_begun: bool,
         /// Bits that are still to be inverted.
         bits_left: u8,
@@ -97,7 +97,7 @@ impl LineFault {
         self.effect == LineEffect::Gone && self.timer.is_active()
     }
 
-    /// Whether the next request, or the reply to the last one, is affected.
+    /// Returns `true` if the next request, or the reply to the last one, is affected.
     fn affects(&mut self, now_ns: Nanoseconds, direction: Direction) -> bool {
         let is_affected = self.timer.is_active() && self.selector.picks_message(self.asked, direction);
         if is_affected {

@@ -156,7 +156,7 @@ impl<P: Injectable> FaultyPort<P> {
         }
     }
 
-    /// Whether the interface is disconnected from its bus.
+    /// Returns `true` if the interface is disconnected from its bus.
     fn is_disconnected(&self) -> bool {
         let cuts = matches!(self.effect, Effect::Interface(InterfaceEffect::BusOff | InterfaceEffect::Down));
         cuts && self.timer.is_active()

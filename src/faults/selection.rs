@@ -40,7 +40,7 @@ pub enum FrameFunction {
 }
 
 impl FrameFunction {
-    /// Whether an identifier has this function.
+    /// Returns `true` if an identifier has this function.
     pub(crate) fn includes(self, id: u32) -> bool {
         let is_of = |functions: &[u16]| functions.iter().any(|function| id & !0x7F == u32::from(*function));
         match self {
@@ -127,7 +127,7 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// Whether a frame of this direction ([`Direction::Sent`] or [`Direction::Received`]) meets the conditions.
+    /// Returns `true` if a frame of this direction ([`Direction::Sent`] or [`Direction::Received`]) meets the conditions.
     pub(crate) fn includes(&self, frame: &Frame, direction: Direction) -> bool {
         let id = frame.id().value();
         let is_canopen = !frame.id().is_extended();
@@ -159,13 +159,13 @@ impl Selector {
         Self { selection, random, left }
     }
 
-    /// Whether this frame is selected.
+    /// Returns `true` if this frame is selected.
     pub fn picks(&mut self, frame: &Frame, direction: Direction) -> bool {
         let is_included = self.selection.includes(frame, direction);
         self.picks_if(is_included)
     }
 
-    /// Whether a request to this address, or the reply to it, is selected.
+    /// Returns `true` if a request to this address, or the reply to it, is selected.
     pub fn picks_message(&mut self, address: u8, direction: Direction) -> bool {
         let is_included = self.selection.includes_message(address, direction);
         self.picks_if(is_included)
@@ -184,7 +184,7 @@ impl Selector {
         is_picked
     }
 
-    /// Whether no further frame will be selected.
+    /// Returns `true` if no further frame will be selected.
     pub fn is_exhausted(&self) -> bool {
         self.left == 0
     }

@@ -56,7 +56,7 @@ impl FaultProgress {
         self.frames.load(Ordering::Relaxed)
     }
 
-    /// Whether it could not be injected, because the port has no drive that can have it.
+    /// Returns `true` if it could not be injected, because the port has no drive that can have it.
     pub fn is_impossible(&self) -> bool {
         self.is_impossible.load(Ordering::Relaxed)
     }
@@ -104,7 +104,7 @@ impl WindowTimer {
         Self { window, trigger_times, progress, opened_ns: None, state: WindowState::Waiting }
     }
 
-    /// Whether the fault is active.
+    /// Returns `true` if the fault is active.
     pub fn is_active(&self) -> bool {
         matches!(self.state, WindowState::Active { .. })
     }

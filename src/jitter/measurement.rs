@@ -100,7 +100,7 @@ pub struct Measurement {
     pub page_faults: u64,
     /// The counters of the interface at the end.
     pub bus: Option<BusHealth>,
-    /// Whether all cycles asked for are there; not when it was interrupted.
+    /// True if all cycles asked for are there; not when it was interrupted.
     pub is_whole: bool,
 }
 

@@ -13,7 +13,7 @@ pub struct JitterReport {
     pub cycle_ns: u64,
     /// Cycles asked for, for each kind of pacing.
     pub cycles: u64,
-    /// Whether all of them are there.
+    /// True if all of them are there.
     pub is_whole: bool,
     /// The interface that SYNC was sent to.
     pub bus: Option<String>,

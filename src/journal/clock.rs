@@ -124,7 +124,7 @@ impl ReplayClock {
         self.answers.iter().copied()
     }
 
-    /// Whether there are answers for another whole cycle.
+    /// Returns `true` if there are answers for another whole cycle.
     pub fn has_cycle(&self) -> bool {
         self.cycles > 0
     }

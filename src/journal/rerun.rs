@@ -79,7 +79,7 @@ impl Rerun {
         Ok(())
     }
 
-    /// Whether the journal has told when the run began.
+    /// Returns `true` if the journal has told when the run began.
     pub const fn has_begun(&self) -> bool {
         self.place.is_some()
     }

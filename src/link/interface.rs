@@ -41,9 +41,9 @@ impl InterfaceSettings {
 pub struct InterfaceStatus {
     /// The name of the interface.
     pub name: String,
-    /// Whether it is up.
+    /// True if it is up.
     pub is_up: bool,
-    /// Whether it carries CAN FD frames.
+    /// True if it carries CAN FD frames.
     pub has_fd: bool,
     /// The bit timing of its controller; `None` for a virtual interface, which has none, and for a controller
     /// that was never configured.
@@ -57,7 +57,7 @@ pub struct InterfaceStatus {
     pub state: BusState,
     /// The controller's transmit and receive error counters, where the driver reports them.
     pub error_counters: Option<(u16, u16)>,
-    /// Whether the interface has a CAN controller; vcan, vxcan and slcan have none.
+    /// True if the interface has a CAN controller; vcan, vxcan and slcan have none.
     pub has_controller: bool,
     /// The modes of its controller in which no drive can be commanded.
     pub unfit_modes: Vec<UnfitMode>,
@@ -413,12 +413,12 @@ fn refusal(
 /// CAP_NET_ADMIN, as a bit of the sets of capabilities.
 const NET_ADMIN: u32 = 12;
 
-/// Whether this process may configure interfaces.
+/// Returns `true` if this process may configure interfaces.
 pub(super) fn this_process_may_configure() -> bool {
     may_configure(&fs::read_to_string("/proc/self/status").unwrap_or_default())
 }
 
-/// Whether a process may configure interfaces, as the kernel's status of it says.
+/// Returns `true` if a process may configure interfaces, as the kernel's status of it says.
 fn may_configure(status: &str) -> bool {
     let effective = status.lines().find_map(|line| line.strip_prefix("CapEff:"));
     let mask = effective.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());

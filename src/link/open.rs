@@ -69,7 +69,7 @@ pub enum OpenError {
 
 #[cfg(feature = "cli")]
 impl OpenError {
-    /// Whether another program has the serial line.
+    /// Returns `true` if another program has the serial line.
     pub(crate) const fn is_line_taken(&self) -> bool {
         matches!(
             self,

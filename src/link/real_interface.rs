@@ -110,7 +110,7 @@ impl RealInterface {
         })
     }
 
-    /// Whether it carries CAN frames, by which another master can be recognised.
+    /// Returns `true` if it carries CAN frames, by which another master can be recognised.
     pub(super) const fn is_can(&self) -> bool {
         !matches!(self, Self::Serial(_))
     }

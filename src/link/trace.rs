@@ -16,7 +16,7 @@ use crate::channels::{Consumer, Producer, ring};
 pub struct TracedFrame {
     /// When it was handed to the interface, or had completely arrived.
     pub at_ns: Nanoseconds,
-    /// Whether it was sent; otherwise it was received.
+    /// True if it was sent; otherwise it was received.
     pub is_sent: bool,
     /// The frame.
     pub frame: Frame,

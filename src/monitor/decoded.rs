@@ -82,7 +82,7 @@ impl Service {
         }
     }
 
-    /// Whether the frame goes to the drives, as far as its protocol tells.
+    /// Returns `true` if the frame goes to the drives, as far as its protocol tells.
     pub const fn is_to_drives(self) -> Option<bool> {
         match self {
             Self::Nmt
@@ -197,7 +197,7 @@ pub struct Decoded {
     pub words: String,
     /// The values of process data.
     pub values: Vec<DecodedValue>,
-    /// Whether the frame shows a drive with torque, or one without; `None` where it shows neither.
+    /// True if the frame shows a drive with torque, or one without; `None` where it shows neither.
     pub shows_torque: Option<bool>,
 }
 

@@ -227,7 +227,7 @@ impl BusDecoder {
         Some(Decoded::of(Service::SdoResponse, words).concerning(member))
     }
 
-    /// Whether a drive has given itself away by its own protocol, and this may be its reply.
+    /// Returns `true` if a drive has given itself away by its own protocol, and this may be its reply.
     fn is_asked_in_own_protocol(&mut self, frame: &Frame) -> bool {
         self.members.by_own_protocol(frame).is_some()
     }
@@ -264,8 +264,8 @@ impl Decoded {
     }
 }
 
-/// Whether the first TPDO of a drive shows torque, if it has its default mapping: the statusword comes first (CiA 402-2). A bit pattern that
-/// is no state of a drive is something else.
+/// Returns `true` if the first TPDO of a drive shows torque, if it has its default mapping: the statusword comes first (CiA 402-2). A bit
+/// pattern that is no state of a drive is something else.
 fn by_default_mapping(frame: &Frame) -> Option<bool> {
     let word = u16::from_le_bytes(*frame.payload().first_chunk()?);
     let state = DriveState::decode(word);

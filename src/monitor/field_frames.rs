@@ -26,7 +26,7 @@ pub struct FieldMeaning {
     pub words: String,
     /// The values.
     pub values: Vec<DecodedValue>,
-    /// Whether the drive has torque.
+    /// True if the drive has torque.
     pub shows_torque: Option<bool>,
 }
 

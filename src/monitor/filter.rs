@@ -72,7 +72,7 @@ pub struct FrameFilter {
 }
 
 impl FrameFilter {
-    /// Whether a frame is of interest.
+    /// Returns `true` if a frame is of interest.
     pub fn takes(&self, frame: &Frame, decoded: &Decoded) -> bool {
         let (excluding, including): (Vec<&IdFilter>, Vec<&IdFilter>) =
             self.ids.iter().partition(|filter| filter.is_inverted);

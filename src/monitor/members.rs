@@ -53,7 +53,7 @@ impl Member {
         Some(Self { axis: None, target, spoken })
     }
 
-    /// Whether a frame is one of the drive's own protocol, and whether it goes to the drive.
+    /// Returns `true` if a frame is one of the drive's own protocol, and whether it goes to the drive.
     pub fn own_direction(&self, frame: &Frame) -> Option<bool> {
         let own =
             self.target.drive.protocol.own_identifiers().filter(|own| self.target.node <= own.last_node)?;

@@ -53,7 +53,7 @@ fn value(target: &TargetDrive, object: MappedObject, bits: u64) -> DecodedValue 
     }
 }
 
-/// Whether the values of a TPDO show a drive with torque.
+/// Returns `true` if the values of a TPDO show a drive with torque.
 pub fn shows_torque(target: &TargetDrive, values: &[DecodedValue]) -> Option<bool> {
     let statusword = values.iter().find(|value| {
         value.object.is_some_and(|object| {

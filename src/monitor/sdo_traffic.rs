@@ -36,7 +36,7 @@ pub enum Heard<M> {
         object: ObjectAddress,
         /// Its number in its block, counted from 1.
         number: u8,
-        /// Whether it is the last one of the transfer.
+        /// True if it is the last one of the transfer.
         is_last: bool,
     },
 }

@@ -126,8 +126,8 @@ fn authority(origin: &str) -> Option<&str> {
     origin.strip_prefix("http://").or_else(|| origin.strip_prefix("https://"))
 }
 
-/// Whether the name in a `Host` header is the address that the request has arrived at, or localhost on loopback. The port is free, since a
-/// tunnel may have another one; the page that asks must have it too.
+/// Returns `true` if the name in a `Host` header is the address that the request has arrived at, or localhost on loopback. The port is
+/// free, since a tunnel may have another one; the page that asks must have it too.
 fn names_address(host: &str, local: IpAddr) -> bool {
     let name = match host.strip_prefix('[') {
         Some(rest) => rest.split_once(']').map_or("", |(address, _)| address),

@@ -42,7 +42,7 @@ pub enum Command {
         axis: usize,
         /// The position, or the distance.
         to: f64,
-        /// Whether it is a distance from the present set-point.
+        /// True if it is a distance from the present set-point.
         relative: bool,
         /// The fraction of the velocity limits.
         velocity: f64,

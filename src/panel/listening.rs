@@ -200,7 +200,7 @@ impl Panel {
         &self.url
     }
 
-    /// Whether it has ended because another process takes the buses of commissioning over.
+    /// Returns `true` if it has ended because another process takes the buses of commissioning over.
     pub fn is_taken_over(&self) -> bool {
         (self.is_taken_over)()
     }

@@ -48,7 +48,7 @@ pub enum Step {
     Failed(CommandRefusal),
 }
 
-/// Whether a group is one of a target.
+/// Returns `true` if a group is one of a target.
 pub fn is_meant(target: RequestTarget, group: usize) -> bool {
     match target {
         RequestTarget::All => true,

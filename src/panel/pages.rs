@@ -218,7 +218,7 @@ impl Pages {
         Ok(number)
     }
 
-    /// Whether a page may give its command with this number now. Its numbers rise.
+    /// Returns `true` if a page may give its command with this number now. Its numbers rise.
     ///
     /// # Errors
     /// See [`PageRefusal`].
@@ -255,13 +255,13 @@ impl Pages {
         }
     }
 
-    /// Whether a page is present and commands, and has said nothing after its command with this number.
+    /// Returns `true` if a page is present and commands, and has said nothing after its command with this number.
     pub fn may_begin(&self, number: PageNumber, sequence: u64, now: Instant) -> bool {
         let is_newest = |page: &Page| page.number == number && page.sequence == sequence;
         self.may_move(number, now) && self.open.iter().any(is_newest)
     }
 
-    /// Whether a page is present and commands.
+    /// Returns `true` if a page is present and commands.
     pub fn may_move(&self, number: PageNumber, now: Instant) -> bool {
         let is_present = |page: &Page| page.number == number && page.is_present(now);
         self.commander == Some(number) && self.open.iter().any(is_present)

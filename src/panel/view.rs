@@ -18,7 +18,7 @@ pub struct MachineView {
     name: String,
     cycle_ns: u64,
     version: &'static str,
-    /// Whether there is a monitor of the buses.
+    /// True if there is a monitor of the buses.
     has_frames: bool,
     axes: Vec<AxisDescriptionView>,
     groups: Vec<GroupDescriptionView>,
@@ -130,7 +130,7 @@ struct StopView {
     rule: &'static str,
     axis: Option<u8>,
     category: u8,
-    /// Whether it must be cleared.
+    /// True if it must be cleared.
     is_fault: bool,
     words: Words,
     cure: Option<Words>,

@@ -36,11 +36,11 @@ pub struct PlayFile {
 pub struct JointColumns {
     /// The axis.
     pub axis: usize,
-    /// Whether it has velocities.
+    /// True if it has velocities.
     pub has_velocity: bool,
-    /// Whether it has accelerations.
+    /// True if it has accelerations.
     pub has_acceleration: bool,
-    /// Whether it has torques.
+    /// True if it has torques.
     pub has_torque: bool,
 }
 

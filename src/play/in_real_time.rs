@@ -74,7 +74,7 @@ impl<'a> RealStage<'a> {
         self.controller.group_of_number(group.number)
     }
 
-    /// Whether it was interrupted.
+    /// Returns `true` if it was interrupted.
     pub const fn was_interrupted(&self) -> bool {
         self.was_interrupted
     }

@@ -133,7 +133,7 @@ impl SetPointLog {
         Self { groups: groups.collect(), ..self }
     }
 
-    /// Whether every group that plays is in such a phase.
+    /// Returns `true` if every group that plays is in such a phase.
     fn are_all(&self, record: &CycleRecord, is_such: impl Fn(Phase) -> bool) -> bool {
         let mut own = self.groups.iter().filter_map(|group| record.groups.get(usize::from(*group)));
         own.all(|group| is_such(group.phase))
@@ -201,7 +201,7 @@ impl SetPointLog {
         }
     }
 
-    /// Whether the motion has ended, and all of it is here.
+    /// Returns `true` if the motion has ended, and all of it is here.
     pub fn is_over(&self) -> bool {
         matches!(self.stage, LogStage::Over)
     }

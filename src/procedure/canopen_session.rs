@@ -34,7 +34,7 @@ impl CanopenSession {
         self.client().nmt_state
     }
 
-    /// Whether the node has reported this NMT state since the last NMT command.
+    /// Returns `true` if the node has reported this NMT state since the last NMT command.
     pub fn has_reported(&self, state: NmtState) -> bool {
         self.client().reported_states.contains(&state)
     }
@@ -44,7 +44,7 @@ impl CanopenSession {
         self.client().boot_ups
     }
 
-    /// Whether restarts of the node are watched for.
+    /// Returns `true` if restarts of the node are watched for.
     pub(crate) fn watches_restarts(&self) -> bool {
         self.client().expected_boot_ups.is_some()
     }
@@ -54,7 +54,7 @@ impl CanopenSession {
         self.client_mut().expected_boot_ups.get_or_insert(expected);
     }
 
-    /// Whether the node has restarted, and so has lost its configuration.
+    /// Returns `true` if the node has restarted, and so has lost its configuration.
     pub(crate) fn has_restarted(&self) -> bool {
         let client = self.client();
         client.expected_boot_ups.is_some_and(|expected| client.boot_ups > expected)

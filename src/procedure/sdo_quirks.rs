@@ -10,11 +10,11 @@ pub struct SdoQuirks {
     pub timing: SdoTiming,
     /// Minimum pause between a reply and the next request.
     pub gap_ns: Nanoseconds,
-    /// Whether replies may be shorter than eight bytes, with trailing zeros left out.
+    /// True if replies may be shorter than eight bytes, with trailing zeros left out.
     pub has_short_replies: bool,
-    /// Whether a number may come with another length than that of its object's type.
+    /// True if a number may come with another length than that of its object's type.
     pub has_other_lengths: bool,
-    /// Whether the drive does not answer at all for an object that it does not have.
+    /// True if the drive does not answer at all for an object that it does not have.
     pub is_silent_if_absent: bool,
 }
 
@@ -30,7 +30,7 @@ impl SdoQuirks {
         }
     }
 
-    /// Whether this error means that the drive does not have the object.
+    /// Returns `true` if this error means that the drive does not have the object.
     pub fn means_absent(&self, error: SdoError) -> bool {
         match error {
             SdoError::Aborted(code) => code.means_absent(),

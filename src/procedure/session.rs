@@ -183,7 +183,7 @@ impl<C> ProcedureSession<C> {
         self.state_mut().done = 0;
     }
 
-    /// Whether an interruption has come that is not ignored.
+    /// Returns `true` if an interruption has come that is not ignored.
     pub fn is_interrupted(&self) -> bool {
         let state = self.state();
         state.interruptions > state.ignored_interruptions

@@ -128,7 +128,7 @@ impl Client {
         ClientEvents::new(self.clone(), self.0.shown.clone())
     }
 
-    /// Whether the controller has ended, or the process that it ran in: every command returns an error that says `Ended` then.
+    /// Returns `true` if the controller has ended, or the process that it ran in: every command returns an error that says `Ended` then.
     pub fn has_ended(&self) -> bool {
         self.0.shown.has_ended() || self.0.observer.is_closed()
     }

@@ -25,7 +25,7 @@ pub struct Demand {
 pub enum Command {
     /// To command from now on; in place of another client only if `is_taken_over`.
     Lease {
-        /// Whether another client loses its lease.
+        /// True if another client loses its lease.
         is_taken_over: bool,
     },
     /// To command no longer.

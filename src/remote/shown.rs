@@ -251,7 +251,7 @@ impl Shown {
         self.memory.header().events_lost.load(Ordering::Relaxed)
     }
 
-    /// Whether the controller has ended. Its process may have, too, without a word.
+    /// Returns `true` if the controller has ended. Its process may have, too, without a word.
     pub fn has_ended(&self) -> bool {
         self.memory.header().has_ended.load(Ordering::Acquire) != 0
     }

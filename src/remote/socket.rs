@@ -135,8 +135,8 @@ impl Names {
         })
     }
 
-    /// Whether a controller of `user` is believed to be the one of this name: if it is of this user or of root, or if its folder is not one
-    /// where everybody may make files.
+    /// Returns `true` if a controller of `user` is believed to be the one of this name: if it is of this user or of root, or if its folder
+    /// is not one where everybody may make files.
     pub fn is_believed(&self, user: u32) -> bool {
         let folder = fs::metadata(&self.folder);
         let is_guarded = folder.is_ok_and(|folder| folder.mode() & 0o002 == 0);
@@ -407,7 +407,7 @@ impl Packets {
         Ok(setsockopt(&self.0, sockopt::ReceiveTimeout, &time_value(time))?)
     }
 
-    /// Whether the other side is gone.
+    /// Returns `true` if the other side is gone.
     pub fn is_closed(&self) -> bool {
         let mut watched = [PollFd::new(self.0.as_fd(), PollFlags::empty())];
         poll(&mut watched, PollTimeout::ZERO).is_ok_and(|count| count > 0)

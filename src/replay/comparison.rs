@@ -128,7 +128,7 @@ pub enum CompareError {
 }
 
 impl Comparison {
-    /// Whether every cycle that was compared is the same, bit for bit.
+    /// Returns `true` if every cycle that was compared is the same, bit for bit.
     pub fn is_identical(&self) -> bool {
         self.differing == 0 && self.missing == 0 && self.compared > 0
     }

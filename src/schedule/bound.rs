@@ -16,7 +16,7 @@ use super::response_time::{Message, response_time};
 #[derive(Clone, Copy)]
 pub(super) struct Traffic<'a> {
     pub messages: &'a [&'a BusMessage],
-    /// Whether everything that the controller queues in a slot leaves before the next SYNC.
+    /// True if everything that the controller queues in a slot leaves before the next SYNC.
     pub is_queue_empty_at_sync: bool,
     pub rates: BitRates,
 }
@@ -67,7 +67,7 @@ impl Traffic<'_> {
         response_time(&set, at, self.rates.bit_ns())
     }
 
-    /// Whether another frame of ours can stand in the queue before this one: SYNC is queued at the start of the slot,
+    /// Returns `true` if another frame of ours can stand in the queue before this one: SYNC is queued at the start of the slot,
     /// the set-points in the order of the axes in the command phase, and the background after them.
     fn stands_before(&self, other: &BusMessage, own: &BusMessage) -> bool {
         if !other.kind.is_ours() {

@@ -107,7 +107,7 @@ pub(super) struct BusMessage {
     pub jitter_ns: u64,
     /// The deadline after it was queued; `None` where being late does no harm, or where the slot sets the deadline.
     pub deadline_ns: Option<u64>,
-    /// Whether the drive sends it on its own events instead of at SYNC.
+    /// True if the drive sends it on its own events instead of at SYNC.
     pub is_asynchronous: bool,
 }
 

@@ -67,12 +67,12 @@ pub struct BusSchedule {
 }
 
 impl BusSchedule {
-    /// Whether the bus carries everything in time.
+    /// Returns `true` if the bus carries everything in time.
     pub fn fits(&self) -> bool {
         self.shortfalls.is_empty()
     }
 
-    /// Whether it fits with less reserve than a controller can be expected to need.
+    /// Returns `true` if it fits with less reserve than a controller can be expected to need.
     pub fn is_narrow(&self) -> bool {
         let is_sync_narrow = self.slot.sync_reserve_ns < WAKE_UP_RESERVE_NS;
         let is_rest_narrow = self.slot.set_points_reserve_ns < WAKE_UP_RESERVE_NS + COMPUTE_RESERVE_NS;
@@ -100,7 +100,7 @@ pub struct EmergencyEffect {
 }
 
 impl EmergencyEffect {
-    /// Whether it finds room in the slot.
+    /// Returns `true` if it finds room in the slot.
     pub fn fits(self) -> bool {
         self.feedback_late_ns == 0 && self.next_sync_late_ns == 0
     }
@@ -135,7 +135,7 @@ pub struct MessageSchedule {
     pub jitter_ns: u64,
     /// Its longest time on the wire.
     pub transmission_ns: u64,
-    /// Whether it is sent while the axes are enabled, and counted.
+    /// True if it is sent while the axes are enabled, and counted.
     pub is_sent_while_enabled: bool,
     /// The longest time from the event that queues it until it has been received; `None` where there is no bound, or
     /// where it is not sent while the axes are enabled.

@@ -87,7 +87,7 @@ fn analyse_at_own_phase(config: &Config, bus: usize) -> Option<BusSchedule> {
     Some(analyse_bus(&config, bus))
 }
 
-/// Whether a bus carries its traffic only if its axes share command frames.
+/// Returns `true` if a bus carries its traffic only if its axes share command frames.
 pub(super) fn needs_shared_frames(config: &Config, bus: usize, phase: PhaseChoice) -> bool {
     let trial = Trial { config, bus, is_at_any_phase: phase == PhaseChoice::Any };
     !trial.fits_with(|_| ()) && trial.shared_command_frames().is_some()
@@ -223,7 +223,7 @@ impl Trial<'_> {
         (buses > 1).then_some(Remedy::MoreBuses { axes_per_bus, buses })
     }
 
-    /// Whether so many of the axes of the bus, from this one on, fit it.
+    /// Returns `true` if so many of the axes of the bus, from this one on, fit it.
     fn fits_of_axes(self, first: usize, axes: usize) -> bool {
         self.fits_with(|config| {
             let mut seen = 0..;

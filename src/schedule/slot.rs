@@ -71,7 +71,7 @@ pub struct Slot {
     /// The command phases, from the earliest to the latest, at which feedback and set-points are in time; `None` if
     /// there is none.
     pub command_phases_ns: Option<(u64, u64)>,
-    /// Whether everything that the controller has queued in a slot leaves before the next SYNC.
+    /// True if everything that the controller has queued in a slot leaves before the next SYNC.
     pub is_queue_empty_at_sync: bool,
 }
 

@@ -93,8 +93,8 @@ struct Employed {
     user: u32,
 }
 
-/// Whether a connection of `user` finds one of `places`, which connections of `present` have. The user of this process and root may have
-/// all of them. Another user may have a quarter, and all others together three quarters.
+/// Returns `true` if a connection of `user` finds one of `places`, which connections of `present` have. The user of this process and root
+/// may have all of them. Another user may have a quarter, and all others together three quarters.
 fn has_room(places: usize, user: u32, own: u32, present: impl Iterator<Item = u32>) -> bool {
     let is_stranger = |user: u32| user != own && user != 0;
     let (mut all, mut of_strangers, mut of_user) = (0, 0, 0);

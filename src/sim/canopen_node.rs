@@ -129,8 +129,8 @@ impl CanopenNode {
         (self.due_ns, self.wake_ns) = (now_ns, now_ns + 1);
     }
 
-    /// Whether a frame is a PDO of other nodes, as most frames on a bus are. Then nothing has to be done about it, and this is all that it
-    /// costs.
+    /// Returns `true` if a frame is a PDO of other nodes, as most frames on a bus are. Then nothing has to be done about it, and this is
+    /// all that it costs.
     pub fn passes_by(&mut self, now_ns: Nanoseconds, frame: &Frame) -> bool {
         let id = frame.id();
         let passes_by = PDO_IDS.contains(&id.value())
@@ -185,7 +185,7 @@ pub trait CanopenDevice: ControlLoops + Sized {
     /// Acts on the modes, controlwords and set-points in the dictionary.
     fn take_values(&mut self, now_ns: Nanoseconds, source: ValueSource);
 
-    /// Whether it is in a fault.
+    /// Returns `true` if it is in a fault.
     fn is_faulted(&self) -> bool;
 
     /// Writes the measured values to the dictionary.

@@ -64,7 +64,7 @@ pub enum Disobedience {
 }
 
 impl Defect {
-    /// Whether this is a momentary event, so that nothing has to be removed later.
+    /// Returns `true` if this is a momentary event, so that nothing has to be removed later.
     pub const fn is_event(self) -> bool {
         matches!(
             self,

@@ -71,7 +71,7 @@ pub struct Observation {
     pub operation_mode: i8,
     /// Its NMT state.
     pub nmt: NodeState,
-    /// Whether the brake is engaged.
+    /// True if the brake is engaged.
     pub is_braked: bool,
 }
 

@@ -60,7 +60,7 @@ impl DeviceError {
         }
     }
 
-    /// Whether power is cut at once, because a controlled deceleration is not possible: faults of current (2xxx),
+    /// Returns `true` if power is cut at once, because a controlled deceleration is not possible: faults of current (2xxx),
     /// voltage (3xxx), hardware (5xxx) and sensors (73xx).
     pub const fn cuts_power(self) -> bool {
         match self {
@@ -118,7 +118,7 @@ impl Errors {
         }
     }
 
-    /// Whether an emergency message waits.
+    /// Returns `true` if an emergency message waits.
     pub fn is_pending(&self) -> bool {
         !self.pending.is_empty()
     }

@@ -20,7 +20,7 @@ impl Switch {
         Self { from: f64::NEG_INFINITY, to: position }
     }
 
-    /// Whether it is closed at a position.
+    /// Returns `true` if it is closed at a position.
     pub fn is_closed(&self, position: f64) -> bool {
         (self.from..=self.to).contains(&position)
     }
@@ -36,12 +36,12 @@ pub struct HomingSwitches {
 }
 
 impl HomingSwitches {
-    /// Whether DIR is high at a position.
+    /// Returns `true` if DIR is high at a position.
     pub fn dir(&self, position: f64) -> bool {
         self.dir.is_some_and(|switch| switch.is_closed(position))
     }
 
-    /// Whether PU is high at a position.
+    /// Returns `true` if PU is high at a position.
     pub fn pu(&self, position: f64) -> bool {
         self.pu.is_some_and(|switch| switch.is_closed(position))
     }

@@ -45,11 +45,11 @@ pub struct LssDevice {
     identified: u8,
     /// The identity part that the fastscan checks next.
     scan_part: u8,
-    /// Whether it supports the store service.
+    /// True if it supports the store service.
     pub can_store: bool,
     /// Its treatment of fastscan requests.
     pub stack: LssStack,
-    /// Whether it boots when it has got a node ID, as CiA 305 demands.
+    /// True if it boots when it has got a node ID, as CiA 305 demands.
     pub boots: bool,
 }
 

@@ -20,7 +20,7 @@ pub struct Mailbox {
     order: QueueOrder,
     frames: VecDeque<Frame>,
     capacity: usize,
-    /// Whether it takes CAN FD frames.
+    /// True if it takes CAN FD frames.
     takes_fd: bool,
 }
 
@@ -79,7 +79,7 @@ impl Mailbox {
         self.frames.len()
     }
 
-    /// Whether no frame waits.
+    /// Returns `true` if no frame waits.
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }

@@ -89,7 +89,7 @@ impl Medium {
         self.is_connected[station] = !is_cut_off;
     }
 
-    /// Whether a station is connected.
+    /// Returns `true` if a station is connected.
     pub fn is_connected(&self, station: usize) -> bool {
         self.is_connected[station]
     }

@@ -119,7 +119,7 @@ impl Network {
         self.state
     }
 
-    /// Whether SDO and emergency messages work.
+    /// Returns `true` if SDO and emergency messages work.
     pub fn has_services(&self) -> bool {
         matches!(self.state, NodeState::PreOperational | NodeState::Operational)
     }
@@ -269,7 +269,7 @@ impl Network {
         Some(byte)
     }
 
-    /// Whether the master has just been lost: its heartbeat, or its node guarding.
+    /// Returns `true` if the master has just been lost: its heartbeat, or its node guarding.
     pub fn has_lost_master(&mut self, now_ns: Nanoseconds) -> bool {
         let mut is_lost = self.guard_deadline_ns <= now_ns;
         if is_lost {

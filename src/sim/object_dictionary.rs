@@ -33,15 +33,15 @@ pub struct ObjectEntry {
     pub kind: ObjectKind,
     /// The length of a number in bytes; 0 for a variable length.
     pub length: usize,
-    /// Whether SDO can read it.
+    /// True if SDO can read it.
     pub is_readable: bool,
-    /// Whether SDO can write it.
+    /// True if SDO can write it.
     pub is_writable: bool,
-    /// Whether an RPDO can map it.
+    /// True if an RPDO can map it.
     pub maps_to_rpdo: bool,
-    /// Whether a TPDO can map it.
+    /// True if a TPDO can map it.
     pub maps_to_tpdo: bool,
-    /// Whether a restart keeps its value after "save".
+    /// True if a restart keeps its value after "save".
     pub is_saved: bool,
     low: i128,
     high: i128,
@@ -199,7 +199,7 @@ impl SimulatedDictionary {
         &self.entries[place]
     }
 
-    /// Whether a PDO may map this data type as a placeholder.
+    /// Returns `true` if a PDO may map this data type as a placeholder.
     pub fn is_dummy(&self, index: u16) -> bool {
         self.dummies.contains(&index)
     }
@@ -402,7 +402,7 @@ fn limits(entry: &eds::DictionaryEntry, data_type: DataTypeCode, node: u8) -> (i
     if low < high { (low, high) } else { (lowest, highest) }
 }
 
-/// Whether an object is a command or a set-point, which no device saves.
+/// Returns `true` if an object is a command or a set-point, which no device saves.
 fn is_command(index: u16) -> bool {
     match index {
         0x1001..=0x1003 | 0x1010 | 0x1011 => true,

@@ -27,7 +27,7 @@ struct Field {
     place: Option<usize>,
     shift: u32,
     bits: u32,
-    /// Whether its change is an event of the device, and not only another measurement.
+    /// True if its change is an event of the device, and not only another measurement.
     is_event: bool,
 }
 
@@ -104,12 +104,12 @@ impl Pdo {
         self.bytes = (shift as usize).div_ceil(8);
     }
 
-    /// Whether it is synchronous: transmission types 0 to 240.
+    /// Returns `true` if it is synchronous: transmission types 0 to 240.
     fn is_synchronous(&self) -> bool {
         self.transmission_type <= 240
     }
 
-    /// Whether an event sends it: transmission types 254 and 255. An empty one is not sent.
+    /// Returns `true` if an event sends it: transmission types 254 and 255. An empty one is not sent.
     fn is_event_driven(&self) -> bool {
         self.id.is_some() && self.transmission_type >= 254 && self.bytes > 0
     }
@@ -171,7 +171,7 @@ impl Inbound {
 struct Outbound {
     pdo: Pdo,
     syncs: u8,
-    /// Whether the synchronous transmission has started.
+    /// True if the synchronous transmission has started.
     has_started: bool,
     /// The sampled payload, and when it is to be sent.
     sampled: u64,
@@ -205,7 +205,7 @@ pub struct PdoEngine {
     features: PdoFeatures,
     /// The time of the next action: of the first sampled TPDO, or of the first event timer that runs out.
     due_ns: Nanoseconds,
-    /// Whether an event can send a TPDO.
+    /// True if an event can send a TPDO.
     has_events: bool,
 }
 
@@ -214,7 +214,7 @@ pub struct PdoEngine {
 pub struct PdoFeatures {
     /// Whether an object is a measured value, which changes all the time.
     pub is_measured: fn(u16) -> bool,
-    /// Whether it watches the event timers of its RPDOs.
+    /// True if it watches the event timers of its RPDOs.
     pub watches_rpdos: bool,
 }
 
@@ -270,7 +270,7 @@ impl PdoEngine {
         self.due_ns = sampled.chain(deadlines).fold(NEVER, Nanoseconds::min);
     }
 
-    /// Whether this is the identifier of an RPDO.
+    /// Returns `true` if this is the identifier of an RPDO.
     pub fn takes(&self, id: Id) -> bool {
         self.inbound.iter().any(|inbound| inbound.pdo.id == Some(id))
     }
@@ -327,7 +327,7 @@ impl PdoEngine {
         true
     }
 
-    /// Whether an RPDO carries an object.
+    /// Returns `true` if an RPDO carries an object.
     pub fn carries(&self, number: usize, place: usize) -> bool {
         self.inbound[number].pdo.fields.iter().any(|field| field.place == Some(place))
     }
@@ -374,7 +374,7 @@ impl PdoEngine {
         self.schedule();
     }
 
-    /// Whether an event can send a TPDO.
+    /// Returns `true` if an event can send a TPDO.
     pub fn has_events(&self) -> bool {
         self.has_events
     }
@@ -427,7 +427,7 @@ impl PdoEngine {
         self.outbound[number].pdo.event_ns
     }
 
-    /// Whether the event timer of an RPDO has just run out.
+    /// Returns `true` if the event timer of an RPDO has just run out.
     pub fn has_lost_rpdo(&mut self, now_ns: Nanoseconds) -> bool {
         if now_ns < self.due_ns {
             return false;

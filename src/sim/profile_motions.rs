@@ -74,22 +74,22 @@ impl Motion {
         self.demand.velocity
     }
 
-    /// Whether it is not at rest.
+    /// Returns `true` if it is not at rest.
     pub const fn is_moving(&self) -> bool {
         !matches!(self.course, Course::Rest(_))
     }
 
-    /// Whether it rests at a target, and not where it was stopped.
+    /// Returns `true` if it rests at a target, and not where it was stopped.
     pub const fn is_target_reached(&self) -> bool {
         matches!(self.course, Course::Rest(Rest::AtTarget))
     }
 
-    /// Whether a reciprocating motion is coming to rest.
+    /// Returns `true` if a reciprocating motion is coming to rest.
     pub const fn is_stopping_reciprocation(&self) -> bool {
         matches!(self.course, Course::Stopping { was_reciprocating: true, .. })
     }
 
-    /// Whether it rests because a reciprocating motion was ended.
+    /// Returns `true` if it rests because a reciprocating motion was ended.
     pub const fn has_ended_reciprocation(&self) -> bool {
         matches!(self.course, Course::Rest(Rest::AfterReciprocation))
     }

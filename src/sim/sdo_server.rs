@@ -45,7 +45,7 @@ pub enum SdoFeatures {
     Expedited,
     /// Expedited and segmented ones.
     Segmented {
-        /// Whether it answers every upload in segments, which CiA 301 permits.
+        /// True if it answers every upload in segments, which CiA 301 permits.
         is_upload_segmented: bool,
     },
     /// All, block transfers too.

@@ -71,7 +71,7 @@ impl SlcanAdapter {
         }
     }
 
-    /// Whether a frame can pass between the adapter and its bus.
+    /// Returns `true` if a frame can pass between the adapter and its bus.
     fn passes(&self, frame: &Frame) -> bool {
         let is_nominal = self.nominal.is_some_and(|rate| rate.bits_per_s() == self.bus.nominal);
         let is_data = self.bus.data.is_some() && self.data.map(DataBitRate::bits_per_s) == self.bus.data;

@@ -104,7 +104,7 @@ impl<'a> CdrDecoder<'a> {
         Some(Self { body: message.strip_prefix(&HEADER)?, at: 0 })
     }
 
-    /// Whether the message has nothing more.
+    /// Returns `true` if the message has nothing more.
     pub fn is_over(&self) -> bool {
         self.at >= self.body.len()
     }

@@ -46,7 +46,7 @@ impl FrameFeed {
         readers.retain(|reader| frames.iter().all(|frame| reader.take(frame)));
     }
 
-    /// Whether somebody reads.
+    /// Returns `true` if somebody reads.
     pub fn is_read(&self) -> bool {
         !self.readers.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
     }

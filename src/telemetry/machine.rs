@@ -38,7 +38,7 @@ pub struct AxisDescription {
     pub own_errors: Vec<(u16, String)>,
     /// The unit of its position.
     pub unit: Unit,
-    /// Whether its drive plans its own profile to a target (a profile mode), instead of following set-points.
+    /// True if its drive plans its own profile to a target (a profile mode), instead of following set-points.
     pub plans_own_profile: bool,
     /// Counts per rad (m) of the position that the drive reports.
     pub counts_per_unit: f64,
@@ -148,7 +148,7 @@ impl Machine {
         self.axes.iter().map(|axis| axis.group).collect()
     }
 
-    /// Whether the drive of an axis plans its own profile, instead of following set-points.
+    /// Returns `true` if the drive of an axis plans its own profile, instead of following set-points.
     pub fn plans_own_profile(&self, axis: u8) -> bool {
         self.axes.get(usize::from(axis)).is_some_and(|axis| axis.plans_own_profile)
     }

@@ -22,7 +22,7 @@ pub struct MessageType {
 }
 
 impl MessageType {
-    /// Whether messages with another definition of this type can be read.
+    /// Returns `true` if messages with another definition of this type can be read.
     pub fn can_be_read_as(&self, definition: &str) -> bool {
         let (known, other) = (layout(self.definition), layout(definition));
         let is_earlier = self.later_fields.iter().any(|later| known.len() == other.len() + later);

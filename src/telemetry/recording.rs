@@ -97,7 +97,7 @@ pub struct Recording {
     journal_channel: Option<u16>,
     /// The time of the last message.
     last_time: u64,
-    /// Whether a group was stopping in the last cycle.
+    /// True if a group was stopping in the last cycle.
     was_stopping: bool,
     missed_slots: MissedSlotsSoFar,
 }
@@ -292,7 +292,7 @@ impl Recording {
         self.writer.flush()
     }
 
-    /// Whether the file could exceed this size by another chunk, with the index at its end. A file has at least one chunk.
+    /// Returns `true` if the file could exceed this size by another chunk, with the index at its end. A file has at least one chunk.
     pub fn is_full(&self, size_limit_bytes: u64) -> bool {
         let channels = 4 + self.group_channels.len() + self.axis_channels.len() + self.health_channels.len();
         let index = CHUNK_INDEX_BYTES + CHANNEL_INDEX_BYTES * (channels + 1) as u64;

@@ -21,7 +21,7 @@ use crate::link::trace::TracedHealth;
 /// How recordings are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RecordingOptions {
-    /// Whether recordings and black boxes are compressed (zstd). Default yes.
+    /// True if recordings and black boxes are compressed (zstd). Default yes.
     pub is_compressed: bool,
     /// The most bytes of a file; then the next one begins. `None`, the default, makes a single file. A [`RecordingDestination::Stream`]
     /// is always one.

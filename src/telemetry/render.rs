@@ -101,7 +101,7 @@ impl RunReport {
         }
     }
 
-    /// Whether each of several groups has stopped, and why.
+    /// Returns `true` if each of several groups has stopped, and why.
     fn group_lines(&self, text: &mut String, emphasis: Emphasis) {
         let group = |group: &GroupReport| {
             let stop = group.stop.as_ref().map_or_else(

@@ -110,9 +110,9 @@ pub struct RealtimeReport {
     pub priority: Option<u8>,
     /// The CPU that the thread was pinned to.
     pub cpu: Option<usize>,
-    /// Whether all memory was locked.
+    /// True if all memory was locked.
     pub memory_locked: bool,
-    /// Whether the kernel is PREEMPT_RT.
+    /// True if the kernel is PREEMPT_RT.
     pub preempt_rt: bool,
     /// The time before a deadline during which the thread spun instead of sleeping.
     pub spin_guard_ns: u64,

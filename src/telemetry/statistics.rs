@@ -115,7 +115,7 @@ pub struct AxisStatistics {
     pub position: f64,
     /// The slot in which that position was reported; `None` if the drive has never reported.
     pub reported_slot: Option<u64>,
-    /// Whether the drive still reported in the cycle of that set-point.
+    /// True if the drive still reported in the cycle of that set-point.
     pub is_reported: bool,
     was_enabled: bool,
 }
@@ -162,7 +162,7 @@ impl AxisStatistics {
     }
 }
 
-/// Whether all drives are meant to follow set-points in this phase.
+/// Returns `true` if all drives are meant to follow set-points in this phase.
 const fn is_enabled(phase: Phase) -> bool {
     matches!(phase, Phase::Holding | Phase::Moving | Phase::Streaming | Phase::Stopping)
 }

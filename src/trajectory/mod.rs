@@ -184,7 +184,7 @@ impl Trajectory {
         self.path.axes
     }
 
-    /// Whether an axis ever leaves its first position.
+    /// Returns `true` if an axis ever leaves its first position.
     pub fn moves(&self, axis: usize) -> bool {
         let stays = |polynomial: &Polynomial| polynomial.0[1..].iter().all(|coefficient| *coefficient == 0.0);
         !self.path.polynomials.iter().skip(axis).step_by(self.path.axes.max(1)).all(stays)

@@ -224,7 +224,7 @@ impl Path {
         Ok(())
     }
 
-    /// Whether every axis keeps its limits on a phase of a time law that begins at 0, and the rate is never negative.
+    /// Returns `true` if every axis keeps its limits on a phase of a time law that begins at 0, and the rate is never negative.
     fn keeps_limits(&self, phase: &TimeLawPhase, duration_s: f64, limits: &[AxisLimits]) -> bool {
         let mut left = vec![(0.0, duration_s)];
         for _ in 0..INTERVALS_AT_MOST {

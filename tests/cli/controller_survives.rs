@@ -298,7 +298,7 @@ fn a_process_that_is_paused_for_too_long_stops_the_arm_without_a_jump_and_counts
     assert_moved_smoothly(&place);
 }
 
-/// Whether the drives follow set-points.
+/// Returns `true` if the drives follow set-points.
 fn is_enabled(record: &RecordedCycle) -> bool {
     matches!(record.groups[0].phase, Phase::Holding | Phase::Moving | Phase::Stopping)
 }

@@ -208,7 +208,7 @@ fn a_name_of_a_family_is_found_in_any_case_and_as_a_part_of_a_name_and_not_withi
     }
 }
 
-/// Whether a line has this name, not as a part of a longer word: it begins a word, or a part of a name in capitals.
+/// Returns `true` if a line has this name, not as a part of a longer word: it begins a word, or a part of a name in capitals.
 fn names(line: &str, family: &str) -> bool {
     let lower = line.to_lowercase();
     lower.match_indices(family).any(|(at, _)| {

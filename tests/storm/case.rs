@@ -14,7 +14,7 @@ pub struct Case {
     /// The scenario as a user would write it.
     pub text: String,
     pub scenario: Scenario,
-    /// Whether clients command the group, and a stop is theirs to deal with; otherwise a program does, and a stop ends it.
+    /// True if clients command the group, and a stop is theirs to deal with; otherwise a program does, and a stop ends it.
     pub is_serving: bool,
     /// So many ask for moves and stops, beside the program if there is one.
     pub clients: usize,
@@ -26,13 +26,13 @@ pub struct Case {
     pub broken_off: Option<u64>,
     pub hardship: Hardship,
     pub overload: Overload,
-    /// Whether streams command velocities, torques and impedances, too.
+    /// True if streams command velocities, torques and impedances, too.
     pub has_every_kind_of_point: bool,
-    /// Whether callbacks lead the groups, too.
+    /// True if callbacks lead the groups, too.
     pub has_callbacks: bool,
-    /// Whether somebody changes modes of operation, too.
+    /// True if somebody changes modes of operation, too.
     pub has_mode_changes: bool,
-    /// Whether somebody has checked trajectories carried out.
+    /// True if somebody has checked trajectories carried out.
     pub has_trajectories: bool,
     pub dice: Dice,
 }
@@ -44,9 +44,9 @@ pub struct Hardship {
     pub stalls: Vec<(u64, u64)>,
     /// Cycles from one look of the life cycle to the next; 0 as 1.
     pub neglect: u64,
-    /// Whether clients go on asking for things to the last cycle, though the run is on its way out.
+    /// True if clients go on asking for things to the last cycle, though the run is on its way out.
     pub are_clients_stubborn: bool,
-    /// Whether streams are led near their limits and beyond, and say what they like of their velocity.
+    /// True if streams are led near their limits and beyond, and say what they like of their velocity.
     pub are_streams_wild: bool,
 }
 
@@ -244,7 +244,7 @@ impl Case {
         vary_program(dice, &mut self.config, self.clients > 0);
     }
 
-    /// Whether torques and impedances are commanded.
+    /// Returns `true` if torques and impedances are commanded.
     pub const fn are_torques_commanded(&self) -> bool {
         self.has_callbacks || self.has_every_kind_of_point
     }

@@ -172,7 +172,7 @@ impl Client {
     }
 }
 
-/// Whether the groups can be asked for something beside a program: nothing has stopped one by itself.
+/// Returns `true` if the groups can be asked for something beside a program: nothing has stopped one by itself.
 pub fn are_open(snapshot: &Snapshot) -> bool {
     let is_open = |group: &GroupSnapshot| {
         let has_own_stop = group.stop.is_some_and(|stop| stop.rule() != takt_rt::Rule::Requested);

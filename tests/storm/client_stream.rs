@@ -51,9 +51,9 @@ impl Kind {
 /// Which streams there are.
 #[derive(Clone, Copy)]
 pub struct StreamVariety {
-    /// Whether they are led near the limits and beyond, and say what they like of their velocity.
+    /// True if they are led near the limits and beyond, and say what they like of their velocity.
     pub is_wild: bool,
-    /// Whether they command velocities, torques and impedances too, and not positions alone.
+    /// True if they command velocities, torques and impedances too, and not positions alone.
     pub has_every_kind: bool,
 }
 

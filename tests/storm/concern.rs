@@ -72,9 +72,9 @@ pub struct Concerns {
     /// The bus of each fault.
     buses: Vec<usize>,
     pub by_axis: Vec<Concern>,
-    /// Whether any fault has begun on a bus, an entry a bus.
+    /// True if any fault has begun on a bus, an entry a bus.
     pub by_bus: Vec<bool>,
-    /// Whether a bus cannot carry in time what is asked of it, an entry a bus: `takt run` refuses such a machine.
+    /// True if a bus cannot carry in time what is asked of it, an entry a bus: `takt run` refuses such a machine.
     pub is_overloaded: Vec<bool>,
     bus_of_axis: Vec<usize>,
 }
@@ -148,7 +148,7 @@ impl Concerns {
         }
     }
 
-    /// Whether the last frames to an axis may have been corrupted: such a fault has not ended yet.
+    /// Returns `true` if the last frames to an axis may have been corrupted: such a fault has not ended yet.
     pub fn is_misled_now(&self, fault_injector: &FaultInjector, axis: usize) -> bool {
         let mut faults = fault_injector.progress().zip(&self.by_fault);
         faults.any(|((_, progress), concerns)| {

@@ -5,7 +5,7 @@ use takt_rt::Frame;
 use takt_wire::erob_can::entries;
 use takt_wire::erob_can::frame::ReceivedRequest;
 
-/// Whether the drive of an axis is spoken to outside of the cycle.
+/// Returns `true` if the drive of an axis is spoken to outside of the cycle.
 pub fn is_beside_the_cycle(axis: &Axis) -> bool {
     let protocol = axis.drive.protocol;
     protocol.own_identifiers().is_some() || protocol.is_of_serial_line()

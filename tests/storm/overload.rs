@@ -47,7 +47,7 @@ struct Clog {
 }
 
 impl Clog {
-    /// Whether the queue is stuck in this cycle.
+    /// Returns `true` if the queue is stuck in this cycle.
     fn is_on(self, cycle: u64) -> bool {
         (self.from_cycle..self.from_cycle.saturating_add(self.cycles)).contains(&cycle)
     }
@@ -97,7 +97,7 @@ impl Overload {
         }
     }
 
-    /// Whether there is any.
+    /// Returns `true` if there is any.
     pub fn is_present(&self) -> bool {
         self.computing.chance > 0.0
             || self.sync.chance > 0.0

@@ -51,13 +51,13 @@ fn resume(case: &Case, replay: &Replay) -> Replay {
     Replay::new(&case.config, journal).unwrap()
 }
 
-/// Whether they are the same in every bit: their texts say everything, and NaN is NaN. Texts are slow.
+/// Returns `true` if they are the same in every bit: their texts say everything, and NaN is NaN. Texts are slow.
 fn is_same(recorded: &takt_rt::CycleRecord, replayed: &takt_rt::CycleRecord) -> bool {
     recorded == replayed && is_same_zero(recorded, replayed)
         || format!("{recorded:?}") == format!("{replayed:?}")
 }
 
-/// Whether zeros have the same signs, which equality does not see.
+/// Returns `true` if zeros have the same signs, which equality does not see.
 fn is_same_zero(recorded: &takt_rt::CycleRecord, replayed: &takt_rt::CycleRecord) -> bool {
     recorded.axes().iter().zip(replayed.axes()).all(|(was, is)| {
         was.position_set.to_bits() == is.position_set.to_bits()

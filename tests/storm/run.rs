@@ -146,7 +146,7 @@ pub struct FaultOutcome {
     pub fault: usize,
     /// What the first group that it concerns was doing when it began.
     pub phase: Phase,
-    /// Whether the axes had been enabled before.
+    /// True if the axes had been enabled before.
     pub is_brought_up: bool,
     /// The first stop that a group made by itself from then on, unless another fault came between.
     pub stop: Option<Rule>,
@@ -169,7 +169,7 @@ pub struct Done {
     /// How often a callback, and a checked trajectory, has begun to lead a group.
     pub callbacks: u64,
     pub trajectories: u64,
-    /// Whether the drives could not be brought up.
+    /// True if the drives could not be brought up.
     pub is_bring_up_failed: bool,
 }
 
@@ -315,7 +315,7 @@ fn play_in(world: &mut World, case: &Case) -> Result<Done, String> {
     })
 }
 
-/// Whether the drives of a group in this phase have torque.
+/// Returns `true` if the drives of a group in this phase have torque.
 fn is_led(phase: Phase) -> bool {
     !matches!(phase, Phase::Passive | Phase::Disabled | Phase::Disabling)
 }

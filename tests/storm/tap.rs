@@ -14,7 +14,7 @@ pub struct Tap {
     port: Port,
     /// What has been taken since the last look.
     pub sent: Vec<Frame>,
-    /// Whether the interface's queue takes frames and sends none.
+    /// True if the interface's queue takes frames and sends none.
     pub is_clogged: bool,
     queue: VecDeque<Frame>,
 }

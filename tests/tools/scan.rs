@@ -439,7 +439,7 @@ fn three_modes() -> SimulatedBus {
     bus(&[&mit, &position, &velocity])
 }
 
-/// Whether a frame asks motors by the identifier that every one of them hears.
+/// Returns `true` if a frame asks motors by the identifier that every one of them hears.
 fn reads_registers(frame: &Frame) -> bool {
     frame.id().value() == 0x7FF
 }

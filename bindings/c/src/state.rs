@@ -100,9 +100,9 @@ pub struct takt_axis_state {
     /// The state of CiA 402: 0 not ready to switch on, 1 switch on disabled, 2 ready to switch on, 3 switched on, 4 operation enabled,
     /// 5 quick stop active, 6 fault reaction active, 7 fault, 8 undefined.
     pub drive_state: u8,
-    /// Whether the drive has reported since the controller became active. If not, nothing that it reports is known.
+    /// True if the drive has reported since the controller became active. If not, nothing that it reports is known.
     pub is_heard: bool,
-    /// Whether what the drive reports is not from the last cycle: position, velocity, torque and the rest are old.
+    /// True if what the drive reports is not from the last cycle: position, velocity, torque and the rest are old.
     pub is_stale: bool,
     /// 0; for later.
     pub reserved: [u8; 17],
@@ -126,9 +126,9 @@ pub struct takt_group_state {
     pub stream_late_points: u64,
     /// Points that found no room, or could not be used.
     pub stream_lost_points: u64,
-    /// Whether it is stopping or has stopped. It is false again once the group has been enabled again, or has moved on.
+    /// True if it is stopping or has stopped. It is false again once the group has been enabled again, or has moved on.
     pub is_stopped: bool,
-    /// Whether that stop was for a fault, which takt_clear_faults() must clear.
+    /// True if that stop was for a fault, which takt_clear_faults() must clear.
     pub is_faulted: bool,
     /// The category of that stop, 0 to 2: a takt_stop_category.
     pub stop_category: u8,
@@ -194,7 +194,7 @@ pub struct takt_state {
     pub group_count: u32,
     /// How many of `buses` count.
     pub bus_count: u32,
-    /// Whether the drive of any of these axes is stale.
+    /// True if the drive of any of these axes is stale.
     pub is_any_stale: bool,
     /// 0; for later.
     pub reserved: [u8; 3],

@@ -39,7 +39,7 @@ pub struct Options {
     pub connect: Vec<String>,
     /// The endpoints that are listened at.
     pub listen: Vec<String>,
-    /// Whether the other computers have ROS 2 Humble, which has no hashes of types.
+    /// True if the other computers have ROS 2 Humble, which has no hashes of types.
     pub is_humble: bool,
 }
 

@@ -47,7 +47,7 @@ pub struct Node {
     pub namespace: String,
     /// Its name.
     pub name: String,
-    /// Whether its peers are of Humble.
+    /// True if its peers are of Humble.
     pub is_humble: bool,
 }
 
@@ -93,7 +93,7 @@ pub fn gid(token: &str) -> Gid {
     xxh3_128(token.as_bytes()).to_le_bytes()
 }
 
-/// Whether this is a name of a topic from the root: `/arm/joint_states`.
+/// Returns `true` if this is a name of a topic from the root: `/arm/joint_states`.
 pub fn is_topic(name: &str) -> bool {
     let is_part = |part: &str| {
         part.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')

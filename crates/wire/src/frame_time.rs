@@ -8,7 +8,7 @@ use takt_rt::FrameKind;
 pub struct FrameShape {
     /// Its kind.
     pub kind: FrameKind,
-    /// Whether its identifier has 29 bits.
+    /// True if its identifier has 29 bits.
     pub is_extended: bool,
     /// Its length in bytes, as in its length code.
     pub length: usize,

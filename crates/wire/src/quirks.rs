@@ -34,7 +34,7 @@ pub enum ObjectPattern {
 }
 
 impl ObjectPattern {
-    /// Whether an object is meant.
+    /// Returns `true` if an object is meant.
     pub fn matches(self, address: ObjectAddress) -> bool {
         match self {
             Self::Index(index) => address.index == index,
@@ -99,7 +99,7 @@ pub struct Quirks {
     pub units: Vec<(u16, MotionUnit)>,
     /// The NMT state after the boot-up message.
     pub power_up: PowerUpState,
-    /// Whether it refuses SDO block transfers.
+    /// True if it refuses SDO block transfers.
     pub refuses_blocks: bool,
     /// Its delays.
     pub delays: Delays,
@@ -108,12 +108,12 @@ pub struct Quirks {
 }
 
 impl Quirks {
-    /// Whether the drive lacks an object that its data sheet may list.
+    /// Returns `true` if the drive lacks an object that its data sheet may list.
     pub fn is_missing(&self, address: ObjectAddress) -> bool {
         self.missing.iter().any(|pattern| pattern.matches(address))
     }
 
-    /// Whether the drive refuses to write an object that its data sheet may call writable.
+    /// Returns `true` if the drive refuses to write an object that its data sheet may call writable.
     pub fn is_constant(&self, address: ObjectAddress) -> bool {
         self.constant.iter().any(|pattern| pattern.matches(address))
     }

@@ -155,7 +155,7 @@ struct Stuffing {
     /// The run of equal bits at the end: its length, 0 to 4, and in the lowest bit its level.
     run: u8,
     stuffed: u32,
-    /// Whether a stuff bit follows the last bit pushed.
+    /// True if a stuff bit follows the last bit pushed.
     is_just_stuffed: bool,
 }
 

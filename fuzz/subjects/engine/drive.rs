@@ -18,7 +18,7 @@ pub struct ObedientDrive {
     pub data: ProcessData,
     pub state: DriveState,
     pub is_silent: bool,
-    /// Whether it tells in each cycle what it had to tell in the one before.
+    /// True if it tells in each cycle what it had to tell in the one before.
     pub is_late: bool,
     /// Where the joint is and how fast: rad (m), rad/s (m/s).
     position: f64,

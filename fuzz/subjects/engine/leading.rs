@@ -18,7 +18,7 @@ pub struct Leading {
     next: CallbackReturn,
     /// Calls so far.
     pub calls: u64,
-    /// Whether a torque or an impedance was ever wanted: a joint need not be on its set-point then.
+    /// True if a torque or an impedance was ever wanted: a joint need not be on its set-point then.
     pub has_driven: bool,
 }
 

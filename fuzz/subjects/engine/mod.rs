@@ -77,7 +77,7 @@ pub struct Journey {
     pub calls: u64,
     /// The rules of all stops.
     pub stops: BTreeSet<&'static str>,
-    /// Whether one group was in motion while another one was not.
+    /// True if one group was in motion while another one was not.
     pub are_apart: bool,
 }
 
@@ -103,7 +103,7 @@ struct Hall {
     services: VecDeque<Frame>,
     events: Vec<Event>,
     is_retired: bool,
-    /// Whether set-points left with the last cycle, by its record.
+    /// True if set-points left with the last cycle, by its record.
     is_commanded: bool,
     snapshot: Snapshot,
 }
@@ -383,7 +383,8 @@ impl Machine {
         self.note(self.hall.asked - asked);
     }
 
-    /// Whether frames may leave on a bus that is behind: it may only look so, and they show it. The next ones come after twice the time.
+    /// Returns `true` if frames may leave on a bus that is behind: it may only look so, and they show it. The next ones come after twice
+    /// the time.
     fn is_trial(&mut self, bus: usize, is_behind: bool, has_frames: bool) -> bool {
         let has_cycle = self.slot.is_multiple_of(self.config.buses[bus].divider.into());
         let (slots, next) = &mut self.trials[bus];

@@ -37,7 +37,7 @@ pub struct Watch {
     axes: Vec<Past>,
     groups: Vec<PastGroup>,
     is_retired: bool,
-    /// Whether a torque or an impedance was ever wanted of a joint: it need not be on its set-point then.
+    /// True if a torque or an impedance was ever wanted of a joint: it need not be on its set-point then.
     pub has_driven: bool,
     refused: u64,
     stopping_at_most: u32,

@@ -95,7 +95,7 @@ fn not_carried(bus: &Bus, task: &Task) -> Option<Failure> {
     })
 }
 
-/// Whether no frame that was sent has been acknowledged.
+/// Returns `true` if no frame that was sent has been acknowledged.
 fn is_unacknowledged(port: &mut Port) -> bool {
     let health = port.health();
     health.tx_frames == 0 || health.state != BusState::ErrorActive

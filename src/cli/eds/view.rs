@@ -33,7 +33,7 @@ pub struct FilePicture {
     pub description: Option<String>,
     pub created_by: Option<String>,
     pub last_eds: Option<String>,
-    /// Whether it configures a device (a DCF).
+    /// True if it configures a device (a DCF).
     pub is_configuration: bool,
 }
 
@@ -78,7 +78,7 @@ pub struct EntryView {
     pub low: Option<ValueView>,
     pub high: Option<ValueView>,
     pub denotation: Option<String>,
-    /// Whether numbers of this entry are read in hexadecimal.
+    /// True if numbers of this entry are read in hexadecimal.
     #[serde(skip)]
     pub is_pattern: bool,
 }

@@ -49,16 +49,16 @@ pub struct Report {
     /// The bit rate that it was given, in bit/s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bit_rate: Option<u32>,
-    /// Whether it has stored its settings.
+    /// True if it has stored its settings.
     pub is_stored: bool,
-    /// Whether it was told to change to the bit rate.
+    /// True if it was told to change to the bit rate.
     pub is_activated: bool,
-    /// Whether it keeps its old node ID until it is reset.
+    /// True if it keeps its old node ID until it is reset.
     pub is_reset_needed: bool,
     /// The node ID with which a device has booted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub booted_node: Option<u8>,
-    /// Whether a boot-up message was due and has not come.
+    /// True if a boot-up message was due and has not come.
     pub is_boot_up_missing: bool,
 }
 

@@ -8,7 +8,7 @@ pub const HEAD_BYTES: usize = 8192;
 pub enum Wish {
     /// The metrics, with their text, or (`HEAD`) without.
     Metrics {
-        /// Whether the text is wanted.
+        /// True if the text is wanted.
         has_body: bool,
     },
     /// Something that there is not, or that is not allowed.

@@ -71,7 +71,7 @@ impl FromStr for FamilyName {
 }
 
 impl DriveOptions {
-    /// Whether any drive is named.
+    /// Returns `true` if any drive is named.
     pub fn names_some(&self) -> bool {
         !self.families.is_empty() || !self.sheets.is_empty()
     }

@@ -62,7 +62,7 @@ pub struct Session {
     printed: Collected,
     first_ns: Option<Nanoseconds>,
     shown: u64,
-    /// Whether a log could not be written.
+    /// True if a log could not be written.
     is_log_broken: bool,
     is_bus_lost: bool,
     remarks: Vec<String>,
@@ -216,7 +216,7 @@ impl Session {
         self.printed.print();
     }
 
-    /// Whether anybody wants more frames.
+    /// Returns `true` if anybody wants more frames.
     pub fn wants_more(&self) -> bool {
         let is_unread = self.printed.has_no_reader() && self.options.log.is_none();
         let is_counted_out = self.options.count.is_some_and(|count| self.shown >= count);

@@ -145,7 +145,7 @@ impl ThrottledBar {
     }
 }
 
-/// Whether an event is not part of an ordinary run. One of a stated duration ends with a stop that it requests itself.
+/// Returns `true` if an event is not part of an ordinary run. One of a stated duration ends with a stop that it requests itself.
 fn is_urgent(event: &Event, has_duration: bool) -> bool {
     match &event.kind {
         EventKind::Stop(stop) => !(has_duration && matches!(stop.cause, StopCause::Requested)),

@@ -246,7 +246,7 @@ impl Sheet {
 /// Ctrl-C, or the wish of another takt to take the bus over.
 pub struct Interruption {
     arrived: Arc<AtomicBool>,
-    /// Whether it has been seen once.
+    /// True if it has been seen once.
     is_over: Cell<bool>,
 }
 
@@ -261,7 +261,7 @@ impl Interruption {
         self.is_over.set(true);
     }
 
-    /// Whether it has come.
+    /// Returns `true` if it has come.
     pub fn has_come(&self) -> bool {
         if self.arrived.load(Ordering::Relaxed) {
             self.is_over.set(true);

@@ -101,7 +101,7 @@ fn registers(section: &mut Section<'_>, name: Option<String>) -> Option<Register
     Some(RegisterScan { protocol, mode_is: mode_is? })
 }
 
-/// Whether so many bytes of a frame tell this.
+/// Returns `true` if so many bytes of a frame tell this.
 fn tells(frame: &RegisterFrame, what: RegisterByte, times: usize) -> bool {
     frame.payload.iter().filter(|byte| **byte == what).count() == times
 }

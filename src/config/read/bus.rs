@@ -22,11 +22,11 @@ pub struct ReadBus<'a> {
     pub bit_rate: u32,
     /// Cycles of the controller in one of this bus; `None` when its period is wrong.
     pub divider: Option<u32>,
-    /// Whether it is a serial line, and no CAN bus.
+    /// True if it is a serial line, and no CAN bus.
     pub is_line: bool,
     /// Where the bit rate is, if it is given.
     pub bit_rate_spot: Option<Spot<'a>>,
-    /// Whether the schedule decides if axes share command frames.
+    /// True if the schedule decides if axes share command frames.
     pub has_automatic_frames: bool,
     /// `None` when something about it is wrong.
     pub bus: Option<Bus>,

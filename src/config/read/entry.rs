@@ -73,22 +73,22 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// Whether this is that word, for values that may also be a word (`"off"`, `"measure"`).
+    /// Returns `true` if this is that word, for values that may also be a word (`"off"`, `"measure"`).
     pub fn is_word(&self, word: &str) -> bool {
         matches!(self.value, DeValue::String(text) if text == word)
     }
 
-    /// Whether this is a number without a unit.
+    /// Returns `true` if this is a number without a unit.
     pub fn is_bare_number(&self) -> bool {
         matches!(self.value, DeValue::Integer(_) | DeValue::Float(_))
     }
 
-    /// Whether this is a number with a unit of this quantity.
+    /// Returns `true` if this is a number with a unit of this quantity.
     pub fn is_quantity(&self, quantity: Quantity) -> bool {
         matches!(self.value, DeValue::String(text) if quantity.parse(text).is_ok())
     }
 
-    /// Whether this is a list.
+    /// Returns `true` if this is a list.
     pub fn is_list(&self) -> bool {
         matches!(self.value, DeValue::Array(_))
     }

@@ -19,7 +19,7 @@ pub struct ReadGroup {
     pub axes: Vec<usize>,
     stops_with: Vec<usize>,
     header: Range<usize>,
-    /// Whether its name and all of its axes could be read.
+    /// True if its name and all of its axes could be read.
     pub is_whole: bool,
 }
 

@@ -52,7 +52,7 @@ pub struct Section<'a> {
     known: Vec<&'static str>,
     known_in_defaults: Vec<&'static str>,
     missing: Vec<(&'static str, Cow<'static, str>)>,
-    /// Whether the file has something other than a table here. Its missing keys are not reported then.
+    /// True if the file has something other than a table here. Its missing keys are not reported then.
     is_no_table: bool,
     problems: &'a Problems,
 }

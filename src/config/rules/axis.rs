@@ -126,7 +126,7 @@ pub fn unknown_bus(given: &str, known: &[&str]) -> ProblemKind {
     ProblemKind::UnknownBus { name: excerpt(given), nearest, known }
 }
 
-/// Whether two axes can be those of one drive with several axes.
+/// Returns `true` if two axes can be those of one drive with several axes.
 pub fn are_of_one_node(first: &DriveFacts, second: &DriveFacts) -> bool {
     (first.word, first.identity) == (second.word, second.identity) && first.node_axis != second.node_axis
 }
@@ -308,7 +308,7 @@ fn validate_other_modes(axis: &Axis, spot: &Spot<'_>) {
     }
 }
 
-/// Whether a drive that starts like this can be changed to other modes; reports it if not.
+/// Returns `true` if a drive that starts like this can be changed to other modes; reports it if not.
 pub fn has_other_modes(spot: &Spot<'_>, drive: &DriveFacts, control: Control) -> bool {
     let (given, allowed) = match drive.mode_changes {
         ModeChangeRule::Never { because } => {

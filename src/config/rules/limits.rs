@@ -116,7 +116,7 @@ pub fn validate_following_error(following_error: &FollowingError, q: Quantities,
     fields.at("time").duration(following_error.time_ns, ranges::FOLLOWING_ERROR_TIME_S);
 }
 
-/// Whether a position is within the limits.
+/// Returns `true` if a position is within the limits.
 pub fn contains(limits: &Limits, position: f64) -> bool {
     (limits.position_min..=limits.position_max).contains(&position)
 }

@@ -32,7 +32,7 @@ impl Surroundings {
         }
     }
 
-    /// Whether the joint is a simulated one.
+    /// Returns `true` if the joint is a simulated one.
     pub const fn is_simulated(&self) -> bool {
         self.simulated_inertia.is_some()
     }

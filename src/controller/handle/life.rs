@@ -18,12 +18,12 @@ impl Life {
         self.0.fetch_max(ENDING, Ordering::Relaxed);
     }
 
-    /// Whether the owner ends the run, or the run is over.
+    /// Returns `true` if the owner ends the run, or the run is over.
     pub(super) fn is_ending(&self) -> bool {
         self.0.load(Ordering::Relaxed) != RUNNING
     }
 
-    /// Whether the run is over. What was published before its end can be seen then.
+    /// Returns `true` if the run is over. What was published before its end can be seen then.
     pub(super) fn is_over(&self) -> bool {
         self.0.load(Ordering::Acquire) == OVER
     }

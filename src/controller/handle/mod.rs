@@ -139,7 +139,7 @@ impl Handle {
         }
     }
 
-    /// Whether the run has ended, so that every command returns an error that says `Ended`.
+    /// Returns `true` if the run has ended, so that every command returns an error that says `Ended`.
     pub fn has_ended(&self) -> bool {
         self.0.life.is_over()
     }

@@ -43,7 +43,7 @@ impl Handle {
         self.fault_in(RequestTarget::All)
     }
 
-    /// Whether a stop has discarded a request that has no answer in this state.
+    /// Returns `true` if a stop has discarded a request that has no answer in this state.
     pub(super) fn is_discarded(&self, target: RequestTarget, request: RequestId, state: &Snapshot) -> bool {
         motion::is_discarded(state, request, self.0.clients.newest_stop(target))
     }

@@ -13,7 +13,7 @@ use crate::faults::{Delivery, DriveEffect, InjectError, Injectable};
 #[derive(Debug, Default)]
 pub(super) struct LineStatus {
     is_down: AtomicBool,
-    /// Whether an injected fault has taken the line away.
+    /// True if an injected fault has taken the line away.
     is_taken_away: AtomicBool,
     requests: AtomicU64,
     replies: AtomicU64,

@@ -85,7 +85,7 @@ impl ThreadEnd {
         self.reports.try_iter().for_each(|(place, news)| report(place, news));
     }
 
-    /// Whether a drive has no torque and does not watch for its master any more.
+    /// Returns `true` if a drive has no torque and does not watch for its master any more.
     pub fn is_settled(&self, place: usize) -> bool {
         place < 64 && self.shared.unsettled.load(Ordering::Relaxed) >> place & 1 == 0
     }

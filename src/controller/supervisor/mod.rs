@@ -94,7 +94,7 @@ pub struct Supervisor {
     /// That of groups that have gone back to passive, while it is under way.
     again: Option<BringUpAgain>,
     off_cycle: OffCycleDrives,
-    /// Whether the drive of an axis has PDOs: such a one tells its position at bring-up, and confirms its shut-down by SDO.
+    /// True if the drive of an axis has PDOs: such a one tells its position at bring-up, and confirms its shut-down by SDO.
     has_pdos: Vec<bool>,
     shutdown: Shutdown,
     /// For how long the drive of each axis is told to stop at least.
@@ -117,7 +117,7 @@ pub struct Supervisor {
     drive_errors: Vec<(usize, u16)>,
     deadline_ns: Option<u64>,
     duration_ns: Option<u64>,
-    /// Whether a client commands the group, in place of the program.
+    /// True if a client commands the group, in place of the program.
     is_serving: bool,
     after_bring_up: AfterBringUp,
     /// The buses, and their states as `tracing` knows them.

@@ -14,7 +14,7 @@ pub fn unreleased_stop(snapshot: &Snapshot) -> Option<StopReason> {
     stops.find(|stop| matches!(stop.rule(), Rule::NotDisabled | Rule::DriveEnabled))
 }
 
-/// Whether a group is in such a phase.
+/// Returns `true` if a group is in such a phase.
 pub fn is_any(snapshot: &Snapshot, is_such: impl Fn(Phase) -> bool) -> bool {
     snapshot.groups().iter().any(|group| is_such(group.phase))
 }

@@ -65,12 +65,12 @@ impl Device {
         }
     }
 
-    /// Whether there is a bit rate that can be set and read.
+    /// Returns `true` if there is a bit rate that can be set and read.
     pub fn has_bit_timing(&self) -> bool {
         self.class != Class::Virtual
     }
 
-    /// Whether it has an interrupt of its own.
+    /// Returns `true` if it has an interrupt of its own.
     pub fn has_interrupt(&self) -> bool {
         matches!(self.class, Class::Native | Class::Spi | Class::Usb)
     }

@@ -12,9 +12,9 @@ const FD_MTU: u64 = 72;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Link {
     pub name: String,
-    /// Whether it was brought up.
+    /// True if it was brought up.
     pub is_up: bool,
-    /// Whether it carries CAN FD frames.
+    /// True if it carries CAN FD frames.
     pub has_fd: bool,
     /// `can`, `vcan`, `vxcan` …
     pub kind: Option<String>,

@@ -189,18 +189,18 @@ impl<'a> AxisSession<'a> {
         self.config.axes.iter().filter(is_of_node)
     }
 
-    /// Whether this is the first axis of its node that is brought up or shut down: what belongs to the node as a whole is begun with
-    /// it.
+    /// Returns `true` if this is the first axis of its node that is brought up or shut down: what belongs to the node as a whole is begun
+    /// with it.
     pub fn is_first_of_node(&self) -> bool {
         self.siblings().next().is_none_or(|first| first.drive.node_axis == self.axis.drive.node_axis)
     }
 
-    /// Whether this is the last axis of its node: what belongs to the node as a whole is ended with it.
+    /// Returns `true` if this is the last axis of its node: what belongs to the node as a whole is ended with it.
     pub fn is_last_of_node(&self) -> bool {
         self.siblings().last().is_none_or(|last| last.drive.node_axis == self.axis.drive.node_axis)
     }
 
-    /// Whether the configuration has this axis of the node.
+    /// Returns `true` if the configuration has this axis of the node.
     pub fn has_node_axis(&self, node_axis: u8) -> bool {
         self.siblings().any(|axis| axis.drive.node_axis == node_axis)
     }
@@ -505,7 +505,7 @@ impl<'a> AxisSession<'a> {
         Ok(())
     }
 
-    /// Whether an object that may be absent is so by this error. Some drives abort with a code that has another meaning.
+    /// Returns `true` if an object that may be absent is so by this error. Some drives abort with a code that has another meaning.
     fn may_refuse(&self, error: SdoError) -> bool {
         matches!(error, SdoError::Aborted(_)) || self.bus.quirks().means_absent(error)
     }

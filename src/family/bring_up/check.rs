@@ -39,7 +39,7 @@ pub enum Check {
 }
 
 impl Check {
-    /// Whether `value` meets the condition.
+    /// Returns `true` if `value` meets the condition.
     pub fn passes(self, value: i64) -> bool {
         match self {
             Self::Any => true,

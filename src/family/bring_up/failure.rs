@@ -132,11 +132,11 @@ pub enum FailureCause {
         object: ObjectAddress,
         /// The bytes to write.
         written: Content,
-        /// Whether it was being read back after the write.
+        /// True if it was being read back after the write.
         is_reading_back: bool,
         /// Why it failed.
         error: SdoError,
-        /// Whether this error means that the drive does not have the object.
+        /// True if this error means that the drive does not have the object.
         means_absent: bool,
     },
     /// A configured value reads back differently.
@@ -272,7 +272,7 @@ impl fmt::Display for FailureCause {
 }
 
 impl FailureCause {
-    /// Whether the drive did not answer.
+    /// Returns `true` if the drive did not answer.
     pub(crate) fn is_silence(&self) -> bool {
         matches!(
             self,

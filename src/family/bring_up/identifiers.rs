@@ -81,7 +81,7 @@ impl Taken {
         id
     }
 
-    /// Whether a PDO of this node may have an identifier.
+    /// Returns `true` if a PDO of this node may have an identifier.
     fn is_free(&self, id: Id, node: u8) -> bool {
         let owner = (id.value() & 0x7F) as u8;
         PDO_IDS.contains(&id.value())

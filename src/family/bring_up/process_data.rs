@@ -201,7 +201,7 @@ fn of_node_axis(objects: Vec<MappedObject>, axis: &Axis) -> Vec<MappedObject> {
     objects.into_iter().map(|object| object.of_node_axis(axis.drive.node_axis)).collect()
 }
 
-/// Whether the mode of an axis may be changed at run time.
+/// Returns `true` if the mode of an axis may be changed at run time.
 fn changes_mode(axis: &Axis) -> bool {
     !axis.other_modes.is_empty()
 }

@@ -47,8 +47,8 @@ fn frame_bits(bytes: usize) -> u32 {
     worst_case_bits(FrameShape::classic(bytes)).nominal
 }
 
-/// Whether the command of an axis may be in a frame with those of others: it is sent in every cycle, by a mapping of the controller,
-/// and taken at SYNC.
+/// Returns `true` if the command of an axis may be in a frame with those of others: it is sent in every cycle, by a mapping of the
+/// controller, and taken at SYNC.
 fn may_share(axis: &Axis, config: &Config) -> bool {
     let is_of_node = |other: &&Axis| (other.bus, other.node) == (axis.bus, axis.node);
     axis.mapping == PdoMapping::Written
@@ -137,7 +137,7 @@ impl SharedFrame {
         Self { number: self.number, parts }.is_possible(members)
     }
 
-    /// Whether it fits a frame, and the drive of each axis can map its part and pass over the others.
+    /// Returns `true` if it fits a frame, and the drive of each axis can map its part and pass over the others.
     fn is_possible(&self, members: &[&Axis]) -> bool {
         let count = self.objects().count();
         let can_map = |place: usize| {

@@ -228,7 +228,7 @@ impl Sheet<'_> {
         Ok(())
     }
 
-    /// Whether a mode of the axis has this target.
+    /// Returns `true` if a mode of the axis has this target.
     fn has_target(&self, target: CommandSlot) -> bool {
         self.c.axis.controls().any(|control| control.target_slot() == target)
     }

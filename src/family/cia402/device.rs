@@ -120,12 +120,12 @@ impl Device {
         first_pdo(self.node_axis)
     }
 
-    /// Whether the drive has an object.
+    /// Returns `true` if the drive has an object.
     pub fn has(&self, object: &Object) -> bool {
         self.entry(object.address).is_some()
     }
 
-    /// Whether the drive lets an object be written.
+    /// Returns `true` if the drive lets an object be written.
     pub fn is_writable(&self, address: ObjectAddress) -> bool {
         let writable = |entry: &DictionaryEntry| {
             matches!(
@@ -140,7 +140,7 @@ impl Device {
             && !self.quirks.is_constant(of_axis(address, self.node_axis))
     }
 
-    /// Whether a PDO can carry an object.
+    /// Returns `true` if a PDO can carry an object.
     pub fn is_mappable(&self, address: ObjectAddress) -> bool {
         self.entry(address).is_some_and(|entry| entry.is_mappable)
     }
@@ -240,7 +240,8 @@ impl Device {
         by_quirks.or_else(by_si).or_else(by_factor).unwrap_or(VelocityUnit::Counts(1.0))
     }
 
-    /// Whether the controller can map the PDOs: the mapping of the first RPDO of the axis and that of its first TPDO are writable.
+    /// Returns `true` if the controller can map the PDOs: the mapping of the first RPDO of the axis and that of its first TPDO are
+    /// writable.
     fn is_mapped_freely(&self) -> bool {
         [PdoDirection::Receive, PdoDirection::Transmit].into_iter().all(|direction| {
             let parameters = PdoParameters::at(direction, self.first_pdo());
@@ -271,7 +272,7 @@ impl Device {
         }
     }
 
-    /// Whether the drive can be made to watch the heartbeat of the controller.
+    /// Returns `true` if the drive can be made to watch the heartbeat of the controller.
     pub(super) fn consumes_heartbeat(&self) -> bool {
         self.is_writable(CONSUMER_HEARTBEAT_TIME.address)
     }

@@ -214,7 +214,7 @@ fn advice_words(advice: &Option<&'static str>) -> String {
 }
 
 impl Failure {
-    /// Whether the drive reports that the object does not exist.
+    /// Returns `true` if the drive reports that the object does not exist.
     pub(crate) fn means_absent(&self) -> bool {
         match self {
             Self::Transfer { error: SdoError::Aborted(code), .. } => code.means_absent(),
@@ -222,7 +222,7 @@ impl Failure {
         }
     }
 
-    /// Whether the request was refused before anything was changed.
+    /// Returns `true` if the request was refused before anything was changed.
     pub fn is_refusal(&self) -> bool {
         matches!(
             self,

@@ -100,7 +100,7 @@ impl TargetDrive {
         family::of(&self.drive)
     }
 
-    /// Whether its counts mean a position: by a configuration, or by what its family says of its encoder.
+    /// Returns `true` if its counts mean a position: by a configuration, or by what its family says of its encoder.
     pub fn has_units(&self) -> bool {
         self.limits.is_some() || self.drive.counts_per_turn.is_some()
     }
@@ -109,7 +109,7 @@ impl TargetDrive {
         self.family().data_sheet(&self.drive)
     }
 
-    /// Whether the drive has an object, as far as its data sheet tells.
+    /// Returns `true` if the drive has an object, as far as its data sheet tells.
     pub fn has(&self, address: ObjectAddress) -> bool {
         self.data_sheet().is_none_or(|sheet| sheet.has(address))
     }
@@ -119,12 +119,12 @@ impl TargetDrive {
         self.data_sheet()?.name(address)
     }
 
-    /// Whether the drive lets an object be written, as far as its data sheet tells.
+    /// Returns `true` if the drive lets an object be written, as far as its data sheet tells.
     pub fn is_writable(&self, address: ObjectAddress) -> bool {
         self.data_sheet().is_none_or(|sheet| sheet.is_writable(address))
     }
 
-    /// Whether the drive has a mode that its object 6502 may leave out.
+    /// Returns `true` if the drive has a mode that its object 6502 may leave out.
     pub(super) fn adds_mode(&self, mode: OperationMode) -> bool {
         self.data_sheet().is_some_and(|sheet| sheet.adds_mode(mode))
     }

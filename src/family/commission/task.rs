@@ -79,14 +79,14 @@ pub enum Task {
     },
     /// Make the current position zero.
     Zero {
-        /// Whether the user confirmed it.
+        /// True if the user confirmed it.
         is_confirmed: bool,
     },
     /// Store the parameters.
     Save,
     /// Restore the parameters of the factory.
     Restore {
-        /// Whether the user confirmed it.
+        /// True if the user confirmed it.
         is_confirmed: bool,
     },
     /// Change the node ID.
@@ -101,7 +101,7 @@ pub enum Task {
     },
     /// Release the brake without torque.
     ReleaseBrake {
-        /// Whether the user confirmed that nothing holds the joint.
+        /// True if the user confirmed that nothing holds the joint.
         is_confirmed: bool,
     },
     /// Stop the joint as fast as the drive can, whatever that does to its gear, by a command of its own.
@@ -113,7 +113,7 @@ pub enum Task {
     },
     /// Clear the drive's fault.
     ClearFault {
-        /// Whether the user confirmed the loss of the turn count, where clearing causes it.
+        /// True if the user confirmed the loss of the turn count, where clearing causes it.
         is_confirmed: bool,
     },
     /// Show readings of the axis.
@@ -143,9 +143,9 @@ pub enum Task {
     },
     /// Set whether the drive moves to its multi-turn zero at power-up.
     AutoHome {
-        /// Whether it does so.
+        /// True if it does so.
         is_on: bool,
-        /// Whether the user confirmed it.
+        /// True if the user confirmed it.
         is_confirmed: bool,
     },
     /// Set the drive up for interpolation over the bus.
@@ -184,7 +184,7 @@ pub struct GainFactors {
 }
 
 impl GainFactors {
-    /// Whether none is given.
+    /// Returns `true` if none is given.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
@@ -223,7 +223,7 @@ pub enum PulseQuantity {
 pub struct ValueText {
     /// The text: with a unit, a whole number, or a word where the entry has words for its values.
     pub text: String,
-    /// Whether it is a whole number in the drive's own unit.
+    /// True if it is a whole number in the drive's own unit.
     pub is_raw: bool,
 }
 

@@ -61,7 +61,7 @@ pub trait CommandedModule {
     /// Enables or disables the motor.
     fn set_enabled(&self, is_enabled: bool) -> impl Future<Output = Result<(), Self::Error>>;
 
-    /// Whether the motor could not be enabled because the module has just been switched on.
+    /// Returns `true` if the motor could not be enabled because the module has just been switched on.
     fn is_starting(error: &Self::Error) -> bool;
 
     /// What the user should know while the motor is enabled: what becomes of it without its master.
@@ -161,17 +161,17 @@ impl From<u16> for ReachedStatus {
 }
 
 impl Status {
-    /// Whether the joint stands.
+    /// Returns `true` if the joint stands.
     pub const fn stands(&self) -> bool {
         self.velocity.saturating_abs() <= super::STANDING
     }
 
-    /// Whether a move has come to its target, and the joint stands there.
+    /// Returns `true` if a move has come to its target, and the joint stands there.
     pub fn has_arrived(&self) -> bool {
         self.reached == ReachedStatus::Reached && self.motion == MotionStatus::Stopped && self.stands()
     }
 
-    /// Whether the motor has no power, and the joint stands: settings that need it may be made.
+    /// Returns `true` if the motor has no power, and the joint stands: settings that need it may be made.
     pub fn is_off(&self) -> bool {
         self.reached == ReachedStatus::MotorOff && self.stands()
     }

@@ -131,7 +131,7 @@ impl Motion {
         }
     }
 
-    /// Whether it has a target, which was compared with the limits of the axis beforehand.
+    /// Returns `true` if it has a target, which was compared with the limits of the axis beforehand.
     pub const fn has_target(self) -> bool {
         !matches!(self, Self::Continuous(..) | Self::Velocity(..) | Self::Torque { .. })
     }

@@ -29,7 +29,7 @@ pub struct Run<'a> {
     pub motion: Motion,
     /// How long a motion lasts that does not end by itself; `None`: until it is interrupted.
     pub duration_ns: Option<Nanoseconds>,
-    /// Whether the motor stays enabled at the end.
+    /// True if the motor stays enabled at the end.
     pub keeps_enabled: bool,
     /// The drive: units and limits of its axis.
     pub target: &'a TargetDrive,

@@ -68,7 +68,7 @@ enum Stage {
     Off,
     Preparing {
         setting: usize,
-        /// Whether the value in the drive is another one.
+        /// True if the value in the drive is another one.
         differs: bool,
     },
     /// It is told to enable, not before this time.
@@ -91,7 +91,7 @@ enum Stage {
     /// It shows an error, or has refused to be enabled.
     Fault {
         code: u16,
-        /// Whether disabling was no cure for it.
+        /// True if disabling was no cure for it.
         is_tried: bool,
     },
     /// It was disabled after an error, which is read again.
@@ -322,7 +322,7 @@ impl Follower {
         self.stage = Stage::Stopping { is_told: false, until_ns };
     }
 
-    /// Whether the drive is led to its set-points, or is about to be.
+    /// Returns `true` if the drive is led to its set-points, or is about to be.
     const fn is_leading(&self) -> bool {
         matches!(self.stage, Stage::Enabling { .. } | Stage::Settling { .. } | Stage::Following)
     }

@@ -11,7 +11,7 @@ const REPLY_NS: u64 = 500_000;
 /// In what firmware differs, as far as the simulation can show it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Firmware {
-    /// Whether the velocity limit of torque control (0204) is taken while the motor is enabled. By the manual it is not; a program
+    /// True if the velocity limit of torque control (0204) is taken while the motor is enabled. By the manual it is not; a program
     /// of the vendor writes it in every loop while enabled, so there seems to be firmware that takes it.
     takes_velocity_limit_while_enabled: bool,
 }

@@ -166,7 +166,7 @@ async fn ratings(c: &AxisSession<'_>) -> StepResult {
     Ok(())
 }
 
-/// Whether a mode of the axis has this target.
+/// Returns `true` if a mode of the axis has this target.
 fn has_target(axis: &Axis, target: CommandSlot) -> bool {
     axis.controls().any(|control| control.target_slot() == target)
 }

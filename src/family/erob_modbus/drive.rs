@@ -39,7 +39,7 @@ pub enum AccessFailure {
 }
 
 impl AccessError {
-    /// Whether the drive refuses with this code.
+    /// Returns `true` if the drive refuses with this code.
     pub fn is_refusal(&self, code: ExceptionCode) -> bool {
         matches!(&self.failure, AccessFailure::Request(error) if error.failure == RequestFailure::Refused(code))
     }

@@ -143,7 +143,7 @@ impl Follower {
         }
     }
 
-    /// Whether the drive has no torque, and does not watch for its master, as far as this side knows.
+    /// Returns `true` if the drive has no torque, and does not watch for its master, as far as this side knows.
     pub const fn is_settled(&self) -> bool {
         matches!(self.life, Life::Off)
     }
@@ -379,7 +379,7 @@ impl Follower {
         };
     }
 
-    /// Whether the drive has kept the communication time-out decides whether it is enabled.
+    /// Returns `true` if the drive has kept the communication time-out decides whether it is enabled.
     fn take_timeout(&mut self, values: &Values) {
         let Life::Preparing { step, from_ns } = self.life else { return };
         if values.as_slice() == [self.parameters.communication_timeout_ms] {

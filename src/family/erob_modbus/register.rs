@@ -85,7 +85,7 @@ impl Register {
         }
     }
 
-    /// Whether it makes no difference how often a value is written: not for commands that act anew each time.
+    /// Returns `true` if it makes no difference how often a value is written: not for commands that act anew each time.
     pub fn may_be_repeated(&self) -> bool {
         use registers::{CLEAR_FAULT, RESET_ENCODER, SAVE, START_MOTION};
         ![START_MOTION, CLEAR_FAULT, SAVE, RESET_ENCODER].contains(self)

@@ -38,11 +38,11 @@ pub struct BusScan {
     pub wait_ns: Nanoseconds,
     /// How long to listen, at the least. A heartbeat usually comes once a second.
     pub listening_ns: Nanoseconds,
-    /// Whether nothing is sent at all.
+    /// True if nothing is sent at all.
     pub only_listens: bool,
-    /// Whether drives may be asked that lose their torque by the question.
+    /// True if drives may be asked that lose their torque by the question.
     pub may_take_torque: bool,
-    /// Whether the bus carries CAN FD frames.
+    /// True if the bus carries CAN FD frames.
     pub has_fd: bool,
     /// The node IDs of the running controller that sends the questions, if one does: its drives are not asked.
     pub of_controller: Option<Vec<u8>>,
@@ -115,7 +115,7 @@ impl Scan {
         }
     }
 
-    /// Whether the question of a protocol is no command to any drive, whoever is on the bus.
+    /// Returns `true` if the question of a protocol is no command to any drive, whoever is on the bus.
     fn disturbs_nobody(&self, protocol: &dyn OwnProtocol) -> bool {
         let Some(question) = protocol.question(1) else { return true };
         let harms = |other: &&'static dyn OwnProtocol| other.is_harmed_by(question.id());
@@ -136,7 +136,7 @@ impl Scan {
         }
     }
 
-    /// Whether the question of a protocol may be asked on this bus.
+    /// Returns `true` if the question of a protocol may be asked on this bus.
     fn may_ask(&self, protocol: &dyn OwnProtocol) -> bool {
         let is_allowed = self.scan.may_take_torque || protocol.consequence().is_none();
         let may_be_sent = |question: Frame| self.scan.has_fd || !question.is_fd();
@@ -204,13 +204,14 @@ impl Scan {
         }
     }
 
-    /// Whether a question is one to nobody but the drives of its protocol.
+    /// Returns `true` if a question is one to nobody but the drives of its protocol.
     fn reaches_nobody_else(&mut self, place: usize, protocol: &dyn OwnProtocol, id: Id) -> bool {
         !self.would_be_taken(protocol.name(), id)
             && !self.session.heard(|heard| heard.is_command_to_other(place, id))
     }
 
-    /// Whether a drive that is heard would take a question for a command. The first one of each protocol that is left out so is remembered.
+    /// Returns `true` if a drive that is heard would take a question for a command. The first one of each protocol that is left out so is
+    /// remembered.
     fn would_be_taken(&mut self, asker: &'static str, id: Id) -> bool {
         let Some(other) = self.session.heard(|heard| heard.would_take(id)) else { return false };
         self.left_out.entry(asker).or_insert_with(|| {
@@ -258,7 +259,7 @@ impl Scan {
         }
     }
 
-    /// Whether the SDO identifiers of a node are those of a drive that has answered in its own protocol.
+    /// Returns `true` if the SDO identifiers of a node are those of a drive that has answered in its own protocol.
     fn is_own_drive(&self, node: u8) -> bool {
         self.session.heard(|heard| {
             heard.protocols().iter().enumerate().any(|(place, protocol)| {

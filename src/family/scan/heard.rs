@@ -25,7 +25,7 @@ pub struct HeardNode {
     pub boot_ups: u32,
     /// The last emergency message that was not the end of one.
     pub emergency: Option<Emergency>,
-    /// Whether it has sent process data, under the identifiers of the pre-defined connection set.
+    /// True if it has sent process data, under the identifiers of the pre-defined connection set.
     pub has_process_data: bool,
     /// The identifiers of its process data and emergency messages.
     ids: BTreeSet<u32>,
@@ -35,17 +35,17 @@ pub struct HeardNode {
 }
 
 impl HeardNode {
-    /// Whether anything has come from it.
+    /// Returns `true` if anything has come from it.
     pub const fn is_there(&self) -> bool {
         self.state.is_some() || self.emergency.is_some() || self.has_process_data || self.has_answered()
     }
 
-    /// Whether it has answered an SDO request.
+    /// Returns `true` if it has answered an SDO request.
     pub const fn has_answered(&self) -> bool {
         self.responses > 0
     }
 
-    /// Whether more responses have come than requests were sent.
+    /// Returns `true` if more responses have come than requests were sent.
     pub const fn answers_twice(&self) -> bool {
         self.requests > 0 && self.responses > self.requests
     }
@@ -61,7 +61,7 @@ pub struct HeardDrive {
 }
 
 impl HeardDrive {
-    /// Whether more replies have come than requests were sent.
+    /// Returns `true` if more replies have come than requests were sent.
     pub const fn answers_twice(&self) -> bool {
         self.requests > 0 && self.replies > self.requests
     }
@@ -77,12 +77,12 @@ struct HeardHeartbeats {
 }
 
 impl HeardHeartbeats {
-    /// Whether a drive may be there. By an identifier that CANopen does not have, frames of any bytes show that.
+    /// Returns `true` if a drive may be there. By an identifier that CANopen does not have, frames of any bytes show that.
     const fn may_be(&self) -> bool {
         self.alike > 0 || self.node.is_none()
     }
 
-    /// Whether they are those of a drive, if no CANopen node has this identifier.
+    /// Returns `true` if they are those of a drive, if no CANopen node has this identifier.
     const fn are(&self) -> bool {
         self.alike >= HEARTBEATS && self.different == 0
     }
@@ -164,7 +164,7 @@ impl Heard {
         drives.map(|(drive, _)| *drive).collect()
     }
 
-    /// Whether an identifier belongs to one of these drives.
+    /// Returns `true` if an identifier belongs to one of these drives.
     fn belongs_to(&self, drives: &[(usize, u8)], id: Id) -> bool {
         drives.iter().any(|(place, node)| {
             self.protocols.get(*place).is_some_and(|protocol| protocol.has_identifier(*node, id))
@@ -181,7 +181,7 @@ impl Heard {
         })
     }
 
-    /// Whether nothing was heard of a node but frames by identifiers of drives that are known by their heartbeats.
+    /// Returns `true` if nothing was heard of a node but frames by identifiers of drives that are known by their heartbeats.
     pub(super) fn is_mistaken(&self, node: &HeardNode) -> bool {
         let drives = self.heartbeating();
         let has_shown_itself = node.state.is_some() || node.has_answered();
@@ -189,7 +189,7 @@ impl Heard {
         !has_shown_itself && !node.ids.is_empty() && node.ids.iter().all(is_of_drive)
     }
 
-    /// Whether another drive that has replied takes frames of this identifier for commands.
+    /// Returns `true` if another drive that has replied takes frames of this identifier for commands.
     pub(super) fn is_command_to_other(&self, protocol: usize, id: Id) -> bool {
         self.drives.iter().filter(|((place, _), heard)| *place != protocol && heard.reply.is_some()).any(
             |((place, node), _)| {

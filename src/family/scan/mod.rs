@@ -46,7 +46,7 @@ pub struct Scanned {
     pub devices: Vec<FoundDevice>,
     /// What is odd on the bus as a whole: sentences for people.
     pub remarks: Vec<String>,
-    /// Whether it was interrupted before everything was asked.
+    /// True if it was interrupted before everything was asked.
     pub is_interrupted: bool,
     /// The state of the bus at the end.
     pub bus_state: BusState,

@@ -52,18 +52,18 @@ pub trait OwnProtocol: Sync + fmt::Debug {
         None
     }
 
-    /// Whether an identifier belongs to a drive that is known by its heartbeats.
+    /// Returns `true` if an identifier belongs to a drive that is known by its heartbeats.
     fn has_identifier(&self, _node: u8, _id: Id) -> bool {
         false
     }
 
-    /// Whether every drive of this protocol takes a frame of this identifier for a command, whatever its node ID is. Nobody is asked by it
-    /// where such a drive is heard.
+    /// Returns `true` if every drive of this protocol takes a frame of this identifier for a command, whatever its node ID is. Nobody is
+    /// asked by it where such a drive is heard.
     fn is_harmed_by(&self, _id: Id) -> bool {
         false
     }
 
-    /// Whether a drive takes frames of this identifier for commands.
+    /// Returns `true` if a drive takes frames of this identifier for commands.
     fn is_commanded_by(&self, _node: u8, _id: Id) -> bool {
         false
     }

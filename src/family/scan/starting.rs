@@ -84,7 +84,7 @@ pub fn starting_configuration(
     text
 }
 
-/// Whether there can be an axis for one of the devices.
+/// Returns `true` if there can be an axis for one of the devices.
 pub fn can_drive(devices: &[FoundDevice]) -> bool {
     !driven(devices).is_empty()
 }

@@ -46,7 +46,7 @@ pub fn fixed(axis: &Axis) -> ProcessData {
     ProcessData { commands, feedback: vec![transmit(feedback)], unused }
 }
 
-/// Whether the drive sends its feedback at SYNC. In profile velocity it must: its reply to a command has no statusword.
+/// Returns `true` if the drive sends its feedback at SYNC. In profile velocity it must: its reply to a command has no statusword.
 pub fn answers_sync(axis: &Axis) -> bool {
     axis.answers_sync || axis.control == Control::ProfileVelocity
 }

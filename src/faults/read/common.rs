@@ -35,7 +35,7 @@ impl Location<'_, '_> {
         }
     }
 
-    /// Whether its drives are simulated; if not, that is reported.
+    /// Returns `true` if its drives are simulated; if not, that is reported.
     pub fn is_simulated(&self, config: &Config) -> bool {
         let interface = config.buses.get(self.bus).map(|bus| &bus.interface);
         match (interface, &self.entry) {

@@ -103,7 +103,7 @@ impl FaultKind {
         KINDS.iter().find(|(_, other)| *other == self).map_or("", |(name, _)| *name)
     }
 
-    /// Whether it concerns an axis and not a bus.
+    /// Returns `true` if it concerns an axis and not a bus.
     pub fn needs_axis(self) -> bool {
         matches!(self, Self::Drive(_) | Self::ForeignSetPoints | Self::DuplicateNode)
     }

@@ -124,7 +124,7 @@ fn rpdos(node: u8) -> impl Iterator<Item = (Id, u8)> {
     function_code::RPDO.into_iter().map(move |function| (Id::canopen(function, node), node))
 }
 
-/// Whether an SDO request writes (CiA 301, 7.2.4.3): client command specifier 0 and 1 (download), 6 (block download).
+/// Returns `true` if an SDO request writes (CiA 301, 7.2.4.3): client command specifier 0 and 1 (download), 6 (block download).
 fn is_sdo_download(frame: &Frame) -> bool {
     frame.payload().first().is_some_and(|byte| matches!(byte >> 5, 0 | 1 | 6))
 }

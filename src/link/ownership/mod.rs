@@ -111,13 +111,13 @@ pub enum ClaimError {
 }
 
 impl ClaimError {
-    /// Whether a process of a user that is neither root nor this one keeps the lock, whoever asks for it. Anybody in the network namespace
-    /// can bind its name.
+    /// Returns `true` if a process of a user that is neither root nor this one keeps the lock, whoever asks for it. Anybody in the network
+    /// namespace can bind its name.
     fn is_of_stranger(&self) -> bool {
         matches!(self, Self::NotReleased { holder, .. } if holder.user != 0 && holder.user != geteuid().as_raw())
     }
 
-    /// Whether [`IfOwned::TakeOver`] may help.
+    /// Returns `true` if [`IfOwned::TakeOver`] may help.
     pub(crate) const fn can_be_taken_over(&self) -> bool {
         matches!(self, Self::Held { role: Role::Master, .. })
     }

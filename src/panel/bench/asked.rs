@@ -48,7 +48,7 @@ pub enum Ask {
         drive: usize,
         /// What is done.
         task: AskedTask,
-        /// Whether it ends when it is not renewed, as with a held key.
+        /// True if it ends when it is not renewed, as with a held key.
         #[serde(default)]
         held: bool,
     },
@@ -93,7 +93,7 @@ pub enum AskedTask {
     Disable {},
     /// Clears a fault.
     ClearFault {
-        /// Whether its consequence was agreed to.
+        /// True if its consequence was agreed to.
         is_confirmed: bool,
     },
     /// To a position.
@@ -199,7 +199,7 @@ impl AskedTask {
         }
     }
 
-    /// Whether the drive may have torque while it runs, or after it.
+    /// Returns `true` if the drive may have torque while it runs, or after it.
     pub const fn may_give_torque(&self) -> bool {
         !matches!(self, Self::Info {} | Self::Cycle { .. } | Self::Disable {} | Self::ClearFault { .. })
     }

@@ -16,7 +16,7 @@ pub struct Interruption<'a> {
     bench: &'a Bench,
     /// The page it is for; `None` where it is carried out for nobody, as the last disabling is.
     page: Option<PageNumber>,
-    /// Whether another errand replaces it.
+    /// True if another errand replaces it.
     gives_way: bool,
     stops: u64,
     interrupted: Option<Instant>,
@@ -34,7 +34,7 @@ impl<'a> Interruption<'a> {
         Self { bench, page: None, gives_way: false, stops: 0, interrupted: None, looked: None }
     }
 
-    /// Whether the errand is to be interrupted now: each `true` is an interruption of its own.
+    /// Returns `true` if the errand is to be interrupted now: each `true` is an interruption of its own.
     pub fn poll(&mut self, ownership: &mut Ownership) -> bool {
         let now = Instant::now();
         if self.looked.is_some_and(|looked| now.duration_since(looked) < LOOK_EVERY) {

@@ -50,7 +50,7 @@ struct Errand {
 }
 
 impl Errand {
-    /// Whether it ends what goes on, and does not wait for it.
+    /// Returns `true` if it ends what goes on, and does not wait for it.
     const fn is_disabling(&self) -> bool {
         matches!(self.ask, Ask::Task { task: AskedTask::Disable {}, .. })
     }
@@ -71,7 +71,7 @@ pub struct Bench {
 #[derive(Debug, Default)]
 struct Next {
     errand: Option<Errand>,
-    /// Whether an errand runs that is not to be replaced by another one.
+    /// True if an errand runs that is not to be replaced by another one.
     is_busy: bool,
     /// What runs is to end.
     ends: bool,
@@ -138,12 +138,12 @@ impl Bench {
         self.stops.load(Ordering::Acquire)
     }
 
-    /// Whether another process has taken the buses over.
+    /// Returns `true` if another process has taken the buses over.
     pub fn is_taken_over(&self) -> bool {
         self.is_taken_over.load(Ordering::Acquire)
     }
 
-    /// Whether a page is there and commands.
+    /// Returns `true` if a page is there and commands.
     fn may_move(&self, page: PageNumber) -> bool {
         !self.gate.has_ended() && self.gate.pages().may_move(page, Instant::now())
     }

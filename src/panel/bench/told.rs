@@ -20,7 +20,7 @@ pub struct DriveView {
     pub family: Option<String>,
     /// `rad`, `m`, or `counts` where its units are not known.
     pub unit: &'static str,
-    /// Whether it stands in the configuration.
+    /// True if it stands in the configuration.
     pub is_configured: bool,
     pub position_min: Option<f64>,
     pub position_max: Option<f64>,
@@ -44,7 +44,7 @@ pub struct FoundView {
 }
 
 impl FoundView {
-    /// Whether it is this device, where neither has a node ID.
+    /// Returns `true` if it is this device, where neither has a node ID.
     pub fn is(&self, found: &FoundDevice) -> bool {
         self.serial == found.serial && self.product == found.product
     }
@@ -107,7 +107,7 @@ impl DriveView {
 pub struct BusView {
     pub name: String,
     pub interface: String,
-    /// Whether it is a serial line, which has no frames.
+    /// True if it is a serial line, which has no frames.
     pub is_line: bool,
 }
 
@@ -135,7 +135,7 @@ pub struct RunningView {
     pub step: &'static str,
     pub done: u32,
     pub of: u32,
-    /// Whether it is only a reading, which gives way to everything.
+    /// True if it is only a reading, which gives way to everything.
     pub is_watch: bool,
 }
 

@@ -35,7 +35,7 @@ enum Part {
 }
 
 impl Part {
-    /// Whether it may stand for a text. A name or a number is no sentence.
+    /// Returns `true` if it may stand for a text. A name or a number is no sentence.
     fn may_be(self, text: &str) -> bool {
         !text.is_empty() && (self == Self::Words || !(text.contains(": ") || text.contains("; ")))
     }
@@ -163,7 +163,7 @@ impl Phrase {
         Self { english: texts, parts, chinese }
     }
 
-    /// Whether it only joins words, as by a semicolon. It is for words of which some have a phrase.
+    /// Returns `true` if it only joins words, as by a semicolon. It is for words of which some have a phrase.
     fn is_join(&self) -> bool {
         !self.english.iter().any(|text| text.contains(char::is_alphabetic))
     }

@@ -81,7 +81,7 @@ impl Glossary {
     }
 }
 
-/// Whether a text begins with these words, and not with a longer one.
+/// Returns `true` if a text begins with these words, and not with a longer one.
 fn is_next(text: &str, words: &str) -> bool {
     let Some(rest) = text.strip_prefix(words) else { return false };
     !words.is_empty() && (!words.ends_with(is_of_word) || !rest.starts_with(is_of_word))
@@ -99,7 +99,7 @@ fn is_han(letter: char) -> bool {
 #[derive(Default)]
 struct Chinese {
     text: String,
-    /// Whether the end is within square brackets, where numbers stand.
+    /// True if the end is within square brackets, where numbers stand.
     is_in_list: bool,
 }
 

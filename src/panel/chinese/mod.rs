@@ -55,7 +55,7 @@ impl Words {
         Self { en: String::new(), zh: String::new() }
     }
 
-    /// Whether either of the languages has this part, which is in small letters.
+    /// Returns `true` if either of the languages has this part, which is in small letters.
     #[cfg(feature = "panel")]
     pub fn contain(&self, before: &str, part: &str) -> bool {
         [&self.en, &self.zh]

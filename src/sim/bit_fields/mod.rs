@@ -283,7 +283,7 @@ impl FieldSimulation {
         self.demand.interpolate_to(target, period_s.clamp(STEP_S, LONGEST_PERIOD_S), f64::INFINITY);
     }
 
-    /// Whether the frame sets the drive up; it is taken then.
+    /// Returns `true` if the frame sets the drive up; it is taken then.
     fn take_setup(&mut self, frame: &Frame) -> bool {
         let payload = frame.payload();
         let (mut is_taken, mut given) = (false, None);
@@ -323,7 +323,7 @@ impl FieldSimulation {
         self.servo.set_factors(self.factors);
     }
 
-    /// Whether every frame has come that the drive needs before it is spoken to as described.
+    /// Returns `true` if every frame has come that the drive needs before it is spoken to as described.
     fn is_set_up(&self) -> bool {
         self.setup.iter().all(|(setup, _, is_taken)| setup.number.is_some() || *is_taken)
     }

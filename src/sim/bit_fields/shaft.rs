@@ -24,9 +24,9 @@ pub struct Command {
     pub damping: f64,
     /// The code of a mode.
     pub mode: u8,
-    /// Whether the drive is to have torque.
+    /// True if the drive is to have torque.
     pub run: bool,
-    /// Whether the present position becomes zero.
+    /// True if the present position becomes zero.
     pub zero: bool,
 }
 
@@ -43,7 +43,7 @@ pub struct Reply {
     pub temperature: f64,
     /// The code of the mode.
     pub mode: u8,
-    /// Whether it has torque.
+    /// True if it has torque.
     pub run: bool,
     /// Its error.
     pub error: u16,

@@ -152,7 +152,7 @@ impl Axis {
         self.torque * self.direction()
     }
 
-    /// Whether the brake is engaged.
+    /// Returns `true` if the brake is engaged.
     pub fn is_braked(&self) -> bool {
         !self.device.state().has_torque() || self.defects.is_brake_stuck
     }

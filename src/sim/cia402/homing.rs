@@ -41,7 +41,7 @@ struct Edge {
     input: Input,
     /// The direction in which the switch is looked for: 1 or −1.
     initial: f64,
-    /// Whether the switch closes at the edge in the direction of the search; otherwise it opens.
+    /// True if the switch closes at the edge in the direction of the search; otherwise it opens.
     closes: bool,
 }
 
@@ -126,7 +126,7 @@ pub struct HomingStep<'a> {
     pub to: f64,
     /// 1 when the position units increase with the position of the joint, otherwise −1.
     pub direction: f64,
-    /// Whether the axis is at rest.
+    /// True if the axis is at rest.
     pub is_at_rest: bool,
 }
 
@@ -177,7 +177,7 @@ impl Homing {
         }
     }
 
-    /// Whether the homing is running.
+    /// Returns `true` if the homing is running.
     pub fn is_running(&self) -> bool {
         !matches!(self.state, State::Idle | State::Done | State::Failed)
     }

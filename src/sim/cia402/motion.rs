@@ -232,12 +232,12 @@ impl Motion {
         if self.mode == Some(OperationMode::Homing) { self.homing.step(step) } else { None }
     }
 
-    /// Whether the demand is at rest.
+    /// Returns `true` if the demand is at rest.
     pub fn is_at_rest(&self) -> bool {
         self.generator.velocity == 0.0
     }
 
-    /// Whether the following error has just been beyond its window (6065) for longer than its time (6066).
+    /// Returns `true` if the following error has just been beyond its window (6065) for longer than its time (6066).
     pub fn exceeds_window(&mut self, actual: Actual, profile: &Profile<'_>, duration_s: f64) -> bool {
         let is_watched = matches!(
             self.mode,

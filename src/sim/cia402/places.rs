@@ -94,7 +94,7 @@ places! {
     supported_modes = 0x6502: 0,
 }
 
-/// Whether an object of any axis is a measured or demanded value, which changes all the time.
+/// Returns `true` if an object of any axis is a measured or demanded value, which changes all the time.
 pub fn is_measured(index: u16) -> bool {
     match index {
         0x6000..=0x9FFF => matches!(

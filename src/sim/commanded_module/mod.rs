@@ -54,7 +54,7 @@ pub struct ModuleParameters {
     pub highest_velocity: f64,
     /// From power-on until it can be enabled: 8 s by the manual of the own CAN protocol.
     pub ready_ns: Nanoseconds,
-    /// Whether it has a battery that keeps the count of turns.
+    /// True if it has a battery that keeps the count of turns.
     pub has_battery: bool,
 }
 
@@ -184,22 +184,22 @@ impl CommandedModule {
         (self.torque * TWIST).round() as i32
     }
 
-    /// Whether the motor has power.
+    /// Returns `true` if the motor has power.
     pub const fn is_enabled(&self) -> bool {
         matches!(self.power, Power::On { .. })
     }
 
-    /// Whether the brake is engaged.
+    /// Returns `true` if the brake is engaged.
     pub const fn is_braked(&self) -> bool {
         !(self.is_enabled() || self.is_brake_released) || self.defects.is_brake_stuck
     }
 
-    /// Whether it is led through a motion, or its joint moves.
+    /// Returns `true` if it is led through a motion, or its joint moves.
     pub fn is_moving(&self) -> bool {
         self.motion().is_some_and(|motion| motion.is_moving()) || self.velocity().abs() > STANDING
     }
 
-    /// Whether it does not reply, on purpose.
+    /// Returns `true` if it does not reply, on purpose.
     pub const fn is_silent(&self) -> bool {
         self.defects.is_silent
     }
@@ -350,7 +350,7 @@ impl CommandedModule {
         self.saving_until_ns = Some(now_ns.saturating_add(SAVE_NS));
     }
 
-    /// Whether saving is over by now. It says so once.
+    /// Returns `true` if saving is over by now. It says so once.
     pub fn has_saved(&mut self, now_ns: Nanoseconds) -> bool {
         self.saving_until_ns.take_if(|until_ns| *until_ns <= now_ns).is_some()
     }

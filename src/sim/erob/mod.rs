@@ -60,11 +60,11 @@ pub struct ErobParameters {
     pub power_up_ns: Nanoseconds,
     /// From the arrival of SYNC until the feedback is ready to send.
     pub feedback_delay_ns: Nanoseconds,
-    /// Whether a battery keeps the turn count; without it the position after power-up is within one turn.
+    /// True if a battery keeps the turn count; without it the position after power-up is within one turn.
     pub has_battery: bool,
-    /// Whether 6061 follows mode 7, as one capture of the manual shows (Fig 5-38) although 6502 does not have it.
+    /// True if 6061 follows mode 7, as one capture of the manual shows (Fig 5-38) although 6502 does not have it.
     pub has_interpolated_position: bool,
-    /// Whether SDO uploads are segmented, which CiA 301 permits for any object.
+    /// True if SDO uploads are segmented, which CiA 301 permits for any object.
     pub is_upload_segmented: bool,
     /// Seed of the differences between units: SDO latencies, the warning bit.
     pub seed: u64,

@@ -18,7 +18,7 @@ pub struct ErobMotion {
     velocity_limit: f64,
     generator: Generator,
     torque: f64,
-    /// Whether the targets of interpolated position mode come as a stream.
+    /// True if the targets of interpolated position mode come as a stream.
     is_streamed: bool,
     set_points: SetPoints,
     /// How long the actual value has been within its window.
@@ -174,7 +174,7 @@ impl ErobMotion {
         self.generator.follow(actual);
     }
 
-    /// Whether the mode follows a position, and so has a following error.
+    /// Returns `true` if the mode follows a position, and so has a following error.
     pub fn follows_position(&self) -> bool {
         matches!(self.mode, Some(OperationMode::CyclicSynchronousPosition)) || self.is_profile_position()
     }

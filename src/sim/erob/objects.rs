@@ -319,7 +319,7 @@ pub mod at {
     }
 }
 
-/// Whether an object is a measured or demanded value, which changes all the time.
+/// Returns `true` if an object is a measured or demanded value, which changes all the time.
 pub fn is_measured(index: u16) -> bool {
     matches!(
         index,

@@ -20,11 +20,11 @@ pub struct ErobCanParameters {
     pub module: ModuleParameters,
     /// From a request to its reply: up to 1 ms by the manual's captures.
     pub reply_ns: Nanoseconds,
-    /// Whether it controls a brake.
+    /// True if it controls a brake.
     pub has_brake: bool,
     /// How it ends a reply that tells of an error.
     pub error_form: ErrorForm,
-    /// Whether 0x0204 may be written while the motor is enabled, as a program of the vendor expects.
+    /// True if 0x0204 may be written while the motor is enabled, as a program of the vendor expects.
     pub has_free_velocity_limit: bool,
 }
 

@@ -81,7 +81,7 @@ const FACTORY: [Factory; 35] = [
 pub struct Settings {
     present: [i32; FACTORY.len()],
     saved: [i32; FACTORY.len()],
-    /// Whether the velocity limit of torque control may be written at any time, as some firmware seems to allow.
+    /// True if the velocity limit of torque control may be written at any time, as some firmware seems to allow.
     has_free_velocity_limit: bool,
 }
 

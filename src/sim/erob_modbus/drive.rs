@@ -29,7 +29,7 @@ pub struct ErobModbusParameters {
     pub module: ModuleParameters,
     /// From a request to its reply. Not published.
     pub reply_ns: Nanoseconds,
-    /// Whether it has a torque sensor.
+    /// True if it has a torque sensor.
     pub has_torque_sensor: bool,
 }
 

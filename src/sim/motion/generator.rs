@@ -94,7 +94,7 @@ impl Generator {
         self.target = target;
     }
 
-    /// Whether the interpolation is on the way to this target.
+    /// Returns `true` if the interpolation is on the way to this target.
     pub fn interpolates_to(&self, target: f64) -> bool {
         target == self.target && self.left_s > 0.0
     }

@@ -13,9 +13,9 @@ pub struct ObjectRow {
     pub data_type: DataTypeCode,
     /// Access by SDO.
     pub access: AccessType,
-    /// Whether a master can map it to a PDO.
+    /// True if a master can map it to a PDO.
     pub is_mappable: bool,
-    /// Whether the device saves it.
+    /// True if the device saves it.
     pub is_saved: bool,
     /// The lowest value.
     pub lowest: i64,
@@ -23,7 +23,7 @@ pub struct ObjectRow {
     pub highest: i64,
     /// Value of a new unit.
     pub default: i64,
-    /// Whether the node ID is added to the default.
+    /// True if the node ID is added to the default.
     pub adds_node: bool,
 }
 

@@ -15,7 +15,7 @@ use super::{ID, INVALID, MAX_OBJECTS};
 const EXTENDED: i64 = 1 << 29;
 const MAX_BITS: u32 = 64;
 
-/// Whether an object is a parameter of a PDO.
+/// Returns `true` if an object is a parameter of a PDO.
 pub fn is_parameter(index: u16) -> bool {
     matches!(index, 0x1400..=0x1BFF)
 }

@@ -46,7 +46,7 @@ enum UploadPhase {
 }
 
 impl SdoServer {
-    /// Whether segments of a block arrive, whose first byte is no command.
+    /// Returns `true` if segments of a block arrive, whose first byte is no command.
     pub(super) fn receives_block(&self) -> bool {
         matches!(
             self.transfer,

@@ -46,12 +46,12 @@ impl Alarms {
         self.stopping.get_or_insert(alarm);
     }
 
-    /// Whether an alarm stops the motor.
+    /// Returns `true` if an alarm stops the motor.
     pub fn is_stopped(&self) -> bool {
         self.stopping.is_some()
     }
 
-    /// Whether the supply voltage is too high now.
+    /// Returns `true` if the supply voltage is too high now.
     pub fn has_over_voltage(&self, now_ns: Nanoseconds) -> bool {
         now_ns < self.over_voltage_until_ns
     }

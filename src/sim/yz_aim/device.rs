@@ -63,7 +63,7 @@ pub struct Conditions {
 #[derive(Clone, Copy, Debug)]
 pub struct YzAimDevice {
     level: Level,
-    /// Whether 0006h has been received since power-up.
+    /// True if 0006h has been received since power-up.
     has_shut_down: bool,
     word: u16,
     raised_ns: Option<Nanoseconds>,
@@ -80,7 +80,7 @@ impl YzAimDevice {
         self.level
     }
 
-    /// Whether controlword bit 8 halts the motion.
+    /// Returns `true` if controlword bit 8 halts the motion.
     pub fn is_halted(&self) -> bool {
         self.level == Level::Enabled && self.word & controlword::HALT != 0
     }

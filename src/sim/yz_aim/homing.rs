@@ -15,7 +15,7 @@ struct Search {
     input: Input,
     /// The direction of the search: 1 or −1.
     direction: f64,
-    /// Whether the switch closes at the edge; otherwise it opens.
+    /// True if the switch closes at the edge; otherwise it opens.
     closes: bool,
 }
 
@@ -73,12 +73,12 @@ impl Homing {
         }
     }
 
-    /// Whether the homing is running.
+    /// Returns `true` if the homing is running.
     pub fn is_running(&self) -> bool {
         matches!(self.state, State::Approaching(_) | State::Searching(..) | State::Settling)
     }
 
-    /// Whether a homing was started since the mode was set.
+    /// Returns `true` if a homing was started since the mode was set.
     pub fn is_begun(&self) -> bool {
         self.state != State::Idle
     }

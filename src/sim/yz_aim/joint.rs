@@ -61,9 +61,9 @@ pub struct YzAimJoint {
     parameters: YzAimParameters,
     dictionary: SimulatedDictionary,
     network: Network,
-    /// Whether the next boot sends a boot-up message.
+    /// True if the next boot sends a boot-up message.
     is_boot_announced: bool,
-    /// Whether the heartbeat of the master has timed out.
+    /// True if the heartbeat of the master has timed out.
     is_master_lost: bool,
     sdo: SdoServer,
     pdos: PdoEngine,
@@ -87,14 +87,14 @@ pub struct YzAimJoint {
     torque: f64,
     /// Offset added to the encoder's counts.
     counts_offset: i32,
-    /// Whether the first target after enabling is still to come; it will be ignored.
+    /// True if the first target after enabling is still to come; it will be ignored.
     ignores_target: bool,
     /// The speed of a move after power-up: counts/s.
     power_up_speed: Option<f64>,
     has_started: bool,
     is_starting_cold: bool,
     was_energised: bool,
-    /// Whether 260Ah = 60006 has been written.
+    /// True if 260Ah = 60006 has been written.
     is_zero_armed: bool,
     injected: Option<DriveFault>,
     defects: FeedbackDefects,
@@ -206,12 +206,12 @@ impl YzAimJoint {
         self.mode() == mode && self.device.level() == Level::Enabled
     }
 
-    /// Whether a target takes effect at every SYNC: 2619h = 7 was stored at power-up.
+    /// Returns `true` if a target takes effect at every SYNC: 2619h = 7 was stored at power-up.
     fn interpolates(&self) -> bool {
         self.is_in_mode(mode::INTERPOLATION) && self.special_function == mode::INTERPOLATION
     }
 
-    /// Whether the motor is energised. It holds its shaft after power-up, and homing needs no controlword.
+    /// Returns `true` if the motor is energised. It holds its shaft after power-up, and homing needs no controlword.
     fn is_energised(&self) -> bool {
         let is_commanded = matches!(self.device.level(), Level::Cold | Level::Enabled)
             || self.mode() == mode::HOMING && self.homing.is_begun();
@@ -226,7 +226,7 @@ impl YzAimJoint {
         self.alarms.code(self.is_master_lost)
     }
 
-    /// Whether heartbeat and statusword report an alarm.
+    /// Returns `true` if heartbeat and statusword report an alarm.
     fn shows_alarm(&self) -> bool {
         self.alarms.is_stopped()
             || self.is_master_lost

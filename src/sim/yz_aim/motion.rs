@@ -60,7 +60,7 @@ impl YzAimMotion {
         self.generator.target
     }
 
-    /// Whether a profile is running.
+    /// Returns `true` if a profile is running.
     pub fn is_moving(&self) -> bool {
         self.is_moving
     }
@@ -70,7 +70,7 @@ impl YzAimMotion {
         self.generator.velocity
     }
 
-    /// Whether the targets need more than the highest speed.
+    /// Returns `true` if the targets need more than the highest speed.
     pub fn is_limited(&self) -> bool {
         self.is_limited
     }

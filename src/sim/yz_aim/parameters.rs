@@ -46,7 +46,7 @@ pub struct Ratings {
     pub maximum_speed_rpm: f64,
     /// V
     pub supply_voltage: f64,
-    /// Whether a battery keeps the turn count.
+    /// True if a battery keeps the turn count.
     pub has_battery: bool,
 }
 
@@ -74,7 +74,7 @@ pub struct Gearing {
     pub ratio: f64,
     /// Travel of the joint for one turn of the gear's output: 2π rad, or the lead in m.
     pub travel_per_turn: f64,
-    /// Whether the count decreases with the position.
+    /// True if the count decreases with the position.
     pub is_reversed: bool,
     /// The count at the joint's zero, if the drive counts turns.
     pub zero_counts: f64,
@@ -98,16 +98,16 @@ pub struct Quirks {
     pub controlword_interval_ns: Nanoseconds,
     /// The first target after enabling is ignored.
     pub ignores_first_target: bool,
-    /// Whether statusword and heartbeat report the battery alarm 10h, which does not stop the motor.
+    /// True if statusword and heartbeat report the battery alarm 10h, which does not stop the motor.
     pub shows_battery_alarm: bool,
-    /// Whether sub-indices 02, 03 and 05 of 14xxh and 18xxh are writable.
+    /// True if sub-indices 02, 03 and 05 of 14xxh and 18xxh are writable.
     pub has_settable_pdos: bool,
-    /// Whether TPDO3 has 0.1 r/min per bit like 606Ch by SDO, instead of 1 r/min as in the manual's example.
+    /// True if TPDO3 has 0.1 r/min per bit like 606Ch by SDO, instead of 1 r/min as in the manual's example.
     pub has_fine_velocity_in_tpdo3: bool,
     /// TPDO1, 2 and 4 have the statusword before the position, and TPDO3 has velocity and statusword instead of
     /// position and velocity. The mapping objects contain this order.
     pub reports_state_first: bool,
-    /// Whether power-up sends a boot-up message, not only NMT 81h and 82h.
+    /// True if power-up sends a boot-up message, not only NMT 81h and 82h.
     pub announces_power_up: bool,
 }
 
@@ -149,7 +149,7 @@ pub struct HomingBehaviour {
     pub speed_rpm: f64,
     /// Timeout of the search, followed by the homing error; `None`: no timeout.
     pub gives_up_ns: Option<Nanoseconds>,
-    /// Whether methods 20 and 22 work as in CiA 402; otherwise they lead to the homing error at once.
+    /// True if methods 20 and 22 work as in CiA 402; otherwise they lead to the homing error at once.
     pub has_undescribed_methods: bool,
 }
 
@@ -186,7 +186,7 @@ pub struct YzAimParameters {
     pub maximum_speed_rpm: f64,
     /// Supply voltage: V.
     pub supply_voltage: f64,
-    /// Whether a battery keeps the turn count; without it the position after power-up is within one turn.
+    /// True if a battery keeps the turn count; without it the position after power-up is within one turn.
     pub has_battery: bool,
     /// The value stored in 2619h; interpolation needs 7.
     pub special_function: u16,
@@ -194,7 +194,7 @@ pub struct YzAimParameters {
     pub acceleration: u16,
     /// Boot time after power-up or "reset node".
     pub power_up_ns: Nanoseconds,
-    /// Whether the drive boots into NMT operational instead of pre-operational.
+    /// True if the drive boots into NMT operational instead of pre-operational.
     pub starts_operational: bool,
     /// Time from a frame until the PDO that replies to it is ready to send.
     pub feedback_delay_ns: Nanoseconds,

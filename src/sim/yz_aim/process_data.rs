@@ -63,7 +63,7 @@ impl Transmission {
         }
     }
 
-    /// Whether an event timer has ended.
+    /// Returns `true` if an event timer has ended.
     pub fn has_event(&self, now_ns: Nanoseconds) -> bool {
         self.event_ns.iter().any(|event_ns| *event_ns <= now_ns)
     }

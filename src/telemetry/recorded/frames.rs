@@ -30,7 +30,7 @@ pub struct RecordedFrames {
     pub frames: u64,
     /// Damaged chunks and malformed messages, which were passed over.
     pub damaged: u64,
-    /// Whether the file was read to the end of its data.
+    /// True if the file was read to the end of its data.
     pub is_whole: bool,
 }
 

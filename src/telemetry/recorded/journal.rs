@@ -24,7 +24,7 @@ pub struct RecordedJournal {
     pub lost: Option<u64>,
     /// The first defect.
     pub defect: Option<JournalDefect>,
-    /// Whether this version of takt can read the journal.
+    /// True if this version of takt can read the journal.
     pub is_of_other_version: bool,
     /// The file that it begins in, if that is an earlier one of the same run.
     pub begins_in: Option<PathBuf>,

@@ -92,7 +92,7 @@ pub struct RecordedCycle {
     pub timing: CycleTiming,
     /// The groups in the order of the configuration.
     pub groups: Vec<GroupRecord>,
-    /// Whether set-points were sent in this cycle.
+    /// True if set-points were sent in this cycle.
     pub is_commanded: bool,
     /// The axes in the order of the configuration.
     pub axes: Vec<AxisRecord>,
@@ -375,7 +375,7 @@ impl Recorded {
 /// A load is that of a longer time.
 const SHORTEST_LOAD_NS: Nanoseconds = 50_000_000;
 
-/// Whether an instant is in the part of a recording that is read.
+/// Returns `true` if an instant is in the part of a recording that is read.
 fn is_inside(span_s: Option<&Range<f64>>, begin: Option<(u64, Nanoseconds)>, at_ns: Nanoseconds) -> bool {
     let (Some(span_s), Some((_, begin_ns))) = (span_s, begin) else { return true };
     span_s.contains(&((at_ns as f64 - begin_ns as f64) * 1e-9))

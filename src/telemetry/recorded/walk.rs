@@ -17,7 +17,7 @@ const ZSTD: &[u8] = b"zstd";
 /// The condition of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Condition {
-    /// Whether it was read to the end of its data.
+    /// True if it was read to the end of its data.
     pub is_whole: bool,
     /// The number of damaged chunks, which were skipped.
     pub damaged_chunks: u64,

@@ -31,7 +31,7 @@ pub struct RecordingReport {
     pub span_s: (f64, f64),
     /// Cycles in it.
     pub cycles: u64,
-    /// Whether it is the file of a black box.
+    /// True if it is the file of a black box.
     pub is_black_box: bool,
     /// Defects of the file.
     pub warnings: Vec<String>,

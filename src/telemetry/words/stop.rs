@@ -7,7 +7,7 @@ use super::cures::cure;
 use super::{category, mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
 
-/// Whether this is the identifier of an SDO request to a node (CiA 301, 7.3.3).
+/// Returns `true` if this is the identifier of an SDO request to a node (CiA 301, 7.3.3).
 fn is_sdo_request(id: Id) -> bool {
     !id.is_extended() && (0x601..=0x67F).contains(&id.value())
 }

@@ -71,7 +71,7 @@ fn what_fits_without_a_send_phase_fits_with_it_at_every_command_phase_and_period
     }
 }
 
-/// Whether set-points and replies are in time.
+/// Returns `true` if set-points and replies are in time.
 fn fits_in_slot(bus: &BusSchedule) -> bool {
     use Shortfall::{FeedbackLate, RepliesLate, SetPointsLate};
     let is_of_slot =

@@ -6,7 +6,7 @@ use crate::drive_modes::wire::MILLISECOND_NS;
 use crate::drive_modes::world::World;
 
 impl World {
-    /// Whether a target that [`World::drive_to`] has given is reached.
+    /// Returns `true` if a target that [`World::drive_to`] has given is reached.
     pub fn is_reached(&self, motion: RequestId) -> bool {
         self.run.snapshot().motions.of(motion) == Some(MotionState::Finished)
     }

@@ -148,13 +148,13 @@ fn stops<'a>(seen: &'a Seen<'_>, group: usize) -> impl Iterator<Item = StopReaso
     })
 }
 
-/// Whether a group begins a stop of this category, or a harder one.
+/// Returns `true` if a group begins a stop of this category, or a harder one.
 fn has_stopped(event: &Event, group: usize, category: StopCategory) -> bool {
     event.group == Some(group as u8)
         && matches!(event.kind, EventKind::Stop(stop) if stop.category <= category)
 }
 
-/// Whether a group leaves rest, which only a request makes it do.
+/// Returns `true` if a group leaves rest, which only a request makes it do.
 fn has_begun(event: &Event, group: usize) -> bool {
     event.group == Some(group as u8)
         && matches!(

@@ -51,9 +51,9 @@ pub struct Seen<'a> {
     pub overloaded_buses: &'a [bool],
     /// What had been asked for before it, an entry a group.
     pub asked: &'a [RecentRequests],
-    /// Whether callbacks command torques and impedances, so that a joint in cyclic torque need not be on its set-point.
+    /// True if callbacks command torques and impedances, so that a joint in cyclic torque need not be on its set-point.
     pub are_torques_commanded: bool,
-    /// Whether anything else is wrong than that the machine has too little time.
+    /// True if anything else is wrong than that the machine has too little time.
     pub has_faults: bool,
 }
 

@@ -99,7 +99,7 @@ fn longest_s(phase: Phase, axes: &[Axis], enabled_from_s: f64) -> Option<f64> {
     }
 }
 
-/// Whether nothing bounds the speed of a joint but friction.
+/// Returns `true` if nothing bounds the speed of a joint but friction.
 pub fn is_unbounded(control: &Control) -> bool {
     matches!(control, Control::ProfileTorque)
 }

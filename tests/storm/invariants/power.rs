@@ -45,7 +45,7 @@ struct WatchedGroup {
     since_enabling: u64,
     /// Cycles for which the group has been disabled.
     disabled: u64,
-    /// Whether a reset has been granted since the last fault came up. On a bus that is busy its controlwords wait.
+    /// True if a reset has been granted since the last fault came up. On a bus that is busy its controlwords wait.
     is_reset_awaited: bool,
 }
 

@@ -14,7 +14,7 @@ pub struct Releases {
     axes: Vec<Option<Observation>>,
     /// When they were looked at last.
     seen_ns: u64,
-    /// Whether the power of each axis has been cut at once since its group was last enabled.
+    /// True if the power of each axis has been cut at once since its group was last enabled.
     is_cut: Vec<bool>,
 }
 

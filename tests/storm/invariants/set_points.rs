@@ -302,7 +302,7 @@ impl SetPoints {
     }
 }
 
-/// Whether a group with these events has left standstill in this cycle, if only for a move that ends in it.
+/// Returns `true` if a group with these events has left standstill in this cycle, if only for a move that ends in it.
 fn is_asked_to_move<'a>(mut events: impl Iterator<Item = &'a Event>) -> bool {
     events.any(|event| matches!(event.kind, EventKind::PhaseChanged { from: Phase::Holding, .. }))
 }

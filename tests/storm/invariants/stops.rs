@@ -17,9 +17,9 @@ pub struct Stops {
     positions: Vec<f64>,
     /// Cycles since the stop under way began.
     cycles: Option<u64>,
-    /// Whether it has become one that cuts the power at once.
+    /// True if it has become one that cuts the power at once.
     is_cut: bool,
-    /// Whether the drive of each axis has missed the heartbeat since then, and has taken its power by itself.
+    /// True if the drive of each axis has missed the heartbeat since then, and has taken its power by itself.
     has_cut_itself: Vec<bool>,
 }
 

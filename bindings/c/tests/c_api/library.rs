@@ -155,7 +155,7 @@ pub fn program(name: &str) -> PathBuf {
     crate_folder().join("tests/programs").join(name)
 }
 
-/// Whether a tool is installed.
+/// Returns `true` if a tool is installed.
 pub fn is_here(command: &str) -> bool {
     Command::new(command).arg("--version").output().is_ok_and(|output| output.status.success())
 }

@@ -44,7 +44,7 @@ impl IdExpression {
         Some(sum)
     }
 
-    /// Whether the master ID is part of it.
+    /// Returns `true` if the master ID is part of it.
     pub const fn has_master(&self) -> bool {
         self.masters > 0
     }

@@ -58,11 +58,11 @@ pub struct Description {
     pub modes: Vec<FieldMode>,
     /// What the position of a command is counted from.
     pub position_reference: PositionReference,
-    /// Whether the reported position wraps around at the ends of its field. Otherwise it stays at the end.
+    /// True if the reported position wraps around at the ends of its field. Otherwise it stays at the end.
     pub wraps: bool,
     /// What velocity and torque are beside a target that is not theirs.
     pub beside_target: BesideTargetKind,
-    /// Whether the drive stops by itself when no more commands come.
+    /// True if the drive stops by itself when no more commands come.
     pub has_watchdog: bool,
     /// Its error codes in words.
     pub errors: Vec<(u16, String)>,
@@ -313,7 +313,7 @@ impl FieldDevice {
         needed
     }
 
-    /// Whether any frame needs the master ID.
+    /// Returns `true` if any frame needs the master ID.
     pub fn needs_master_id(description: &Description) -> bool {
         let own = match &description.life_cycle {
             DescribedLifeCycle::ByFields(_) => vec![],
@@ -440,20 +440,20 @@ impl FieldDevice {
         }
     }
 
-    /// Whether the drive tells more turns than 32 bits of its counts hold.
+    /// Returns `true` if the drive tells more turns than 32 bits of its counts hold.
     pub fn outruns_counts(&self) -> bool {
         let position = self.description.reply.field(ReplyValue::Position);
         let highest = position.map_or(0.0, |field| field.code_range().1);
         self.description.wraps || highest > f64::from(i32::MAX)
     }
 
-    /// Whether a turn may count so much here: as in the frames, or less, so that 32 bits hold more turns.
+    /// Returns `true` if a turn may count so much here: as in the frames, or less, so that 32 bits hold more turns.
     pub fn may_count(&self, counts_per_turn: f64) -> bool {
         let share = counts_per_turn / self.counts_per_turn();
         (share - 1.0).abs() <= 1e-9 || share < 1.0 && self.outruns_counts()
     }
 
-    /// Whether stiffness and damping of a command are those of a spring and a damper at the shaft, and no mere gains of a loop.
+    /// Returns `true` if stiffness and damping of a command are those of a spring and a damper at the shaft, and no mere gains of a loop.
     pub fn has_impedance(&self) -> bool {
         let stiffness = self.description.command.field(CommandValue::Stiffness);
         stiffness.is_some_and(|field| field.scale.unit == FieldUnit::NewtonMetresPerRadian)

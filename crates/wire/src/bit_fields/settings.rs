@@ -86,7 +86,7 @@ impl Setting {
 pub struct Settings {
     /// The identifier by which it replies.
     pub master_id: Option<u16>,
-    /// Whether its CAN FD frames switch the bit rate.
+    /// True if its CAN FD frames switch the bit rate.
     pub has_bit_rate_switch: bool,
     numbers: [Option<f64>; Setting::COUNT],
 }

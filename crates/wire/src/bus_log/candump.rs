@@ -49,7 +49,7 @@ pub(super) fn parse(line: &str) -> Result<LineItem<'_>, LineProblem> {
 /// Bit 29 of an identifier marks a message of the controller (CAN_ERR_FLAG), which was no frame on the bus.
 const ERROR_FLAG: u32 = 1 << 29;
 
-/// Whether an identifier of eight digits is that of a message of the controller.
+/// Returns `true` if an identifier of eight digits is that of a message of the controller.
 pub(super) fn is_error_id(digits: &str) -> bool {
     digits.len() == 8 && u32::from_str_radix(digits, 16).is_ok_and(|id| id & ERROR_FLAG != 0)
 }

@@ -36,7 +36,7 @@ pub enum FrameTextProblem {
     Length {
         /// How many there are.
         bytes: usize,
-        /// Whether it is a CAN FD frame.
+        /// True if it is a CAN FD frame.
         is_fd: bool,
     },
     /// There is no digit of flags behind `##`.

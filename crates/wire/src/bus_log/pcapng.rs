@@ -117,7 +117,7 @@ fn block(kind: u32, body: &[u8], bytes: &mut Vec<u8>) {
 
 /// An interface of a file.
 struct Interface {
-    /// Whether its packets are CAN frames of SocketCAN.
+    /// True if its packets are CAN frames of SocketCAN.
     is_can: bool,
     name: String,
     /// Units of its times in a second.

@@ -52,7 +52,7 @@ pub struct LogCondition {
     pub malformed: u64,
     /// The first of them, counted from 1, and why.
     pub first_malformed: Option<(usize, String)>,
-    /// Whether the end of the last block is missing.
+    /// True if the end of the last block is missing.
     pub is_cut_off: bool,
 }
 

@@ -20,7 +20,7 @@ pub struct PdoConfiguration {
     pub number: u16,
     /// Its identifier; `None` if it is not known.
     pub id: Option<Id>,
-    /// Whether the PDO is valid.
+    /// True if the PDO is valid.
     pub is_valid: bool,
     /// Its transmission type (CiA 301, 7.5.2.36); `None` if it is not known.
     pub transmission_type: Option<u8>,

@@ -157,7 +157,7 @@ impl RequestClient {
         self.probe = Probe::Due { question, answer };
     }
 
-    /// Whether the last probe has an answer.
+    /// Returns `true` if the last probe has an answer.
     pub const fn has_probe_answer(&self) -> bool {
         matches!(self.probe, Probe::Answered)
     }
@@ -245,7 +245,7 @@ impl RequestClient {
         Some((request, outcome))
     }
 
-    /// Whether a request may begin.
+    /// Returns `true` if a request may begin.
     pub const fn is_free(&self) -> bool {
         matches!(self.state, State::Idle)
     }

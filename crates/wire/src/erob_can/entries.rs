@@ -120,7 +120,7 @@ impl Entry {
         }
     }
 
-    /// Whether the table has it.
+    /// Returns `true` if the table has it.
     pub fn is_listed(&self) -> bool {
         find(self.address).is_some()
     }

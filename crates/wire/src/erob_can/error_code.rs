@@ -75,7 +75,7 @@ impl ErrorCode {
         })
     }
 
-    /// Whether the same request may succeed a little later: within 8 s after power-on.
+    /// Returns `true` if the same request may succeed a little later: within 8 s after power-on.
     pub const fn is_of_power_up(self) -> bool {
         matches!(self, Self::NO_COMMUTATION | Self::RELAY_NOT_ACTIVE)
     }

@@ -19,12 +19,12 @@ pub enum Access {
 }
 
 impl Access {
-    /// Whether the parameter can be read.
+    /// Returns `true` if the parameter can be read.
     pub const fn can_read(self) -> bool {
         matches!(self, Self::Read | Self::ReadWrite)
     }
 
-    /// Whether a value can be sent to the parameter.
+    /// Returns `true` if a value can be sent to the parameter.
     pub const fn can_write(self) -> bool {
         matches!(self, Self::ReadWrite | Self::Write | Self::CommandWithArgument)
     }
@@ -107,7 +107,7 @@ pub enum Values {
 }
 
 impl Values {
-    /// Whether a number is one of them.
+    /// Returns `true` if a number is one of them.
     pub fn contain(&self, value: i64) -> bool {
         match self {
             Self::Any => true,

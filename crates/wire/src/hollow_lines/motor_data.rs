@@ -79,7 +79,7 @@ pub struct MotorReply {
     pub current: i16,
     /// What the motor is led by.
     pub mode: MotorMode,
-    /// Whether it runs; otherwise it is free.
+    /// True if it runs; otherwise it is free.
     pub is_running: bool,
     /// The error code; 0 for none. The manual does not have it: working code reads it from the upper half of the run status.
     pub error: u8,

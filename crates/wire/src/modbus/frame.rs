@@ -240,7 +240,7 @@ fn content(request: &Request, bytes: &[u8]) -> Result<Reply, ReplyError> {
     if confirmed == expected { Ok(Reply::Written) } else { Err(ReplyError::OtherContent) }
 }
 
-/// Whether the last two bytes of a frame are the CRC of the others.
+/// Returns `true` if the last two bytes of a frame are the CRC of the others.
 fn has_valid_crc(bytes: &[u8]) -> bool {
     let Some(address) = bytes.first() else { return false };
     // The function of this request is one whose reply has no length that would be checked.

@@ -11,7 +11,7 @@ pub struct RequestGathering {
     line: LineTiming,
     /// How far apart the bytes of one frame may come.
     pause_ns: Nanoseconds,
-    /// Whether a frame counts that does not begin with a silence.
+    /// True if a frame counts that does not begin with a silence.
     is_lenient: bool,
     bytes: Vec<u8>,
     /// When the last byte of the line had come; `None` before the first.

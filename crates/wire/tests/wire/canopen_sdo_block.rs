@@ -220,7 +220,7 @@ struct Server {
     received: Vec<u8>,
     last: u8,
     has_ended: bool,
-    /// Whether the client has begun a block download that has not ended.
+    /// True if the client has begun a block download that has not ended.
     is_receiving: bool,
 }
 
@@ -239,7 +239,7 @@ impl Server {
         }
     }
 
-    /// Whether the next segment is lost. After the end of the list, no segment is lost.
+    /// Returns `true` if the next segment is lost. After the end of the list, no segment is lost.
     fn loses(&mut self) -> bool {
         self.losses.pop().unwrap_or(false)
     }

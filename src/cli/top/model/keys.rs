@@ -110,7 +110,7 @@ impl Model {
         true
     }
 
-    /// Whether the selected axis can be moved now.
+    /// Returns `true` if the selected axis can be moved now.
     pub(super) fn is_selected_ready(&self) -> bool {
         let is_ready = matches!(self.phase(), Some(Phase::Holding | Phase::Streaming));
         is_ready && self.selected().is_some_and(|axis| axis.is_heard)

@@ -45,7 +45,7 @@ pub struct Seen {
     pub lease: Option<LeaseHolder>,
     /// How long ago its process last showed a cycle.
     pub silent_for: Duration,
-    /// Whether it has ended, or its process has.
+    /// True if it has ended, or its process has.
     pub has_ended: bool,
 }
 
@@ -76,7 +76,7 @@ pub struct Line {
     pub words: String,
     /// How often in a row it has happened.
     pub times: u64,
-    /// Whether it is not part of an ordinary run.
+    /// True if it is not part of an ordinary run.
     pub is_urgent: bool,
 }
 
@@ -100,7 +100,7 @@ pub struct Model {
     pub missed_events: u64,
     /// The axis that is selected.
     pub axis: usize,
-    /// Whether commands are for all axes, or for the group of the selected one.
+    /// True if commands are for all axes, or for the group of the selected one.
     pub is_for_all: bool,
     /// The jog.
     pub jog: Jog,
@@ -109,7 +109,7 @@ pub struct Model {
     pub question: Option<Question>,
     /// The last message, and whether it is of a failure.
     pub message: Option<(String, bool)>,
-    /// Whether the help is shown.
+    /// True if the help is shown.
     pub is_help_shown: bool,
     /// The own process.
     process: u32,
@@ -219,12 +219,12 @@ impl Model {
         }
     }
 
-    /// Whether this view commands.
+    /// Returns `true` if this view commands.
     pub fn commands(&self) -> bool {
         self.is_lease_wanted && self.seen.lease.is_none_or(|holder| holder.process == self.process)
     }
 
-    /// Whether the controller shows no cycles at present.
+    /// Returns `true` if the controller shows no cycles at present.
     pub fn is_silent(&self) -> bool {
         self.seen.has_ended || self.seen.silent_for >= SILENT
     }

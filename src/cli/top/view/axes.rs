@@ -56,7 +56,7 @@ impl Column {
         }
     }
 
-    /// Whether there is anything to show in it.
+    /// Returns `true` if there is anything to show in it.
     fn is_told(self, axes: &[AxisSnapshot]) -> bool {
         match self {
             Self::Torque => axes.iter().any(|axis| axis.torque.is_some()),

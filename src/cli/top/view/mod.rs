@@ -29,7 +29,7 @@ const AXES_AT_LEAST: u16 = 4;
 /// Styles, with or without colours.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
-    /// Whether there are colours: not with `NO_COLOR`.
+    /// True if there are colours: not with `NO_COLOR`.
     pub has_colours: bool,
 }
 

@@ -20,7 +20,7 @@ pub struct FieldClient {
     targets: FieldTargets,
     /// Frames that go first, each in the place of a command.
     first: VecDeque<Frame>,
-    /// Whether no command follows the frames that go first.
+    /// True if no command follows the frames that go first.
     falls_silent: bool,
     replies: u64,
     replied_ns: Nanoseconds,
@@ -91,7 +91,7 @@ impl FieldClient {
         self.falls_silent = true;
     }
 
-    /// Whether frames wait that go first.
+    /// Returns `true` if frames wait that go first.
     pub fn has_frames_first(&self) -> bool {
         !self.first.is_empty()
     }

@@ -132,7 +132,7 @@ fn refuse(s: &TargetDrive, device: &FieldDevice, task: &Task) -> Result<(), Fail
 }
 
 impl FieldTask {
-    /// Whether the drive says nothing unless it is told something.
+    /// Returns `true` if the drive says nothing unless it is told something.
     fn tells_to_ask(&self) -> bool {
         matches!(self.device.description.reply_moment, ReplyMoment::AfterCommand { .. })
     }
@@ -261,12 +261,12 @@ impl FieldTask {
         STANDING.max(1.5 * step)
     }
 
-    /// Whether the drive has this mode.
+    /// Returns `true` if the drive has this mode.
     fn has(&self, mode: FieldMode) -> bool {
         self.device.description.modes.contains(&mode)
     }
 
-    /// Whether the drive holds a position: it has the mode, and its loop has a gain.
+    /// Returns `true` if the drive holds a position: it has the mode, and its loop has a gain.
     fn holds_positions(&self) -> bool {
         let has_gain_field = self.device.description.command.field(CommandField::Stiffness).is_some();
         let has_gain = match self.c.client().parameters().gains {

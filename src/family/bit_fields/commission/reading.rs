@@ -128,7 +128,7 @@ async fn listen(task: &FieldTask) -> Result<(), Failure> {
     }
 }
 
-/// Whether the last reply shows this mode.
+/// Returns `true` if the last reply shows this mode.
 pub fn shows(task: &FieldTask, mode: FieldMode) -> bool {
     let client = task.c.client();
     let takt_rt::LifeCycle::ByFields { modes } = client.parameters().life_cycle else { return false };

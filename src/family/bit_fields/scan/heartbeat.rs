@@ -29,7 +29,7 @@ impl HeartbeatDrives {
         Some(Self { name: scan.name.clone().leak(), scan, id, first: make, further: vec![] })
     }
 
-    /// Whether they are known by this.
+    /// Returns `true` if they are known by this.
     pub fn is_known_by(&self, scan: &HeartbeatScan) -> bool {
         self.scan == *scan
     }

@@ -74,7 +74,7 @@ impl RegisterDrives {
         Self { name: protocol.name.clone().leak(), protocol, makes: vec![(mode_is, make)] }
     }
 
-    /// Whether its registers are read so.
+    /// Returns `true` if its registers are read so.
     pub fn is_read_by(&self, protocol: &RegisterProtocol) -> bool {
         self.protocol == *protocol
     }

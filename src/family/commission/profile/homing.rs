@@ -21,7 +21,7 @@ const SUPPORTED_METHODS: u16 = 0x60E3;
 /// Homing methods on the present position, without motion. 37 replaces 35 in newer versions of CiA 402.
 pub const PRESENT_POSITION: [i8; 2] = [35, 37];
 
-/// Whether the standard defines the method: switches and index pulses (1 to 14, 17 to 30, 33, 34), the present position (35, 37).
+/// Returns `true` if the standard defines the method: switches and index pulses (1 to 14, 17 to 30, 33, 34), the present position (35, 37).
 fn is_standard(method: i8) -> bool {
     matches!(method, 1..=14 | 17..=30 | 33..=35 | 37)
 }

@@ -72,7 +72,7 @@ impl Seen {
         is_speed_known: false,
     };
 
-    /// Whether all is known that a report tells.
+    /// Returns `true` if all is known that a report tells.
     pub const fn is_whole(&self) -> bool {
         self.is_fault_known && self.is_speed_known && self.at_ns > 0
     }

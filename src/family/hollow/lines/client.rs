@@ -63,7 +63,7 @@ impl LineSession {
         client.now_ns.saturating_sub(client.heard_ns)
     }
 
-    /// Whether bytes wait to be taken.
+    /// Returns `true` if bytes wait to be taken.
     pub fn has_heard(&self) -> bool {
         !self.client().received.is_empty()
     }

@@ -38,7 +38,7 @@ impl Menu {
         menu
     }
 
-    /// Whether it is the menu of the parameters.
+    /// Returns `true` if it is the menu of the parameters.
     pub fn is_complete(&self) -> bool {
         self.values.iter().all(Option::is_some) && self.zero_point.is_some()
     }

@@ -37,7 +37,7 @@ pub mod control {
     pub const HALT: i64 = 0x010F;
 }
 
-/// Whether the drive is enabled by its controlword.
+/// Returns `true` if the drive is enabled by its controlword.
 pub const fn is_enabled(statusword: u16) -> bool {
     statusword & ENABLED == ENABLED
 }

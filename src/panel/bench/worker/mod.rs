@@ -43,7 +43,7 @@ struct Watched {
 struct Ended {
     outcome: Result<Report, ProcedureError>,
     notes: Vec<String>,
-    /// Whether anything was sent.
+    /// True if anything was sent.
     has_sent: bool,
 }
 

@@ -26,7 +26,7 @@ pub struct BenchBus {
     pub link: BenchLink,
     /// What its frames mean.
     pub decoder: BusDecoder,
-    /// Whether it carries CAN FD frames.
+    /// True if it carries CAN FD frames.
     pub has_fd: bool,
 }
 

@@ -20,7 +20,7 @@ pub(super) struct Watcher<'a> {
     drive: Option<usize>,
     /// What the procedure has noted.
     pub notes: Vec<String>,
-    /// Whether anything has left.
+    /// True if anything has left.
     pub has_sent: bool,
 }
 

@@ -108,7 +108,7 @@ impl YzAimJoint {
     }
 }
 
-/// Whether the time in the last digit of a parameter is over (in seconds); 0 turns the alarm off.
+/// Returns `true` if the time in the last digit of a parameter is over (in seconds); 0 turns the alarm off.
 fn is_over(seconds: f64, parameter: i64) -> bool {
     let digit = parameter % 10;
     digit > 0 && seconds >= digit as f64

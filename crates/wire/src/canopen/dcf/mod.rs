@@ -29,7 +29,7 @@ pub struct Download {
 }
 
 impl Download {
-    /// Whether the value read back matches the written one. Devices may force bit 30 (no RTR) of a PDO's COB-ID.
+    /// Returns `true` if the value read back matches the written one. Devices may force bit 30 (no RTR) of a PDO's COB-ID.
     pub fn is_held_by(&self, received: &Uploaded) -> bool {
         const NO_RTR: u32 = 1 << 30;
         let Self { object, data } = self;

@@ -134,7 +134,7 @@ impl ObjectType {
         Self::CODES.iter().map(of).find(|object_type| object_type.word().eq_ignore_ascii_case(word))
     }
 
-    /// Whether it has sub-objects.
+    /// Returns `true` if it has sub-objects.
     pub const fn has_sub_objects(self) -> bool {
         matches!(self, Self::Array | Self::Record | Self::DefStruct)
     }
@@ -189,7 +189,7 @@ impl AccessType {
         Self::WORDS.iter().find(|(_, known)| *known == self).map_or("ro", |(word, _)| word)
     }
 
-    /// Whether it can be written.
+    /// Returns `true` if it can be written.
     pub const fn is_writable(self) -> bool {
         !matches!(self, Self::ReadOnly | Self::Constant)
     }
@@ -296,7 +296,7 @@ impl ObjectDictionary {
         self.commissioning.as_ref()?.node
     }
 
-    /// Whether the file configures a device.
+    /// Returns `true` if the file configures a device.
     pub fn is_configuration(&self) -> bool {
         self.commissioning.is_some() || self.entries().any(|entry| entry.configured.is_some())
     }

@@ -49,12 +49,12 @@ impl Findings {
         self.0.source.name()
     }
 
-    /// Whether the file has errors, so that it cannot be used.
+    /// Returns `true` if the file has errors, so that it cannot be used.
     pub fn has_errors(&self) -> bool {
         self.problems().iter().any(|problem| problem.kind.severity() == Severity::Error)
     }
 
-    /// Whether there are no problems.
+    /// Returns `true` if there are no problems.
     pub fn is_empty(&self) -> bool {
         self.problems().is_empty()
     }

@@ -5,7 +5,7 @@
 pub struct Number {
     /// The number without the node ID.
     pub constant: i128,
-    /// Whether `$NODEID` is added.
+    /// True if `$NODEID` is added.
     pub adds_node: bool,
 }
 
@@ -30,7 +30,7 @@ impl Number {
 pub(super) struct ParsedNumber {
     pub number: Number,
     pub anomaly: Option<Anomaly>,
-    /// Whether it is hexadecimal, so that it may be a bit pattern.
+    /// True if it is hexadecimal, so that it may be a bit pattern.
     pub is_pattern: bool,
 }
 

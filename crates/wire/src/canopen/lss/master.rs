@@ -120,7 +120,7 @@ struct Job {
     kind: Kind,
     /// When the last request was sent; `None` while a request is due.
     sent_at_ns: Option<Nanoseconds>,
-    /// Whether the current fastscan request has a reply.
+    /// True if the current fastscan request has a reply.
     has_reply: bool,
 }
 
@@ -209,7 +209,7 @@ impl LssMaster {
         }
     }
 
-    /// Whether a task is running or its outcome has not been taken.
+    /// Returns `true` if a task is running or its outcome has not been taken.
     pub const fn is_busy(&self) -> bool {
         !matches!(self.activity, Activity::Idle)
     }

@@ -78,7 +78,7 @@ abort_codes! {
 }
 
 impl AbortCode {
-    /// Whether the object does not exist, or not for this kind of access.
+    /// Returns `true` if the object does not exist, or not for this kind of access.
     pub const fn means_absent(self) -> bool {
         matches!(
             self,

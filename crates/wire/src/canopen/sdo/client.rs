@@ -139,7 +139,7 @@ impl SdoClient {
         }
     }
 
-    /// Whether a transfer is running or its outcome has not been taken.
+    /// Returns `true` if a transfer is running or its outcome has not been taken.
     pub const fn is_busy(&self) -> bool {
         !matches!(self.activity, Activity::Idle)
     }

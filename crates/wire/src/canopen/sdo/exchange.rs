@@ -101,7 +101,7 @@ impl Exchange {
         matches!(self.phase, ExchangePhase::Initiate)
     }
 
-    /// Whether the server may be in the middle of this transfer.
+    /// Returns `true` if the server may be in the middle of this transfer.
     pub fn is_server_in_transfer(&self) -> bool {
         let is_done_at_once =
             matches!(self.initiation(), SdoRequest::DownloadExpedited { .. } | SdoRequest::Upload { .. });

@@ -38,7 +38,7 @@ pub enum SdoRequest {
         toggle: bool,
         /// The segment's data.
         data: Segment,
-        /// Whether it is the last one.
+        /// True if it is the last one.
         is_last: bool,
     },
     /// Initiate an upload.
@@ -57,7 +57,7 @@ pub enum SdoRequest {
         object: ObjectAddress,
         /// Number of segments in a block.
         block_size: BlockSize,
-        /// Whether the client supports the CRC.
+        /// True if the client supports the CRC.
         has_crc: bool,
     },
     /// Start a block upload.
@@ -77,7 +77,7 @@ pub enum SdoRequest {
         object: ObjectAddress,
         /// The announced size in bytes, if indicated.
         size: Option<u32>,
-        /// Whether the client supports the CRC.
+        /// True if the client supports the CRC.
         has_crc: bool,
     },
     /// End a block download.

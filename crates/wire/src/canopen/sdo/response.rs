@@ -38,7 +38,7 @@ pub enum SdoResponse {
         toggle: bool,
         /// The segment's data.
         data: Segment,
-        /// Whether it is the last one.
+        /// True if it is the last one.
         is_last: bool,
     },
     /// The object has been written, or its segments may follow.
@@ -57,7 +57,7 @@ pub enum SdoResponse {
         object: ObjectAddress,
         /// The announced size in bytes, if indicated.
         size: Option<u32>,
-        /// Whether the server supports the CRC.
+        /// True if the server supports the CRC.
         has_crc: bool,
     },
     /// End a block upload.
@@ -73,7 +73,7 @@ pub enum SdoResponse {
         object: ObjectAddress,
         /// Number of segments in a block.
         block_size: BlockSize,
-        /// Whether the server supports the CRC.
+        /// True if the server supports the CRC.
         has_crc: bool,
     },
     /// Acknowledge a block, in full or in part.

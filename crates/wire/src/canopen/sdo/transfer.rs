@@ -56,7 +56,7 @@ impl Transfer {
 pub struct Uploaded {
     /// The bytes; four when the server did not indicate the size.
     pub bytes: Vec<u8>,
-    /// Whether the server indicated the size.
+    /// True if the server indicated the size.
     pub is_size_known: bool,
 }
 

@@ -84,7 +84,7 @@ impl Expedited {
         self.bytes.get(..self.length.unwrap_or(4).into()).unwrap_or(&self.bytes)
     }
 
-    /// Whether the size is indicated.
+    /// Returns `true` if the size is indicated.
     pub const fn is_size_indicated(&self) -> bool {
         self.length.is_some()
     }
@@ -192,7 +192,7 @@ impl BlockSegment {
         self.data
     }
 
-    /// Whether it is the last one of the transfer.
+    /// Returns `true` if it is the last one of the transfer.
     pub const fn is_last(self) -> bool {
         self.is_last
     }
