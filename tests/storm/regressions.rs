@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 31] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 32] = [
     (34_714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27_432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11_882, "The same in profile velocity"),
@@ -311,6 +311,10 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 31] = [
         "A group was enabled while one that it stops with coasted after a heartbeat was missed, and the storm blamed the controller",
     ),
     (300_023_254, "The same, with a fault of another drive"),
+    (
+        500_029_916,
+        "A drive whose power was taken while its set-points waited got the way of all of them in one cycle",
+    ),
     (
         300_039_251,
         "A stream led a joint back from beyond a position limit, which turned outward and inward again within a cycle, and was stopped",

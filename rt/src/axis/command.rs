@@ -3,7 +3,7 @@
 use super::late_reply::SetPointSkip;
 use super::torque_loop::TorqueLoop;
 use super::{Axis, AxisParameters, CommandPdo, FeedForward};
-use crate::cia402::{Goal, controlword};
+use crate::cia402::{DriveState, Goal, controlword};
 use crate::control::{ControlLaw, LoopInput, TrackingError};
 use crate::frame::Frame;
 use crate::pdo::{CommandSlot, TransmissionType};
@@ -51,10 +51,12 @@ impl Axis {
         self.torque_loop.is_undefined()
     }
 
-    /// Sends the set-point that is due. A drive that follows positions gets no longer way than that of one cycle of its bus.
+    /// Sends the set-point that is due. A drive that follows positions gets no longer way than that of one cycle of its bus, also where its
+    /// power is being taken: it may obey that later.
     #[inline]
     fn send_set_point(&mut self, is_enabled: bool) {
-        if is_enabled && matches!(self.parameters.law, ControlLaw::Position | ControlLaw::Interpolated) {
+        let may_follow = is_enabled || self.drive_state() == DriveState::OperationEnabled;
+        if may_follow && matches!(self.parameters.law, ControlLaw::Position | ControlLaw::Interpolated) {
             self.set_points.send_within(self.parameters.limits.velocity, self.reception.cycle_s());
         } else {
             self.set_points.send();
