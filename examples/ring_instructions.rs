@@ -12,7 +12,6 @@ use std::path::Path;
 use takt::internals::RunInside;
 use takt::internals::channels::{ChannelSizes, GroupStream, channels};
 use takt::internals::link::trace::{Trace, traced};
-use takt::sim::SimulatedBus;
 use takt::{Config, Phase, VirtualRun};
 use takt_rt::{BusHealth, BusPort, CycleRecord, Frame, HostInterface, Id, ReceiveBatch, Received, Snapshot};
 
@@ -93,7 +92,7 @@ fn run_cycles<P: BusPort>(
 fn arm6(is_journaled: bool, cycles: u32) -> Result<(), Box<dyn std::error::Error>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/arm6-erob.toml");
     let config = Config::load(&path)?;
-    let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus));
+    let buses = (0..config.buses.len()).map(|bus| takt::simulated_bus(&config, bus));
     if !is_journaled {
         return run_cycles(&config, buses.collect(), vec![], false, cycles);
     }

@@ -127,37 +127,39 @@ pub mod schedule {
 }
 
 pub mod sim {
-    pub use crate::sim::object_dictionary::table::ObjectRow;
+    pub use takt_sim::object_dictionary::table::ObjectRow;
     pub mod bit_fields {
-        pub use crate::sim::bit_fields::*;
+        pub use takt_sim::bit_fields::*;
     }
     pub mod commanded_module {
-        pub use crate::sim::commanded_module::ModuleParameters;
+        pub use takt_sim::commanded_module::ModuleParameters;
     }
     pub mod erob_can {
-        pub use crate::sim::erob_can::*;
+        pub use takt_sim::erob_can::*;
     }
     pub mod erob_modbus {
-        pub use crate::sim::erob_modbus::*;
+        pub use takt_sim::erob_modbus::*;
     }
-    pub use crate::sim::mailbox::*;
-    pub use crate::sim::medium::*;
+    pub use takt_sim::mailbox::*;
+    pub use takt_sim::medium::*;
     pub mod serial_line {
-        pub use crate::sim::serial_host::*;
-        pub use crate::sim::serial_line::*;
+        pub use takt_sim::serial_host::*;
+        pub use takt_sim::serial_line::*;
     }
     pub mod pseudo_terminal {
-        pub use crate::sim::pseudo_terminal::*;
+        pub use takt_sim::pseudo_terminal::*;
     }
     pub mod erob {
-        pub use crate::sim::erob::*;
+        pub use crate::family::erob_canopen::simulated_parameters;
+        pub use takt_sim::erob::*;
     }
     #[cfg(feature = "cli")]
     pub mod lss {
-        pub use crate::sim::lss::*;
+        pub use takt_sim::lss::*;
     }
     pub mod yz_aim {
-        pub use crate::sim::yz_aim::*;
+        pub use crate::family::yz_aim::simulated_parameters;
+        pub use takt_sim::yz_aim::*;
     }
 }
 

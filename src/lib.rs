@@ -76,14 +76,15 @@
 //! monitor                             the meaning of every frame on a bus
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
 //! journal                             what a run was told from outside, so that it can be replayed
-//! link sim                            sockets; simulated buses and drives
+//! link                                sockets and serial lines
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! channels                            the lock-free channels to the real-time thread
 //! trajectory packet sleep_alignment monotonic_clock
 //! ```
 //!
-//! Below all of them are the crates [`takt_wire`] (protocols without I/O, times of frames on the wire, logs of frames) and [`takt_rt`].
+//! Below all of them are the crates [`takt_sim`] (simulated buses and drives), [`takt_wire`] (protocols without I/O, times of frames on the
+//! wire, logs of frames) and [`takt_rt`].
 //!
 //! A run meets the parts in this order: `config` reads the file, `link` opens the buses, `schedule` says whether everything fits,
 //! `controller` assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its life (bring-up by
@@ -134,7 +135,7 @@ mod replay;
 pub mod schedule;
 #[cfg(target_os = "linux")]
 mod serve;
-pub mod sim;
+
 #[cfg(target_os = "linux")]
 mod sleep_alignment;
 pub mod telemetry;
@@ -164,6 +165,7 @@ pub use controller::{
     VirtualController, VirtualRun,
 };
 pub use error::{Error, Result};
+pub use family::simulated_bus;
 pub use faults::{FaultInjector, Scenario};
 #[cfg(target_os = "linux")]
 pub use link::IfOwned;
@@ -176,6 +178,9 @@ pub use trajectory::{Interpolation, Trajectory, TrajectoryError, TrajectoryPoint
 
 /// The CANopen services, device descriptions and configuration files that configurations and families name.
 pub use takt_wire::canopen;
+
+/// Simulated buses and drives that behave as their manuals and the field notes say.
+pub use takt_sim as sim;
 
 /// What runs inside the real-time thread: its types as they come out of a [`Handle`], and the planner.
 pub use takt_rt as rt;

@@ -82,7 +82,7 @@ impl Bench {
         let axis = config().axes.first().expect("the configuration has an axis");
         let counts = axis.scale().expect("it has units").velocity_from_drive(1).abs();
         Self {
-            bus: SimulatedBus::new(config(), 0),
+            bus: takt::simulated_bus(config(), 0),
             follower: Follower::new(axis, MS).expect("it has units"),
             now_ns: 0,
             target: OffCycleTarget::default(),

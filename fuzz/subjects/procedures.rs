@@ -87,7 +87,7 @@ const MAX_STEPS: usize = 100_000;
 /// has a reason.
 pub fn bring_up(mut input: Input<'_>) {
     let config = &configurations()[usize::from(input.byte()) % 3];
-    let mut bus = UnreliableBus { bus: SimulatedBus::new(config, 0), now_ns: 0, input, unchanged: 0 };
+    let mut bus = UnreliableBus { bus: takt::simulated_bus(config, 0), now_ns: 0, input, unchanged: 0 };
     let mut bring_up = BringUp::with_timing(config, TIMING);
     let mut is_started = false;
     for _ in 0..MAX_STEPS {

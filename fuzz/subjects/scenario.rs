@@ -5,7 +5,6 @@ use std::sync::OnceLock;
 use takt::Port;
 use takt::config::Config;
 use takt::faults::{FaultInjector, Scenario};
-use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, Phase, ReceiveBatch, Snapshot};
 
 use super::configuration::assert_explained;
@@ -30,7 +29,7 @@ pub fn run(bytes: &[u8]) {
 fn play(scenario: Scenario) {
     let fault_injector = FaultInjector::new(scenario);
     let mut ports: Vec<Port> = (0..arm().buses.len())
-        .map(|bus| fault_injector.wrap(bus, Port::Simulated(Box::new(SimulatedBus::new(arm(), bus)))))
+        .map(|bus| fault_injector.wrap(bus, Port::Simulated(Box::new(takt::simulated_bus(arm(), bus)))))
         .collect();
     let set_points: Vec<Frame> =
         (1..=6).map(|node| Frame::of(Id::canopen(0x200, node), [0x0F, 0, node, 0, 0, 0])).collect();

@@ -3,7 +3,6 @@
 use std::sync::OnceLock;
 
 use takt::config::Config;
-use takt::sim::SimulatedBus;
 use takt_rt::{
     BusPort, DriveState, Frame, Id, MAX_OBJECTS, MappedObject, Mapping, ProcessImage, ReceiveBatch,
 };
@@ -142,7 +141,7 @@ fn one_yz_aim() -> &'static Config {
 }
 
 fn talk_to_drive(config: &Config, mut input: Input<'_>) {
-    let mut bus = SimulatedBus::new(config, 0);
+    let mut bus = takt::simulated_bus(config, 0);
     let mut now_ns = 0;
     for _ in 0..MAX_FRAMES {
         if input.is_empty() {

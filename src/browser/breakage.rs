@@ -5,7 +5,7 @@ use serde::Deserialize;
 use crate::config::Config;
 use crate::controller::VirtualController;
 use crate::faults::{DriveEffect, Injectable};
-use crate::sim::{Defect, DriveFault};
+use takt_sim::{Defect, DriveFault};
 
 /// What is broken, or mended where `is_broken` says so.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]

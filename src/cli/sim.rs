@@ -19,9 +19,9 @@ use crate::controller::opening::open_configured;
 use crate::family::simulated_drives;
 use crate::link::ownership::{ClaimError, InterfaceLock, lock_for_simulator};
 use crate::link::{OpenError, RealInterface, SocketCanOptions};
-use crate::sim::LiveDrives;
-use crate::sim::line_faults::LineFault;
-use crate::sim::serial_device::SerialDeviceKind;
+use takt_sim::LiveDrives;
+use takt_sim::line_faults::LineFault;
+use takt_sim::serial_device::SerialDeviceKind;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -151,7 +151,7 @@ pub fn run(arguments: &Arguments) -> Exit {
     for LssOnBus { bus, device } in &arguments.lss_devices {
         let is_its_bus = |(name, _): &&mut (String, LiveDrives)| bus.as_ref().is_none_or(|bus| bus == name);
         match drives.iter_mut().find(is_its_bus) {
-            Some((_, drives)) => drives.add_lss_device((*device).into()),
+            Some((_, drives)) => drives.add_lss_device(device.device()),
             None => {
                 let bus = bus.as_deref().unwrap_or_else(|| first_bus(&config));
                 return UsageError::from(format!("--lss: the bus `{bus}` has no real interface"))

@@ -6,7 +6,6 @@ use crate::controller::port::Port;
 use crate::link::ownership::{BusClaim, MasterTraffic};
 use crate::link::{InterfaceSettings, OpenError, RealInterface, SocketCanOptions, open_interface};
 use crate::monitor::BusDecoder;
-use crate::sim::SimulatedBus;
 
 /// The time in milliseconds after which the kernel restarts a controller that is bus-off.
 const RESTART_MS: u32 = 100;
@@ -64,7 +63,7 @@ impl Bus {
                 };
                 Ok(match open_configured(config, *bus, &options)? {
                     Some(port) => port.into(),
-                    None => Port::Simulated(Box::new(SimulatedBus::new(config, *bus))),
+                    None => Port::Simulated(Box::new(crate::family::simulated_bus(config, *bus))),
                 })
             }
             Self::Interface { interface, bit_rate, data_bit_rate } => {

@@ -12,6 +12,7 @@ pub use takt_rt::AxisLimits as Limits;
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
 pub use takt_rt::ControlLaw as Control;
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
+pub use takt_sim::plant::FrictionShape;
 use takt_wire::canopen::dcf::DeviceConfiguration;
 pub use takt_wire::quirks::PowerUpState;
 
@@ -507,17 +508,6 @@ pub struct Joint {
     /// The rated torque of the drive at the joint: N·m (N). What the drive reports (object 6076) goes before it. Default: the
     /// torque limit.
     pub rated_torque: Option<f64>,
-}
-
-/// How the Coulomb friction of a simulated joint depends on its speed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum FrictionShape {
-    /// It does not: it is the same at rest and in motion.
-    #[default]
-    Constant,
-    /// As measured on a joint with a harmonic drive: little of it at rest, from where it rises steeply to the whole at about 0.8 rad/s.
-    HarmonicDrive,
 }
 
 /// What stands in for an axis on a simulated bus, beside its joint.

@@ -4,7 +4,6 @@ use super::buses::socket_options;
 use super::port::Port;
 use crate::config::Config;
 use crate::link::{InterfaceSettings, LinkPort, OpenError, RealInterface, SocketCanOptions, open_interface};
-use crate::sim::SimulatedBus;
 
 impl Port {
     /// Opens bus number `bus` of a configuration.
@@ -15,7 +14,7 @@ impl Port {
         let options = socket_options(config, bus);
         match open_configured(config, bus, &options)? {
             Some(port) => Ok(port.into()),
-            None => Ok(Self::Simulated(Box::new(SimulatedBus::new(config, bus)))),
+            None => Ok(Self::Simulated(Box::new(crate::family::simulated_bus(config, bus)))),
         }
     }
 }

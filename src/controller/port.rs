@@ -8,7 +8,7 @@ use super::lines::LinePort;
 use crate::faults::{Delivery, DriveEffect, FaultyPort, InjectError, Injectable};
 use crate::link::LinkPort;
 use crate::link::trace::{Trace, TracedPort, traced};
-use crate::sim::SimulatedBus;
+use takt_sim::SimulatedBus;
 
 /// Frames that the trace to the logger holds: almost one second of a fully loaded bus at 1 Mbit/s.
 const TRACE_FRAMES: usize = 1 << 13;

@@ -19,8 +19,8 @@ use crate::faults::FaultInjector;
 use crate::journal::JournaledClock;
 #[cfg(any(feature = "browser", feature = "internals"))]
 use crate::journal::{RunJournal, clock_journal};
-use crate::sim::SimulatedBus;
 use crate::telemetry::WallClock;
+use takt_sim::SimulatedBus;
 
 /// Zero of virtual time: 2000-01-01 00:00:00 UTC, in ns since 1970-01-01.
 const VIRTUAL_EPOCH_NS: u64 = 946_684_800_000_000_000;
@@ -123,7 +123,7 @@ impl VirtualRun<SimulatedBus> {
     pub fn simulated(config: &Config) -> Result<(Self, LogSide), AssembleError> {
         // The simulated drives take the values as they are.
         config.validate()?;
-        let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
+        let ports = (0..config.buses.len()).map(|bus| crate::family::simulated_bus(config, bus)).collect();
         Self::new(config, ports)
     }
 }
@@ -159,7 +159,7 @@ impl<P: BusPort> VirtualRun<P> {
         let lines = Lines::simulated(config, Some(fault_injector));
         let simulated = |bus| match lines.port(bus) {
             Some(line) => Port::Line(Box::new(line)),
-            None => Port::Simulated(Box::new(SimulatedBus::new(config, bus))),
+            None => Port::Simulated(Box::new(crate::family::simulated_bus(config, bus))),
         };
         let ports =
             (0..config.buses.len()).map(|bus| outermost(fault_injector.wrap(bus, simulated(bus)))).collect();

@@ -47,6 +47,7 @@ pub use error_words::{error_cure, error_words};
 pub use off_cycle::{LineCounts, OffCycleBudget, OffCycleDrive, OffCycleLine, OffCycleTarget, OffCycleWish};
 pub use registry::{NameTaken, all, register};
 pub(crate) use registry::{named, of};
+pub use simulated_bus::simulated_bus;
 pub(crate) use simulated_bus::simulated_drives;
 pub(crate) use warning::is_rounded;
 pub use warning::{Warning, WarningKind, WarningSubject};
@@ -65,7 +66,7 @@ use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use crate::family::scan::{FoundDevice, NodeIdentity, OwnProtocol, Recognised, StartingKeys};
 use crate::procedure::ModbusSession;
-use crate::sim::{DevicesOnLine, Drive};
+use takt_sim::{DevicesOnLine, Drive};
 
 /// ZeroErr eRob with CANopen firmware.
 pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACTS);

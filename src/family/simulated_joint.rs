@@ -1,7 +1,7 @@
 //! The joint of a simulated drive, as the axis describes it.
 
 use crate::config::Axis;
-use crate::sim::plant::{Encoder, JointParameters};
+use takt_sim::plant::{Encoder, JointParameters};
 
 /// The brake holds so much more than the peak torque.
 const BRAKE_TO_PEAK_TORQUE: f64 = 2.0;

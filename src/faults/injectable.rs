@@ -3,7 +3,7 @@
 use takt_rt::{BusPort, Frame, Nanoseconds};
 
 use crate::link::trace::TracedPort;
-use crate::sim::{Defect, DriveFault, InjectDefectError, SimulatedBus, SimulatedLineDevices, UnknownNode};
+use takt_sim::{Defect, DriveFault, InjectDefectError, SimulatedBus, SimulatedLineDevices, UnknownNode};
 
 /// An effect on a simulated drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,25 +97,23 @@ impl Injectable for SimulatedBus {
 }
 
 /// As [`Injectable::inject`], on a serial line.
-impl SimulatedLineDevices {
-    pub(crate) fn inject(
-        &mut self,
-        node: u8,
-        effect: DriveEffect,
-        is_present: bool,
-    ) -> Result<(), InjectError> {
-        match effect {
-            DriveEffect::Silent => self.silence(node, is_present)?,
-            DriveEffect::LoadTorque(torque) => {
-                self.set_load_torque(node, if is_present { torque } else { 0.0 })?;
-            }
-            DriveEffect::Reboot if is_present => self.power_cycle(node)?,
-            DriveEffect::Cause(fault) if is_present => self.inject_fault(node, fault)?,
-            DriveEffect::Reboot | DriveEffect::Cause(_) => {}
-            DriveEffect::Defect(defect) => self.inject_defect(node, defect, is_present)?,
+pub(crate) fn inject_on_line(
+    line: &mut SimulatedLineDevices,
+    node: u8,
+    effect: DriveEffect,
+    is_present: bool,
+) -> Result<(), InjectError> {
+    match effect {
+        DriveEffect::Silent => line.silence(node, is_present)?,
+        DriveEffect::LoadTorque(torque) => {
+            line.set_load_torque(node, if is_present { torque } else { 0.0 })?;
         }
-        Ok(())
+        DriveEffect::Reboot if is_present => line.power_cycle(node)?,
+        DriveEffect::Cause(fault) if is_present => line.inject_fault(node, fault)?,
+        DriveEffect::Reboot | DriveEffect::Cause(_) => {}
+        DriveEffect::Defect(defect) => line.inject_defect(node, defect, is_present)?,
     }
+    Ok(())
 }
 
 impl<P: Injectable> Injectable for TracedPort<P> {

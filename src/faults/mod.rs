@@ -29,6 +29,7 @@ mod trigger;
 mod window;
 
 pub use effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, LineEffect, Part};
+pub(crate) use injectable::inject_on_line;
 pub use injectable::{Delivery, DriveEffect, InjectError, Injectable};
 pub use injector::{FaultEvent, FaultEvents, FaultInjector, Transition};
 pub use line::LineFaults;

@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use takt_rt::{Frame, Id};
 use takt_wire::canopen::function_code;
 
-use crate::sim::random::Random;
+use takt_sim::random::Random;
 
 /// The direction of a frame, seen from the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -176,7 +176,7 @@ impl Selector {
             return false;
         }
         // An `f64` holds 53 bits exactly.
-        let share = (self.random.next() >> 11) as f64 / (1u64 << 53) as f64;
+        let share = (self.random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
         let is_picked = share < self.selection.probability;
         if is_picked && self.selection.count.is_some() {
             self.left -= 1;

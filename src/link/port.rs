@@ -5,7 +5,7 @@ use takt_rt::linux::{Attachment, SlcanPort, SocketCanPort, TransparentPort};
 use takt_rt::{BusHealth, BusPort, Frame, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
 #[cfg(feature = "cli")]
-use crate::sim::LivePort;
+use takt_sim::LivePort;
 
 /// The port of a real interface.
 #[derive(Debug)]

@@ -275,7 +275,7 @@ mod tests {
     use std::io::{Read, Write};
 
     use super::*;
-    use crate::sim::pseudo_terminal::PseudoTerminal;
+    use takt_sim::pseudo_terminal::PseudoTerminal;
 
     const SETTINGS: SerialSettings = SerialSettings::new(115_200);
 

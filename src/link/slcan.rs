@@ -180,9 +180,9 @@ impl Adapter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::pseudo_terminal::PseudoTerminal;
     use std::io::{Read, Write};
     use std::thread;
+    use takt_sim::pseudo_terminal::PseudoTerminal;
 
     const CLASSIC: InterfaceSettings =
         InterfaceSettings { bit_rate: 1_000_000, data_bit_rate: None, restart_ms: 100 };

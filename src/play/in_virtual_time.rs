@@ -16,8 +16,8 @@ use crate::channels::{GivenTrajectory, GroupAxes, LogSide};
 use crate::config::Config;
 use crate::controller::assemble::AssembleError;
 use crate::controller::{AfterBringUp, Interrupt, Outcome, VirtualRun};
-use crate::sim::SimulatedBus;
 use crate::trajectory::TrajectoryConditions;
+use takt_sim::SimulatedBus;
 
 /// An arm of simulated drives in virtual time.
 pub struct VirtualStage<'a> {
@@ -42,7 +42,7 @@ impl<'a> VirtualStage<'a> {
         interrupted: &'a AtomicBool,
     ) -> Result<Self, AssembleError> {
         config.validate()?;
-        let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus)).collect();
+        let ports = (0..config.buses.len()).map(|bus| crate::family::simulated_bus(config, bus)).collect();
         let (run, log) = VirtualRun::serving(config, ports, AfterBringUp::Enable)?;
         Ok(Self {
             run,

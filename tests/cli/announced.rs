@@ -6,7 +6,6 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::{Arc, Mutex};
 
-use takt::sim::SimulatedBus;
 use takt::telemetry::{
     LogSide, Logger, LoggerOptions, Machine, RecordingDestination, RecordingOptions, WallClock,
 };
@@ -172,7 +171,7 @@ fn a_bus_that_goes_off_and_comes_back_is_told() {
 fn a_drive_that_cannot_be_brought_up_is_an_error_with_its_step_its_reason_and_the_cure() {
     let config = first();
     let told = told_by(|| {
-        let mut bus = SimulatedBus::new(&config, 0);
+        let mut bus = takt::simulated_bus(&config, 0);
         bus.silence(1, true).unwrap();
         let (mut run, _log) = VirtualRun::new(&config, vec![bus]).unwrap();
         let outcome = run.run(CYCLES_AT_MOST, |_| {});

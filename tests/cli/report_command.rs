@@ -11,7 +11,6 @@ use takt::config::Config;
 use takt::faults::{FaultInjector, Scenario};
 use takt::internals::channels::{ChannelSizes, GroupStream, channels};
 use takt::internals::link::trace::traced;
-use takt::sim::SimulatedBus;
 use takt::telemetry::{
     BlackBoxOptions, BusDescription, Emphasis, LogSummary, Logger, LoggerOptions, Machine, RealtimeReport,
     Recorded, RecordingDestination, RecordingOptions, RunEnd, RunOutcome, RunReport, WallClock,
@@ -37,7 +36,7 @@ fn stopped_run() -> RunFiles {
     config.axes[2].following_error.limit = 0.002;
     config.axes[2].following_error.time_ns = 5_000_000;
     let (ports, traces) = (0..config.buses.len())
-        .map(|bus| traced(SimulatedBus::new(&config, bus), &config.buses[bus].name, 256))
+        .map(|bus| traced(takt::simulated_bus(&config, bus), &config.buses[bus].name, 256))
         .unzip();
     let (mut run, log) = VirtualRun::new(&config, ports).unwrap();
     let options = LoggerOptions {

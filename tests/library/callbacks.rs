@@ -172,7 +172,7 @@ const RUN: CallbackRun =
 /// A joint that holds, in virtual time.
 fn holding() -> VirtualRun<SimulatedBus> {
     let config = config("single-erob.toml");
-    let ports = vec![SimulatedBus::new(&config, 0)];
+    let ports = vec![takt::simulated_bus(&config, 0)];
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
     while run.snapshot().groups[0].phase != Phase::Holding {
         assert!(run.step());

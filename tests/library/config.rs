@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use takt::config::{
     Config, Control, Feedback, Interface, OverrideError, PowerUpState, ProblemKind, ProgramTarget, Travel,
 };
-use takt::internals::sim::yz_aim::YzAimParameters;
 use takt::{Outcome, VirtualRun};
 
 /// The configurations that come with takt; other folders in there hold other things.
@@ -412,7 +411,7 @@ fn a_simulated_yz_aim_may_power_up_operational() {
     let gantry = parse(&text.replace("[defaults.axis.joint]", operational));
     for axis in &gantry.axes {
         assert_eq!(axis.simulated.power_up, PowerUpState::Operational);
-        let unit = YzAimParameters::of(axis, 1_000_000, &gantry.simulation);
+        let unit = takt::internals::sim::yz_aim::simulated_parameters(axis, 1_000_000, &gantry.simulation);
         assert!(unit.starts_operational);
     }
     assert_eq!(parse(&text).axes[0].simulated.power_up, PowerUpState::PreOperational);

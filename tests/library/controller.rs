@@ -375,7 +375,7 @@ fn drives_of_a_killed_controller_are_brought_up_again() {
         let mut now_ns = killed.clock().now_ns();
         let mut ports = vec![];
         for (bus, port) in killed.ports().iter_mut().enumerate() {
-            ports.push(std::mem::replace(port, SimulatedBus::new(&config, bus)));
+            ports.push(std::mem::replace(port, takt::simulated_bus(&config, bus)));
         }
         for _ in 0..silence_ms {
             now_ns += 1_000_000;
@@ -414,7 +414,7 @@ fn move_to(target: [f64; MAX_AXES], minimum_duration_s: f64) -> Move {
 #[test]
 fn a_client_that_keeps_moving_the_group_does_not_prevent_the_end_of_the_run() {
     let config = load("arm6-erob.toml");
-    let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+    let ports = (0..config.buses.len()).map(|bus| takt::simulated_bus(&config, bus)).collect();
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
     while run.snapshot().groups[0].phase != Phase::Holding {
         assert!(run.step());
@@ -440,7 +440,7 @@ fn a_client_that_keeps_moving_the_group_does_not_prevent_the_end_of_the_run() {
 #[test]
 fn a_group_that_a_client_moves_before_the_life_cycle_sees_it_hold_goes_on() {
     let config = load("arm6-erob.toml");
-    let ports = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+    let ports = (0..config.buses.len()).map(|bus| takt::simulated_bus(&config, bus)).collect();
     let mut run = VirtualRun::serving(&config, ports).unwrap().0;
     while run.snapshot().groups[0].phase != Phase::Enabling {
         assert!(run.step());

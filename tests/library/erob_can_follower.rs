@@ -78,7 +78,7 @@ impl Bench {
 
     fn of(config: &Config) -> Self {
         let follower = Follower::new(&config.axes[0], MS).unwrap();
-        let bus = SimulatedBus::new(config, 0);
+        let bus = takt::simulated_bus(config, 0);
         Self { bus, follower, now_ns: 0, sent: vec![], reports: vec![], outstanding: (0, 0) }
     }
 

@@ -100,6 +100,7 @@ fn every_word_that_is_said_to_be_ours_is_a_name_of_its_language() {
     let mut rust = String::new();
     sources(&root().join("src"), &mut rust);
     sources(&root().join("crates/wire/src"), &mut rust);
+    sources(&root().join("crates/sim/src"), &mut rust);
     sources(&root().join("rt/src"), &mut rust);
     let read = |file: &str| fs::read_to_string(root().join(file)).unwrap();
     let (c, cpp) = (read("bindings/c/include/takt.h"), read("bindings/c/include/takt.hpp"));

@@ -198,8 +198,8 @@ fn config() -> Config {
 #[test]
 fn a_configured_bus_has_one_drive_per_axis_with_the_scale_of_the_axis() {
     let config = config();
-    assert_eq!(SimulatedBus::new(&config, 0).nodes().collect::<Vec<_>>(), [1]);
-    let mut bus = SimulatedBus::new(&config, 1);
+    assert_eq!(takt::simulated_bus(&config, 0).nodes().collect::<Vec<_>>(), [1]);
+    let mut bus = takt::simulated_bus(&config, 1);
     assert_eq!(bus.nodes().collect::<Vec<_>>(), [2, 3]);
     bus.send(0, &[]);
     let counts = [2, 3].map(|node| bus.observe(node).unwrap().position_counts);

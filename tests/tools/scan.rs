@@ -25,7 +25,7 @@ fn bus(axes: &[&str]) -> SimulatedBus {
     let text = format!("{BUS}{}", axes.collect::<String>());
     let path = format!("{}/tests/scan.toml", env!("CARGO_MANIFEST_DIR"));
     let config = Config::parse(&path, &text).unwrap_or_else(|error| panic!("{error:?}"));
-    SimulatedBus::new(&config, 0)
+    takt::simulated_bus(&config, 0)
 }
 
 fn usual() -> BusScan {
@@ -415,7 +415,7 @@ fn motors_on_can_fd_are_asked_only_where_the_bus_carries_it() {
             + "[[axis]]\nname = \"leg\"\nnode = 4\nmaster_id = 0x66\ndrive = \"hollow-can-fd\"\npole_pairs = 14\nkp = 100\nkd = 20\n\
                torque_constant = 0.23\n";
         let config = Config::parse("fd.toml", &text).unwrap_or_else(|error| panic!("{error:?}"));
-        SimulatedBus::new(&config, 0)
+        takt::simulated_bus(&config, 0)
     };
     let with_consent = BusScan { may_take_torque: true, ..usual() };
     let outcome = scan(&with_consent, &mut fd_bus());

@@ -13,9 +13,9 @@ use crate::controller::VirtualClock;
 use crate::family;
 use crate::link::ownership::{BusClaim, IfOwned, MasterTraffic, Ownership};
 use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions, open_interface};
-use crate::sim::lss::{LssBus, LssDevice};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds};
+use takt_sim::lss::LssBus;
 use takt_wire::canopen::lss::{BitTiming, Inquiry, LssAddress, LssOutcome, LssTask};
 
 use super::columns::paragraph;
@@ -164,7 +164,7 @@ pub fn run(arguments: &Arguments) -> Exit {
         }
         None => {
             let devices = arguments.simulate.iter();
-            let mut bus = LssBus::new(devices.copied().map(LssDevice::from));
+            let mut bus = LssBus::new(devices.map(|device| device.device()));
             lead(arguments, &mut bus, &mut VirtualClock::default(), is_interrupted)
         }
         Some(_) if !arguments.simulate.is_empty() => {

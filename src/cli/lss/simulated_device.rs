@@ -5,7 +5,7 @@ use std::str::FromStr;
 use takt_wire::canopen::lss::LssAddress;
 
 use crate::commission::layer_settings::NO_NODE;
-use crate::sim::lss::{LssDevice, LssStack};
+use takt_sim::lss::{LssDevice, LssStack};
 
 /// A device as it is written on the command line: IDENTITY[@NODE][,BEHAVIOUR…].
 #[derive(Clone, Copy, Debug)]
@@ -16,11 +16,11 @@ pub struct SimulatedDevice {
     boots: bool,
 }
 
-impl From<SimulatedDevice> for LssDevice {
-    fn from(SimulatedDevice { address, node, stack, boots }: SimulatedDevice) -> Self {
-        let mut device = Self::new(address, node);
-        device.stack = stack;
-        device.boots = boots;
+impl SimulatedDevice {
+    /// Returns the device in its state after power-up.
+    pub fn device(self) -> LssDevice {
+        let mut device = LssDevice::new(self.address, self.node);
+        (device.stack, device.boots) = (self.stack, self.boots);
         device
     }
 }

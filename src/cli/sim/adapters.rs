@@ -7,9 +7,9 @@ use std::str::FromStr;
 use crate::cli::usage_error::UsageError;
 use crate::config::{Bus, Config, Interface};
 use crate::family::simulated_drives;
-use crate::sim::LiveDrives;
-use crate::sim::pseudo_terminal::PseudoTerminal;
-use crate::sim::slcan_adapter::{AdapterBitRates, SlcanAdapter};
+use takt_sim::LiveDrives;
+use takt_sim::pseudo_terminal::PseudoTerminal;
+use takt_sim::slcan_adapter::{AdapterBitRates, SlcanAdapter};
 
 /// A second path for the adapter of a bus, or the wish for adapters alone.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -10,10 +10,10 @@ use crate::config::quirks::{self, Quirks};
 use crate::config::{Interface, InterfaceError};
 use crate::link::ownership::{InterfaceLock, lock_for_simulator};
 use crate::link::{InterfaceSettings, RealInterface, SocketCanOptions, open_interface};
-use crate::sim::LiveDrives;
-use crate::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters, counts_per_turn};
-use crate::sim::homing_switches::{ReferenceSwitches, Switch};
-use crate::sim::plant::{Encoder, JointParameters};
+use takt_sim::LiveDrives;
+use takt_sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters, counts_per_turn};
+use takt_sim::homing_switches::{ReferenceSwitches, Switch};
+use takt_sim::plant::{Encoder, JointParameters};
 
 use crate::cli::usage_error::UsageError;
 

@@ -4,9 +4,9 @@ use super::adapters::AdapterLink;
 use crate::cli::exit::Exit;
 use crate::cli::interruption;
 use crate::cli::usage_error::UsageError;
-use crate::sim::line_faults::{FaultyLine, LineFault};
-use crate::sim::pseudo_terminal::PseudoTerminal;
-use crate::sim::serial_device::{LiveSerialDevice, SerialDeviceKind, kinds};
+use takt_sim::line_faults::{FaultyLine, LineFault};
+use takt_sim::pseudo_terminal::PseudoTerminal;
+use takt_sim::serial_device::{LiveSerialDevice, SerialDeviceKind, kinds};
 
 /// The kind of device with this name.
 pub fn named(text: &str) -> Result<&'static SerialDeviceKind, String> {

@@ -6,9 +6,9 @@ use crate::cli::exit::Exit;
 use crate::cli::interruption;
 use crate::cli::usage_error::UsageError;
 use crate::family;
-use crate::sim::pseudo_terminal::PseudoTerminal;
-use crate::sim::serial_host;
-use crate::sim::serial_line::DevicesOnLine;
+use takt_sim::pseudo_terminal::PseudoTerminal;
+use takt_sim::serial_host;
+use takt_sim::serial_line::DevicesOnLine;
 
 use super::adapters::AdapterLink;
 

@@ -22,7 +22,6 @@ use crate::controller::virtual_time::VirtualRun;
 #[cfg(feature = "browser")]
 use crate::journal::RunJournal;
 use crate::link::trace::Trace;
-use crate::sim::SimulatedBus;
 use crate::telemetry::{EachCycle, Logger, Machine, shown_timing};
 
 /// A controller of simulated drives in virtual time, with the commands of a [`Controller`](super::Controller).
@@ -183,7 +182,7 @@ impl VirtualController {
 
 /// The port of a bus of a configuration that has been checked.
 fn simulated(config: &Config, bus: usize) -> Port {
-    Port::Simulated(Box::new(SimulatedBus::new(config, bus)))
+    Port::Simulated(Box::new(crate::family::simulated_bus(config, bus)))
 }
 
 impl Deref for VirtualController {

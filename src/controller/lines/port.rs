@@ -7,7 +7,7 @@ use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch};
 
 use super::SharedLine;
 use crate::family::LineCounts;
-use crate::faults::{Delivery, DriveEffect, InjectError, Injectable};
+use crate::faults::{Delivery, DriveEffect, InjectError, Injectable, inject_on_line};
 
 /// The state of a line, which its master writes and the cycle reads.
 #[derive(Debug, Default)]
@@ -90,6 +90,6 @@ impl Injectable for LinePort {
 
     fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
         let devices = self.devices.as_ref().ok_or(InjectError::NotSimulated)?;
-        devices.lock().inject(node, effect, is_present)
+        inject_on_line(&mut devices.lock(), node, effect, is_present)
     }
 }

@@ -8,7 +8,7 @@ use super::port::LineStatus;
 use crate::config::Config;
 use crate::family::{self, OffCycleLine, OffCycleTarget};
 use crate::faults::LineFaults;
-use crate::sim::SimulatedLineDevices;
+use takt_sim::SimulatedLineDevices;
 
 /// The master looks at its line so often, as the thread of a real line does.
 const STEP_NS: Nanoseconds = 1_000_000;

@@ -8,8 +8,8 @@ use takt_wire::canopen::object::{DataType, ObjectAddress};
 
 use crate::config::Axis;
 use crate::family::DataSheet;
-use crate::sim::bit_fields::FieldSimulationParameters;
-use crate::sim::plant::JointParameters;
+use takt_sim::bit_fields::FieldSimulationParameters;
+use takt_sim::plant::JointParameters;
 
 /// There are no objects.
 impl DataSheet for FieldDevice {

@@ -26,8 +26,8 @@ use crate::config::{
     ModeChangeRule, ModeSet, Protocol, Quantity, bit_fields,
 };
 use crate::procedure::ModbusSession;
-use crate::sim::Drive;
-use crate::sim::bit_fields::FieldSimulation;
+use takt_sim::Drive;
+use takt_sim::bit_fields::FieldSimulation;
 
 /// Makes a task with a drive on a serial line of a bit rate.
 pub type BeginOnLine = fn(TargetDrive, Task, u32) -> Result<DriveTask<Vec<u8>>, Failure>;

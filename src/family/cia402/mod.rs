@@ -24,8 +24,8 @@ use super::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile
 use super::scan::{FoundDevice, NodeIdentity, Recognised, StartingKeys};
 use super::{DataSheet, Family, SettingUp};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
-use crate::sim::Drive;
 use bring_up::Sheet;
+use takt_sim::Drive;
 use takt_wire::canopen::object::Object;
 use takt_wire::canopen::objects::PdoDirection;
 

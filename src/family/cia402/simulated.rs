@@ -3,10 +3,10 @@
 use super::device::Device;
 use crate::config::{Axis, Config, Simulation};
 use crate::family::simulated_bus::gravity;
-use crate::sim::Drive;
-use crate::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
-use crate::sim::homing_switches::ReferenceSwitches;
-use crate::sim::plant::{Encoder, JointParameters};
+use takt_sim::Drive;
+use takt_sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
+use takt_sim::homing_switches::ReferenceSwitches;
+use takt_sim::plant::{Encoder, JointParameters};
 
 /// The simulated drive of an axis, with the other axes of its node.
 pub fn drive(axis: &Axis, device: &Device, config: &Config) -> Box<dyn Drive> {

@@ -3,7 +3,7 @@
 use super::ENABLED_FROM_NS;
 use crate::config::Axis;
 use crate::family::simulated_joint::{encoder, mechanics};
-use crate::sim::commanded_module::ModuleParameters;
+use takt_sim::commanded_module::ModuleParameters;
 
 /// Torque for one ampere where the axis says nothing of it: that of an eRob80 with a ratio of 120.
 pub const TORQUE_PER_AMPERE: f64 = 31.0 / 6.3;

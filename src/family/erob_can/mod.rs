@@ -33,8 +33,8 @@ use super::{
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::erob::selection;
-use crate::sim::Drive;
 use follower::Follower;
+use takt_sim::Drive;
 use takt_wire::canopen::function_code;
 use takt_wire::canopen::objects::DEVICE_TYPE;
 use takt_wire::canopen::sdo::SdoRequest;

@@ -2,8 +2,8 @@
 
 use crate::config::{Axis, FamilyKeys};
 use crate::family::erob::simulated::module;
-use crate::sim::Drive;
-use crate::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
+use takt_sim::Drive;
+use takt_sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
 
 /// From a request to its reply: up to 1 ms in the captures of the manual.
 const REPLY_NS: u64 = 500_000;

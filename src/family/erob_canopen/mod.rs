@@ -4,9 +4,11 @@ mod bring_up;
 mod commission;
 mod errors;
 mod facts;
+mod simulated;
 
 pub use errors::{MULTI_TURN_BATTERY, error_text};
 pub use facts::FACTS;
+pub use simulated::simulated_parameters;
 
 use takt_rt::Frame;
 use takt_wire::canopen::emcy::ErrorCode;
@@ -20,8 +22,8 @@ use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::AxisSession;
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
-use crate::sim::Drive;
-use crate::sim::erob::{ErobJoint, ErobParameters};
+use takt_sim::Drive;
+use takt_sim::erob::ErobJoint;
 
 /// The family.
 #[derive(Clone, Copy, Debug)]
@@ -113,7 +115,7 @@ impl Family for ErobCanopen {
     }
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
-        Box::new(ErobJoint::new(ErobParameters::of(axis, &config.simulation)))
+        Box::new(ErobJoint::new(simulated_parameters(axis, &config.simulation)))
     }
 }
 

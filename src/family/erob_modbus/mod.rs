@@ -42,12 +42,12 @@ use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::erob::selection;
 use crate::procedure::ModbusSession;
-use crate::sim::{DevicesOnLine, Drive};
 use axis::LineKeys;
 use budget::LineBudget;
 use fault_code::FaultCode;
 use line::FollowedLine;
 use register::Register;
+use takt_sim::{DevicesOnLine, Drive};
 use takt_wire::modbus::frame::SlaveAddress;
 
 /// The family.

@@ -8,10 +8,10 @@ use takt_wire::modbus::line_timing::LineTiming;
 use crate::config::{Axis, Config, FrictionShape};
 use crate::family::erob::simulated::{TORQUE_PER_AMPERE, module};
 use crate::family::simulated_bus::gravity;
-use crate::sim::commanded_module::ModuleParameters;
-use crate::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
-use crate::sim::plant::{Encoder, JointParameters};
-use crate::sim::{DevicesOnLine, Drive};
+use takt_sim::commanded_module::ModuleParameters;
+use takt_sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
+use takt_sim::plant::{Encoder, JointParameters};
+use takt_sim::{DevicesOnLine, Drive};
 
 /// A program on a pseudo-terminal may write a frame in pieces so far apart.
 const PAUSE_NS: u64 = 20_000_000;

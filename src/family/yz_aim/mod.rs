@@ -9,10 +9,12 @@ mod chinese;
 mod commission;
 mod facts;
 mod process_data;
+mod simulated;
 
 pub use alarm::{Alarm, Clearing};
 pub use facts::{FACTS, HIGHEST_SPEED_RPM, NO_RAMP, STANDSTILL};
 pub(crate) use process_data::answers_sync;
+pub use simulated::simulated_parameters;
 
 use takt_rt::Frame;
 use takt_wire::canopen::object::Object;
@@ -24,8 +26,8 @@ use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo};
 use crate::procedure::SdoQuirks;
-use crate::sim::Drive;
-use crate::sim::yz_aim::{YzAimJoint, YzAimParameters};
+use takt_sim::Drive;
+use takt_sim::yz_aim::YzAimJoint;
 
 /// The family.
 #[derive(Clone, Copy, Debug)]
@@ -129,6 +131,6 @@ impl Family for YzAim {
 
     fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
         let bit_rate = config.buses.get(axis.bus).map_or(1_000_000, |bus| bus.bit_rate);
-        Box::new(YzAimJoint::new(YzAimParameters::of(axis, bit_rate, &config.simulation)))
+        Box::new(YzAimJoint::new(simulated_parameters(axis, bit_rate, &config.simulation)))
     }
 }

@@ -10,10 +10,10 @@ use crate::config::read::section::Section;
 use crate::config::{Axis, Config, Quantity, Travel};
 use crate::family;
 use crate::faults::effect::{DelayPlace, Effect, ForeignFrames, FrameEffect, InterfaceEffect, Part};
-use crate::faults::injectable::{DriveEffect, InjectError, Injectable};
+use crate::faults::injectable::{DriveEffect, InjectError, Injectable, inject_on_line};
 use crate::faults::selection::Selection;
 use crate::faults::window::Window;
-use crate::sim::{Defect, Disobedience, DriveFault, SimulatedBus, SimulatedLineDevices};
+use takt_sim::{Defect, Disobedience, DriveFault, SimulatedLineDevices};
 
 /// A kind of fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -309,12 +309,12 @@ pub fn drive(
 /// A trial with a simulated drive of the same configuration shows whether it can have the effect.
 fn trial(axis: &Axis, effect: DriveEffect, config: &Config) -> Result<(), InjectError> {
     if !config.is_serial_line(axis.bus) {
-        return SimulatedBus::new(config, axis.bus).inject(axis.node, effect, true);
+        return family::simulated_bus(config, axis.bus).inject(axis.node, effect, true);
     }
     let devices = family::of_line(config, axis.bus)
         .and_then(|family| family.simulated_axes_on_line(config, axis.bus))
         .ok_or(InjectError::NotSimulated)?;
-    SimulatedLineDevices::new(devices).inject(axis.node, effect, true)
+    inject_on_line(&mut SimulatedLineDevices::new(devices), axis.node, effect, true)
 }
 
 /// The key, with its value, that the drive refuses: another value may be possible for the same axis.

@@ -118,7 +118,7 @@ mod tests {
             }
         }
         let mut source = String::new();
-        for folder in ["src", "crates/wire/src", "rt/src"] {
+        for folder in ["src", "crates/sim/src", "crates/wire/src", "rt/src"] {
             add(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut source);
         }
         let source = source.replace("\\\"", "\"").replace("\\\n", "\n");

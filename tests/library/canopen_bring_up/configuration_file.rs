@@ -9,7 +9,6 @@ use takt_wire::canopen::dcf::{self, DeviceConfiguration, Download};
 use takt_wire::canopen::eds;
 use takt_wire::canopen::sdo::AbortCode;
 
-use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, ReceiveBatch};
 
 use super::scripted_drive::{ScriptedDrive, at};
@@ -125,7 +124,7 @@ fn the_simulated_erob_accepts_its_own_eds_as_a_configuration() {
     assert!(configuration.downloads.len() > 60, "{}", configuration.downloads.len());
     let mut config = config(&[(0, 2)]);
     config.axes[0].dcf = Some(configuration);
-    let mut bus = SimulatedBus::new(&config, 0);
+    let mut bus = takt::simulated_bus(&config, 0);
     let mut bring_up = BringUp::new(&config);
     let mut batch = ReceiveBatch::new();
     for now_ns in (0..20_000_000_000).step_by(1_000_000) {

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use takt::Config;
 use takt::internals::RunInside;
-use takt::sim::SimulatedBus;
 use takt::{Outcome, VirtualRun};
 use takt_rt::Phase;
 
@@ -18,7 +17,7 @@ pub fn sheet(name: &str) -> PathBuf {
 }
 
 pub fn run_of(config: &Config) -> VirtualRun<ListeningBus> {
-    let buses = (0..config.buses.len()).map(|bus| ListeningBus::new(SimulatedBus::new(config, bus)));
+    let buses = (0..config.buses.len()).map(|bus| ListeningBus::new(takt::simulated_bus(config, bus)));
     VirtualRun::new(config, buses.collect()).unwrap().0
 }
 

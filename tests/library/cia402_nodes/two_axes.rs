@@ -9,7 +9,7 @@ use takt::family::cia402::{self, Device};
 use takt::family::commission::{CommandValue, MotionProfile, MoveKind, TargetDrive, Task, ValueText};
 use takt::internals::commission::bus_session::{self, SessionEvent};
 use takt::schedule::{self, MessageKind};
-use takt::sim::{DriveFault, SimulatedBus};
+use takt::sim::DriveFault;
 use takt::{Outcome, VirtualClock};
 use takt_rt::{Frame, Id, Origin, Phase, Rule};
 
@@ -293,7 +293,7 @@ fn commissioning_of_the_second_axis_moves_the_second_axis_alone() {
         profile,
         keeps_enabled: false,
     };
-    let mut bus = SimulatedBus::new(&config, 0);
+    let mut bus = takt::simulated_bus(&config, 0);
     let target = TargetDrive::of(&config.axes[1]).unwrap();
     let task = target.family().commission(target.clone(), task).unwrap();
     let mut touched = vec![];
@@ -321,7 +321,7 @@ fn commissioning_of_the_second_axis_moves_the_second_axis_alone() {
 #[test]
 fn an_object_is_read_from_the_axis_that_it_was_written_to() {
     let config = machine("");
-    let mut bus = SimulatedBus::new(&config, 0);
+    let mut bus = takt::simulated_bus(&config, 0);
     let mut clock = VirtualClock::default();
     let mut run = |axis: usize, task: Task| {
         let target = TargetDrive::of(&config.axes[axis]).unwrap();

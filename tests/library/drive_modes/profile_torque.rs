@@ -11,7 +11,8 @@ use crate::drive_modes::world::{World, load};
 
 /// One eRob that differs from what the configuration says of it.
 fn erob_with(config: Config, change: impl Fn(&mut ErobParameters)) -> (Config, Vec<SimulatedBus>) {
-    let mut parameters = ErobParameters::of(&config.axes[0], &config.simulation);
+    let mut parameters =
+        takt::internals::sim::erob::simulated_parameters(&config.axes[0], &config.simulation);
     change(&mut parameters);
     let drive: Box<dyn Drive> = Box::new(ErobJoint::new(parameters));
     let rates = WireBitRates { nominal: 1_000_000, data: None };

@@ -13,7 +13,8 @@ use crate::drive_modes::world::{World, load};
 /// The gantry with drives that differ from the usual ones.
 fn gantry_with(config: Config, change: impl Fn(&mut YzAimParameters)) -> World {
     let drives = config.axes.iter().map(|axis| -> Box<dyn Drive> {
-        let mut parameters = YzAimParameters::of(axis, 1_000_000, &config.simulation);
+        let mut parameters =
+            takt::internals::sim::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
         change(&mut parameters);
         Box::new(YzAimJoint::new(parameters))
     });

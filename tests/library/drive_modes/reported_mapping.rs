@@ -161,7 +161,8 @@ fn the_mapping_of_a_yz_aim_cannot_be_written() {
 /// Drives whose firmware reports the statusword before the position, unlike the manual.
 fn state_first(config: Config) -> World {
     let drives = config.axes.iter().map(|axis| -> Box<dyn Drive> {
-        let parameters = YzAimParameters::of(axis, 1_000_000, &config.simulation);
+        let parameters =
+            takt::internals::sim::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
         let quirks = Quirks { reports_state_first: true, ..parameters.quirks };
         Box::new(YzAimJoint::new(YzAimParameters { quirks, ..parameters }))
     });

@@ -91,7 +91,7 @@ pub fn load(name: &str) -> Config {
 
 impl World {
     pub fn new(config: Config) -> Self {
-        let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+        let buses = (0..config.buses.len()).map(|bus| takt::simulated_bus(&config, bus)).collect();
         Self::on(config, buses)
     }
 
@@ -104,7 +104,7 @@ impl World {
 
     /// A controller that holds where its axes are for an hour, to be commanded by the test.
     pub fn holding(config: Config) -> Self {
-        let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(&config, bus)).collect();
+        let buses = (0..config.buses.len()).map(|bus| takt::simulated_bus(&config, bus)).collect();
         Self::holding_on(config, buses)
     }
 

@@ -11,7 +11,7 @@ fn bus() -> SimulatedBus {
     let mut config = Config::load(&path).unwrap();
     config.axes.iter_mut().for_each(|axis| axis.power_up_ns = 1_000_000);
     config.simulation.longest_gap_ns = u64::MAX;
-    let mut bus = SimulatedBus::new(&config, 0);
+    let mut bus = takt::simulated_bus(&config, 0);
     received(&mut bus, 0);
     received(&mut bus, 3_000_000);
     bus

@@ -60,7 +60,7 @@ fn machine(name: &str) -> Config {
 /// bus.
 fn enabled(config: &Config, lost: Option<usize>) -> (VirtualRun<LossyBus>, usize) {
     let heartbeat = Id::canopen(0x700, config.master.node);
-    let buses = (0..config.buses.len()).map(|bus| SimulatedBus::new(config, bus));
+    let buses = (0..config.buses.len()).map(|bus| takt::simulated_bus(config, bus));
     let ports = buses.map(|bus| LossyBus { bus, heartbeat, lost, heartbeats: 0 }).collect();
     let (mut run, _) = VirtualRun::new(config, ports).unwrap();
     while run.snapshot().groups[0].phase != Phase::Moving {

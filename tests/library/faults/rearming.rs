@@ -7,7 +7,6 @@ use takt::VirtualRun;
 use takt::config::Config;
 use takt::faults::FaultInjector;
 use takt::internals::RunInside;
-use takt::sim::SimulatedBus;
 use takt_rt::{Fault, Phase, Request, Rule, StopCause, StopReason};
 
 use crate::faults::arm::{arm, folder, scenario};
@@ -20,7 +19,7 @@ fn faulted(config: &Config, kind: &str) -> VirtualRun<Port> {
     let fault =
         format!("[[fault]]\nkind = \"{kind}\"\naxis = \"{axis}\"\nwhen = \"enabled\"\nat = \"100 ms\"\n");
     let fault_injector = Arc::new(FaultInjector::new(scenario(&fault, config)));
-    let simulated = |bus| Port::Simulated(Box::new(SimulatedBus::new(config, bus)));
+    let simulated = |bus| Port::Simulated(Box::new(takt::simulated_bus(config, bus)));
     let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
     let (mut run, _) = VirtualRun::serving(config, ports).unwrap();
     run_until(&mut run, |run| {

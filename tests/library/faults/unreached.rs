@@ -195,7 +195,7 @@ impl BusPort for Refusing {
 #[test]
 fn a_drive_that_refuses_to_be_shut_down_is_named() {
     let config = config(MIXED);
-    let port = Refusing { bus: SimulatedBus::new(&config, 0), node: 1, is_refusing: false };
+    let port = Refusing { bus: takt::simulated_bus(&config, 0), node: 1, is_refusing: false };
     let (mut run, _) = VirtualRun::new(&config, vec![port]).unwrap();
     let mut has_moved = false;
     run.run(120_000, |run| {
@@ -209,7 +209,7 @@ fn a_drive_that_refuses_to_be_shut_down_is_named() {
 #[test]
 fn after_a_bring_up_that_fails_the_others_are_told_to_stop_and_those_not_reached_are_named() {
     let config = config(MIXED);
-    let mut port = Refusing { bus: SimulatedBus::new(&config, 0), node: 1, is_refusing: true };
+    let mut port = Refusing { bus: takt::simulated_bus(&config, 0), node: 1, is_refusing: true };
     // An earlier run has left it with torque.
     let enable = [0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFC];
     for at_ms in 0..20 {
@@ -228,7 +228,7 @@ fn after_a_bring_up_that_fails_the_others_are_told_to_stop_and_those_not_reached
 fn after_an_interrupted_bring_up_every_axis_that_has_confirmed_nothing_is_named() {
     let config = config(&OWN_PROTOCOL.replace("erob-can", "erob-canopen"));
     for (interrupt, unreached) in [(Interrupt::Controlled, vec![]), (Interrupt::Immediate, vec![0])] {
-        let (mut run, _) = VirtualRun::new(&config, vec![SimulatedBus::new(&config, 0)]).unwrap();
+        let (mut run, _) = VirtualRun::new(&config, vec![takt::simulated_bus(&config, 0)]).unwrap();
         run.interrupt(interrupt);
         assert_eq!(run.run(120_000, |_| {}), Some(Outcome::Interrupted));
         assert_eq!(run.supervisor().unreached(), unreached, "{interrupt:?}");

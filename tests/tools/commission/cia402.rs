@@ -29,7 +29,7 @@ fn sheet_bench(sheet: &Path, lines: &str) -> Bench {
     );
     let mut config = Config::parse("one.toml", &text).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
     config.simulation.longest_gap_ns = u64::MAX;
-    Bench::of(TargetDrive::of(&config.axes[0]).unwrap(), SimulatedBus::new(&config, 0))
+    Bench::of(TargetDrive::of(&config.axes[0]).unwrap(), takt::simulated_bus(&config, 0))
 }
 
 fn sheets() -> Vec<PathBuf> {

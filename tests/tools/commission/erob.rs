@@ -18,7 +18,7 @@ fn changed(change: impl FnOnce(&mut Config)) -> Bench {
     let mut config = Config::load(Path::new("configs/single-erob.toml")).unwrap();
     config.simulation.longest_gap_ns = u64::MAX;
     change(&mut config);
-    Bench::of(TargetDrive::of(&config.axes[0]).unwrap(), SimulatedBus::new(&config, 0))
+    Bench::of(TargetDrive::of(&config.axes[0]).unwrap(), takt::simulated_bus(&config, 0))
 }
 
 #[test]

@@ -123,7 +123,7 @@ pub fn process_data_words(s: &TargetDrive, frame: &Frame) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::erob::OBJECTS as SIMULATED;
+    use takt_sim::erob::OBJECTS as SIMULATED;
 
     #[test]
     fn every_object_has_the_same_length_in_the_simulated_drive() {

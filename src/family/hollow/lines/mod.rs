@@ -20,7 +20,7 @@ use crate::config::{
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::commission::{DriveTask, Failure, TargetDrive, Task};
 use crate::family::{Family, NamedEntry, SettingUp};
-use crate::sim::{Drive, SilentDrive};
+use takt_sim::{Drive, SilentDrive};
 
 /// A device on a serial line.
 #[derive(Clone, Copy, Debug)]

@@ -1,0 +1,123 @@
+//! Steps the control loops and the joint.
+
+use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
+
+use super::load_monitor::LoadMonitor;
+use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
+use crate::loops::ControlLoops;
+use crate::motion::Measured;
+use crate::yz_aim::device::Level;
+use crate::yz_aim::homing::Input;
+use crate::yz_aim::motion::MotionCommand;
+use crate::yz_aim::objects::at;
+
+/// 6083h: at this value and above there is no ramp (manual IV.1).
+const NO_RAMP: i64 = 60_000;
+
+impl ControlLoops for YzAimJoint {
+    fn stepped_ns(&self) -> Nanoseconds {
+        self.stepped_ns
+    }
+
+    fn step(&mut self, duration_ns: Nanoseconds) {
+        let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
+        self.stepped_ns += duration_ns;
+        let is_energised = self.is_energised();
+        if is_energised && !self.was_energised {
+            self.engage();
+        }
+        self.was_energised = is_energised;
+        if is_energised {
+            self.step_homing(duration_s);
+            self.drive(duration_s);
+        } else {
+            self.homing.fail();
+            self.torque = 0.0;
+        }
+        if self.joint_defects.is_blocked {
+            self.joint.halt();
+        } else {
+            self.joint.step(duration_s, self.torque * self.direction(), false);
+        }
+        if is_energised {
+            self.monitor_load(duration_s);
+        } else {
+            self.motion.engage(self.actual());
+        }
+    }
+}
+
+impl YzAimJoint {
+    /// Restarts the motion at the actual position, when torque comes on or the command changes.
+    pub(super) fn engage(&mut self) {
+        if !self.was_energised {
+            self.servo.reset();
+            self.load_monitor = LoadMonitor::default();
+        }
+        self.motion.engage(self.actual());
+    }
+
+    fn motion_command(&self) -> MotionCommand {
+        if self.is_master_lost || self.device.is_halted() {
+            return MotionCommand::Stop;
+        }
+        if let Some(speed) = self.homing.speed() {
+            return MotionCommand::Velocity(
+                speed * self.parameters.homing.speed_rpm * COUNTS_PER_SECOND_PER_RPM,
+            );
+        }
+        let profile_speed = self.dictionary.real(at::PROFILE_VELOCITY) * COUNTS_PER_SECOND_PER_RPM;
+        match (self.device.level(), self.mode()) {
+            (Level::Cold, _) => MotionCommand::Profile(self.power_up_speed.unwrap_or(profile_speed)),
+            (Level::Enabled, mode::PROFILE_POSITION) => MotionCommand::Profile(profile_speed),
+            (Level::Enabled, mode::VELOCITY) => {
+                MotionCommand::Velocity(self.dictionary.real(at::TARGET_VELOCITY) * COUNTS_PER_SECOND_PER_RPM)
+            }
+            (Level::Enabled, _) if self.interpolates() => MotionCommand::Interpolate,
+            _ => MotionCommand::Stop,
+        }
+    }
+
+    /// The acceleration ramp: counts/s².
+    fn acceleration(&self) -> f64 {
+        match self.dictionary.number(at::ACCELERATION) {
+            NO_RAMP.. => f64::INFINITY,
+            // At least 1: a ramp of 0 would never stop the motor.
+            slope => slope.max(1) as f64 * COUNTS_PER_SECOND_PER_RPM,
+        }
+    }
+
+    /// One step of command, loops and torque.
+    fn drive(&mut self, duration_s: f64) {
+        let actual = self.actual();
+        let demand = self.motion.step(self.motion_command(), self.acceleration(), actual, duration_s);
+        self.servo.set_torque_limit(self.torque_limit());
+        let measured = Measured {
+            count: 1.0 / self.parameters.encoder.counts_per_unit.abs(),
+            // No torque is fed forward.
+            per_mille: 0.0,
+            position: actual.position,
+            velocity: self.joint.velocity() * self.direction(),
+        };
+        self.torque = demand.torque(&mut self.servo, measured, duration_s);
+    }
+
+    fn step_homing(&mut self, duration_s: f64) {
+        if !self.homing.is_running() {
+            return;
+        }
+        let is_closed = match self.homing.input() {
+            Some(Input::Dir) => self.parameters.switches.dir(self.joint.position()),
+            Some(Input::Pu) => self.parameters.switches.pu(self.joint.position()),
+            None => false,
+        };
+        let (velocity, is_at_rest) = (self.actual().velocity, self.is_at_rest());
+        if self.homing.step(is_closed, velocity, is_at_rest, duration_s) {
+            self.set_counts(0);
+        }
+        let gives_up_ns = self.parameters.homing.gives_up_ns.unwrap_or(NEVER);
+        if self.homing.elapsed_s() * NANOSECONDS_PER_SECOND as f64 > gives_up_ns as f64 {
+            self.homing.fail();
+        }
+    }
+}
