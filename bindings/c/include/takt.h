@@ -346,9 +346,9 @@ typedef struct {
   // The state of CiA 402: 0 not ready to switch on, 1 switch on disabled, 2 ready to switch on, 3 switched on, 4 operation enabled,
   // 5 quick stop active, 6 fault reaction active, 7 fault, 8 undefined.
   uint8_t drive_state;
-  // Whether the drive has reported since the controller became active. If not, nothing that it reports is known.
+  // True if the drive has reported since the controller became active. If not, nothing that it reports is known.
   bool is_heard;
-  // Whether what the drive reports is not from the last cycle: position, velocity, torque and the rest are old.
+  // True if what the drive reports is not from the last cycle: position, velocity, torque and the rest are old.
   bool is_stale;
   // 0; for later.
   uint8_t reserved[17];
@@ -545,9 +545,9 @@ typedef struct {
   uint64_t stream_late_points;
   // Points that found no room, or could not be used.
   uint64_t stream_lost_points;
-  // Whether it is stopping or has stopped. It is false again once the group has been enabled again, or has moved on.
+  // True if it is stopping or has stopped. It is false again once the group has been enabled again, or has moved on.
   bool is_stopped;
-  // Whether that stop was for a fault, which takt_clear_faults() must clear.
+  // True if that stop was for a fault, which takt_clear_faults() must clear.
   bool is_faulted;
   // The category of that stop, 0 to 2: a takt_stop_category.
   uint8_t stop_category;
@@ -609,7 +609,7 @@ typedef struct {
   uint32_t group_count;
   // How many of `buses` count.
   uint32_t bus_count;
-  // Whether the drive of any of these axes is stale.
+  // True if the drive of any of these axes is stale.
   bool is_any_stale;
   // 0; for later.
   uint8_t reserved[3];
