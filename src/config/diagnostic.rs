@@ -20,7 +20,7 @@ impl Diagnostic for ConfigError {
 }
 
 impl Diagnostic for Problem {
-    /// What is wrong with a file that the configuration names, at its lines.
+    /// The problems of a file that the configuration names, at its lines.
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
         let findings: &dyn Diagnostic = self.findings()?;
         Some(Box::new(std::iter::once(findings)))

@@ -37,14 +37,14 @@ struct Described {
     description: Box<dyn Any + Send + Sync>,
 }
 
-/// What is known of the drives of a family.
+/// Facts about the drives of a family.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DriveFacts {
     /// The word for the family in a configuration.
     pub word: &'static str,
-    /// What people call such a drive.
+    /// Display name.
     pub name: &'static str,
-    /// What the drives say of themselves. `None` accepts anything.
+    /// Expected identity. `None` accepts any value.
     pub identity: Identity,
     /// Counts of one turn of the position that the drives report. `None`: a configuration must say it.
     pub counts_per_turn: Option<f64>,
@@ -82,9 +82,9 @@ pub struct DriveFacts {
     pub may_ignore_sync: bool,
     /// The number of this axis among those of its drive, 1 where a drive has one axis. See [`Axis::node`](super::model::Axis::node).
     pub node_axis: u8,
-    /// How the drives are spoken to.
+    /// Protocol.
     pub protocol: Protocol,
-    /// How the drives show that they live, beside their feedback.
+    /// Error control, besides feedback.
     pub error_control: ErrorControl,
     /// True if the drives can watch the heartbeat of the controller (object 1016).
     pub consumes_heartbeat: bool,
@@ -92,17 +92,17 @@ pub struct DriveFacts {
     pub sends_emergencies: bool,
     /// True if the drives may be operational after power-up, without an NMT command.
     pub may_power_up_operational: bool,
-    /// How they use controlword and statusword.
+    /// Use of controlword and statusword.
     pub codec: Cia402Codec,
     /// The pause that they need between two controlwords.
     pub controlword_spacing_ns: u64,
-    /// So long after power-on they can be enabled, where they answer long before.
+    /// Time from power-on until they can be enabled, where they answer long before.
     pub enabled_from_ns: u64,
-    /// What is plausible for such a drive.
+    /// Plausible values.
     pub plausible: Plausible,
 }
 
-/// How drives are spoken to.
+/// Protocol of drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Protocol {
     /// By CANopen: they are nodes, with objects, NMT states and PDOs.
@@ -184,14 +184,14 @@ impl ModeSet {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum VelocityUnit {
-    /// So many counts of the reported position in a second.
+    /// Counts of the reported position per second.
     Counts(f64),
-    /// So many r/min of the reported position.
+    /// r/min of the reported position.
     RevolutionsPerMinute(f64),
 }
 
 impl VelocityUnit {
-    /// What the drive calls a speed of one turn of its position in a second.
+    /// The drive's number for a speed of one turn of its position per second.
     pub(crate) const fn units_per_turn(self, counts_per_turn: f64) -> f64 {
         match self {
             Self::Counts(counts) => counts_per_turn / counts,
@@ -223,7 +223,7 @@ impl ModeChangeRule {
     }
 }
 
-/// What is plausible for a drive of a family. What is not is possible, and warned of.
+/// Plausible values of a drive of a family. Others are possible, and cause a warning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plausible {
     /// The fastest that drives of the family turn, in turns per second of the position that they report.
@@ -295,7 +295,7 @@ impl DriveFacts {
         self.modes.contains(control.operation_mode())
     }
 
-    /// What the drives call a speed of one turn of their position in a second.
+    /// Returns the drives' number for a speed of one turn of their position per second.
     pub const fn velocity_units_per_turn(&self, counts_per_turn: f64) -> f64 {
         self.velocity_unit.units_per_turn(counts_per_turn)
     }
@@ -330,7 +330,7 @@ impl DriveFamily {
         Self { facts: Facts::OfDrive(Arc::new(Described { facts, description: Box::new(description) })) }
     }
 
-    /// What the family has read of this drive, if it has read anything, and it is of this type.
+    /// Returns the data that the family has read for this drive, if there are any and they have this type.
     pub fn description<T: Any>(&self) -> Option<&T> {
         match &self.facts {
             Facts::OfFamily(_) => None,

@@ -99,7 +99,7 @@ impl ConfigError {
         self.0.source.as_ref()
     }
 
-    /// How many problems there are besides [`ConfigError::problems`].
+    /// Returns the number of problems besides [`ConfigError::problems`].
     pub fn omitted(&self) -> usize {
         self.0.omitted
     }
@@ -161,13 +161,13 @@ impl std::error::Error for ConfigError {}
 #[derive(Clone, Debug, PartialEq, Error)]
 #[error("{location}{kind}")]
 pub struct Problem {
-    /// What is wrong.
+    /// The problem.
     pub kind: ProblemKind,
-    /// Where it is wrong.
+    /// The place.
     pub location: Location,
 }
 
-/// Where a problem is.
+/// The place of a problem.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Location {
     /// The file could not even be read.
@@ -205,7 +205,7 @@ impl Problem {
         }
     }
 
-    /// What is wrong with a file that the configuration names.
+    /// The problems of a file that the configuration names.
     pub(super) fn findings(&self) -> Option<&Findings> {
         match &self.kind {
             ProblemKind::Dcf { reason: DcfError::File(findings) } => Some(findings),

@@ -5,7 +5,7 @@ use takt_wire::bit_fields::FieldDevice;
 
 use super::drive_family::DriveFamily;
 
-/// What an identifier is for.
+/// Purpose of an identifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IdUse {
     /// Frames of the controller in the cycle.

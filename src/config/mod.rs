@@ -93,7 +93,7 @@ impl Config {
     }
 }
 
-/// Why a bus cannot be connected to another interface.
+/// The reason for which a bus cannot be connected to another interface.
 #[derive(Clone, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum OverrideError {

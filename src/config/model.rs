@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 /// Limits of an axis in rad (m) and seconds. Defaults: the deceleration is the acceleration, the jerk is infinite.
 pub use takt_rt::AxisLimits as Limits;
-/// How an axis is commanded. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
+/// Control mode of an axis. Defaults of the gains: a position gain of 20 1/s; in CST a stiffness of inertia · bandwidth² and
 /// a damping of 2 · inertia · bandwidth with a bandwidth of 40 rad/s, and the inertia and friction of the simulated joint.
 pub use takt_rt::ControlLaw as Control;
 pub use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
@@ -29,11 +29,11 @@ pub struct Config {
     pub cycle: Cycle,
     /// When missed slots are too many.
     pub missed_slots: MissedSlots,
-    /// How each rule stops the group. Default: see [`takt_rt::Rule::default_category`].
+    /// Stop category of each rule. Default: see [`takt_rt::Rule::default_category`].
     pub stops: StopCategories,
-    /// How far a stream runs behind the stamps of its points; up to 1 s. Default: as far as the points ask for.
+    /// Delay of a stream behind the stamps of its points; up to 1 s. Default: as long as the points need.
     pub stream_delay: StreamDelay,
-    /// What is asked of the operating system.
+    /// Settings of the real-time thread.
     pub realtime: Realtime,
     /// This controller as a CANopen node.
     pub master: Master,
@@ -43,11 +43,11 @@ pub struct Config {
     pub axes: Vec<Axis>,
     /// The groups, each axis in one of them. Without any, all axes are one group.
     pub groups: Vec<Group>,
-    /// What `takt run` does with them.
+    /// The moves of `takt run`.
     pub program: Program,
-    /// What is written down.
+    /// Recordings and black boxes.
     pub telemetry: Telemetry,
-    /// How simulated buses behave.
+    /// Simulated buses.
     pub simulation: Simulation,
 }
 
@@ -122,18 +122,18 @@ pub struct MissedSlots {
     pub leak_slots: u32,
 }
 
-/// What is asked of the operating system for the real-time thread.
+/// Settings of the operating system for the real-time thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Realtime {
     /// SCHED_FIFO priority, 1 to 99; `None` leaves the thread in the normal class. Default 80.
     pub priority: Option<u8>,
     /// The CPU to pin the thread to; `None`, the default, lets takt take the last one it may use.
     pub cpu: Option<usize>,
-    /// True if to lock all memory. Default `true`.
+    /// True to lock all memory. Default `true`.
     pub lock_memory: bool,
-    /// True if to hold the CPU out of deep idle states. Default `true`.
+    /// True to hold the CPU out of deep idle states. Default `true`.
     pub hold_dma_latency: bool,
-    /// How long before a deadline to stop sleeping and spin; `None`, the default, measures the wake-up latency and
+    /// Time before a deadline from which the thread spins instead of sleeping; `None`, the default, measures the wake-up latency and
     /// chooses.
     pub spin_guard_ns: Option<u64>,
 }
@@ -157,7 +157,7 @@ pub struct Master {
 pub struct Bus {
     /// Its name in the configuration and the report.
     pub name: String,
-    /// What it is connected to. Default: simulated.
+    /// Interface. Default: simulated.
     pub interface: Interface,
     /// Cycles of the controller in one cycle of this bus (SYNC, feedback, set-points). Default 1: a file gives the
     /// period.
@@ -166,7 +166,7 @@ pub struct Bus {
     pub bit_rate: u32,
     /// Bit rate (bit/s) of the data phase of CAN FD frames; `None`, the default, on a classic bus.
     pub data_bit_rate: Option<u32>,
-    /// How long (ms) after a controller has gone off the bus the kernel restarts it; 0 leaves it off. It holds where takt
+    /// Time (ms) from bus-off to the restart of the controller by the kernel; 0 leaves it off. It holds where takt
     /// brings the interface up itself. Default 100 ms.
     pub restart_ms: u32,
     /// The most service frames (NMT, SDO …) sent in one cycle while the axes are enabled, beside the heartbeat.
@@ -190,7 +190,7 @@ pub enum CommandFrames {
     Shared,
 }
 
-/// What a bus is connected to.
+/// Interface of a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Interface {
@@ -224,7 +224,7 @@ pub struct CanLine {
     pub baud_rate: u32,
 }
 
-/// What a source may ask of the torque loop of an axis: of an impedance, and of how fast a torque changes.
+/// Limits on what a source commands to the torque loop of an axis: of an impedance, and of how fast a torque changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compliance {
     /// The highest stiffness of an impedance: N·m/rad (N/m). Default: that of the axis' own loop; 0 where it has none.
@@ -247,7 +247,7 @@ pub struct Axis {
     pub node: u8,
     /// The family of the drive.
     pub drive: DriveFamily,
-    /// How it is commanded, with the gains of the loop that the controller closes itself. Default: position.
+    /// Control mode, with the gains of the loop that the controller closes itself. Default: position.
     pub control: Control,
     /// The modes that it may be changed to at run time, beside that one, with their gains: cyclic synchronous modes, each once.
     /// Everything that each of them needs is required and mapped. Default: none.
@@ -262,24 +262,24 @@ pub struct Axis {
     pub reversed: bool,
     /// The count at which the joint's position is zero. Default 0.
     pub zero_counts: i32,
-    /// What may never be exceeded.
+    /// Limits that are never exceeded.
     pub limits: Limits,
     /// Which limits a robot description has, and which the configuration. Default: there is none.
     pub urdf: Option<UrdfLimits>,
     /// The unit in which its positions are shown to people. Default: that in which the file has the limits of its position.
     pub shown_in: PositionUnit,
-    /// What a source may ask of the torque loop. Default: no more than the gains of the axis' own loop.
+    /// Limits on what a source commands to the torque loop. Default: no more than the gains of the axis' own loop.
     pub compliance: Compliance,
-    /// What is sent to the drive beside its target. Default: nothing.
+    /// Feed-forward that is sent with the target. Default: none.
     pub feed_forward: FeedForward,
-    /// How far the joint may be from its set-point.
+    /// Limit of the following error.
     pub following_error: FollowingError,
-    /// How far from the joint a stream of set-points may begin: rad (m). Default 0.02 rad or 0.002 m.
+    /// Largest distance from the joint to the first point of a stream: rad (m). Default 0.02 rad or 0.002 m.
     pub start_tolerance: f64,
-    /// How far from its target a program may leave the joint and still be finished: rad (m). Default 0.01 rad or 1 mm; in CST
+    /// Largest distance from the target at which a program counts as finished: rad (m). Default 0.01 rad or 1 mm; in CST
     /// 1.5 · coulomb_friction / stiffness where that is more, since static friction holds a joint off its target there.
     pub target_tolerance: f64,
-    /// What is done with a stream that asks for more than the limits allow. Default: the axis follows as far as they go.
+    /// Handling of a stream beyond the limits. Default: the axis follows as far as they go.
     pub follow: Follow,
     /// Cycles without feedback before the group stops. Default 5.
     pub missed_feedback_cycles: u16,
@@ -288,7 +288,7 @@ pub struct Axis {
     /// Whose mapping of the PDOs counts. Default: the controller's, or the drive's where the family cannot be
     /// mapped.
     pub mapping: PdoMapping,
-    /// What the drive reports every cycle beside statusword and position. Default: the mode of operation, where the PDOs are
+    /// Feedback of every cycle besides statusword and position. Default: the mode of operation, where the PDOs are
     /// written.
     pub feedback: Vec<Feedback>,
     /// True if the drive answers SYNC with its position, the default, or set-points alone, which spares the bus a frame and makes
@@ -301,28 +301,28 @@ pub struct Axis {
     /// proves the drive alive without loading the bus. A drive without a heartbeat is asked at this period instead, by default at
     /// that of the controller's heartbeat: node guarding, see [`Axis::supervision`].
     pub heartbeat_ns: Option<u64>,
-    /// What is known of the drive beforehand and compared at bring-up. Default: the family's, any revision.
+    /// Expected identity of the drive, compared at bring-up. Default: the family's, any revision.
     pub identity: Identity,
-    /// What a configuration file (DCF or concise DCF) has written to the drive at bring-up, before the controller writes
+    /// Configuration file (DCF or concise DCF), whose values are written to the drive at bring-up, before the controller writes
     /// what it needs itself. Default: none.
     pub dcf: Option<DeviceConfiguration>,
     /// From power-up of the drive to its first answer; commissioning waits for it. Default 200 ms.
     pub power_up_ns: u64,
     /// The mechanics of the joint.
     pub joint: Joint,
-    /// What stands in on a simulated bus, beside the joint.
+    /// The simulated drive, besides the joint.
     pub simulated: SimulatedJoint,
 }
 
 impl Axis {
-    /// How it may be commanded: in the mode that it starts in, and in those that it may be changed to.
+    /// Returns the control modes: the one in which it starts, and those to which it may be changed.
     pub fn controls(&self) -> impl Iterator<Item = &Control> {
         std::iter::once(&self.control).chain(&self.other_modes)
     }
 }
 
 impl Travel {
-    /// How far the joint gets in one turn: rad (m).
+    /// Returns the travel of the joint for one turn: rad (m).
     pub const fn per_turn(self) -> f64 {
         match self {
             Self::Rotary => TAU,
@@ -396,7 +396,7 @@ pub enum Travel {
     },
 }
 
-/// How far the joint may be from its set-point.
+/// Limit of the following error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FollowingError {
     /// rad or m. Default 0.1 rad or 0.01 m.
@@ -405,7 +405,7 @@ pub struct FollowingError {
     pub time_ns: u64,
 }
 
-/// What a drive must say of itself; `None` accepts anything.
+/// Expected identity of a drive; `None` accepts any value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
     /// Object 1000.
@@ -418,10 +418,10 @@ pub struct Identity {
     pub revision: Option<u32>,
 }
 
-/// What `takt run` does: the moves one after the other, the whole list `repeat` times.
+/// The moves of `takt run`, one after the other, the whole list `repeat` times.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Program {
-    /// How often the list is run, at least once. Default 1.
+    /// Number of passes, at least 1. Default 1.
     pub repeat: u32,
     /// The moves.
     pub moves: Vec<ProgramMove>,
@@ -432,7 +432,7 @@ pub struct Program {
 pub struct ProgramMove {
     /// The group that moves, an index into [`Config::groups`]; 0 where there are no groups.
     pub group: usize,
-    /// What is wanted of the axes of the group, in their order.
+    /// Targets of the axes of the group, in their order.
     pub target: ProgramTarget,
     /// Fraction of the velocity limits. Default 1.
     pub velocity_scale: f64,
@@ -444,7 +444,7 @@ pub struct ProgramMove {
     pub dwell_s: f64,
 }
 
-/// What a move wants of every axis.
+/// Target of a move, for every axis.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ProgramTarget {
@@ -466,7 +466,7 @@ pub enum ProgramTarget {
     },
 }
 
-/// What is written down.
+/// Recordings and black boxes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Telemetry {
     /// The folder for recordings. Default `runs`.
@@ -475,14 +475,14 @@ pub struct Telemetry {
     pub is_recorded: bool,
     /// True if the frames of every bus are written as candump logs. Default `false`.
     pub is_candump_written: bool,
-    /// How much of the past the black box keeps and writes at a fault; 100 ms to 60 s, `None` has no black box.
+    /// Length of the black box that is written at a fault; 100 ms to 60 s, `None` has no black box.
     /// Default 5 s.
     pub black_box_ns: Option<u64>,
     /// Cycle records that the ring to the logger can hold. Default 4096.
     pub ring_records: usize,
 }
 
-/// How simulated buses behave.
+/// Simulated buses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Simulation {
     /// Seed of everything random. Default 1.
@@ -510,12 +510,12 @@ pub struct Joint {
     pub rated_torque: Option<f64>,
 }
 
-/// What stands in for an axis on a simulated bus, beside its joint.
+/// The simulated drive of an axis, besides its joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SimulatedJoint {
     /// The torque of gravity a quarter turn from 0, where the joint hangs: N·m (the weight of a linear axis: N). Default 0.
     pub gravity: f64,
-    /// How Coulomb friction depends on the speed. Default: it does not.
+    /// Dependence of the Coulomb friction on the speed. Default: none.
     pub friction: FrictionShape,
     /// Peak torque: N·m (N). Default: three times the rated torque.
     pub peak_torque: f64,

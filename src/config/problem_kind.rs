@@ -16,7 +16,7 @@ pub enum ProblemKind {
     /// The file cannot be read.
     #[error("the file cannot be read: {reason}")]
     Unreadable {
-        /// What the operating system said.
+        /// The operating system's message.
         reason: String,
     },
     /// It is not text in UTF-8.
@@ -25,7 +25,7 @@ pub enum ProblemKind {
     /// It is not TOML.
     #[error("this is not TOML: {message}")]
     Syntax {
-        /// What the parser said.
+        /// The parser's message.
         message: String,
     },
     /// A key that has no meaning.
@@ -33,7 +33,7 @@ pub enum ProblemKind {
     UnknownKey {
         /// The key.
         key: String,
-        /// What was probably meant.
+        /// The most similar known name.
         nearest: Option<&'static str>,
         /// The keys that mean something in this place.
         known: Vec<&'static str>,
@@ -59,7 +59,7 @@ pub enum ProblemKind {
     Replaced {
         /// The key.
         key: String,
-        /// What to write now.
+        /// The key or value to write now.
         by: &'static str,
     },
     /// A key that is needed and not there.
@@ -75,9 +75,9 @@ pub enum ProblemKind {
     WrongType {
         /// The key.
         key: String,
-        /// What belongs there.
+        /// The expected kind of value.
         expected: &'static str,
-        /// What was found.
+        /// The received value.
         found: &'static str,
     },
     /// A text that is not a number with a unit.
@@ -137,7 +137,7 @@ pub enum ProblemKind {
         key: String,
         /// The word.
         given: String,
-        /// What was probably meant.
+        /// The most similar known name.
         nearest: Option<&'static str>,
         /// The words that are allowed here.
         choices: Vec<&'static str>,
@@ -185,7 +185,7 @@ pub enum ProblemKind {
     UnknownBus {
         /// The name.
         name: String,
-        /// What was probably meant.
+        /// The most similar known name.
         nearest: Option<String>,
         /// The buses that are there.
         known: Vec<String>,
@@ -197,7 +197,7 @@ pub enum ProblemKind {
         what: &'static str,
         /// The name.
         name: String,
-        /// What was probably meant.
+        /// The most similar known name.
         nearest: Option<String>,
         /// Those that are there.
         known: Vec<String>,

@@ -40,7 +40,7 @@ impl Dimension {
 /// A physical quantity that a key of the configuration asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quantity {
-    /// What it is called.
+    /// Name.
     pub name: &'static str,
     /// Its SI unit, in which bare numbers are taken; empty for a bare ratio.
     pub unit: &'static str,
@@ -102,7 +102,7 @@ quantities! {
     DAMPING = "damping", "N s/m", "300 N s/m", [1 0 -1 0 0];
 }
 
-/// What a unit symbol stands for.
+/// The quantity and the factor of a unit symbol.
 struct Unit {
     symbol: &'static str,
     factor: f64,
@@ -164,7 +164,7 @@ const UNITS: &[Unit] = &[
     unit("Mbps", 1e6, BIT_RATE),
 ];
 
-/// Why a text is not the quantity that was asked for.
+/// The reason for which a text is not the wanted quantity.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum QuantityError {

@@ -41,7 +41,7 @@ impl ConfigSources {
     }
 }
 
-/// Why no configuration can be made of its files.
+/// The reason for which no configuration can be made of its files.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourcesError {

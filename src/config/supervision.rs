@@ -2,7 +2,7 @@
 
 use super::model::{Axis, Master};
 
-/// What a drive has for error control (CiA 301, 7.2.8).
+/// Error control of a drive (CiA 301, 7.2.8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorControl {
     /// It sends heartbeats (object 1017).
@@ -35,7 +35,7 @@ pub enum Supervision {
     Guarding {
         /// From one request to the next, in whole milliseconds: object 100C.
         guard_time_ns: u64,
-        /// So many guard times may pass without a reply, or without a request: object 100D.
+        /// Number of guard times without a reply, or without a request, until node guarding fails: object 100D.
         life_time_factor: u8,
     },
 }
@@ -47,7 +47,7 @@ const SHORTEST_LIFE_TIME: u64 = 3;
 const MILLISECOND_NS: u64 = 1_000_000;
 
 impl Supervision {
-    /// How long a drive may give no sign of life; `None` where none is expected beside feedback.
+    /// Returns the longest time without a sign of life of the drive; `None` where none is expected besides feedback.
     pub const fn timeout_ns(self) -> Option<u64> {
         match self {
             Self::Feedback => None,

@@ -25,7 +25,7 @@ pub struct Urdf {
     robot: Robot,
 }
 
-/// What a robot description says of a joint that an axis moves.
+/// The joint that an axis moves, by a robot description.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UrdfJoint {
     /// Its name.
@@ -49,15 +49,15 @@ pub struct UrdfLimits {
     pub file: PathBuf,
     /// The joint there.
     pub joint: String,
-    /// Where the limits of the position are from.
+    /// Origin of the position limits.
     pub position: LimitOrigin,
-    /// Where the limit of the velocity is from.
+    /// Origin of the velocity limit.
     pub velocity: LimitOrigin,
-    /// Where the limit of the torque is from.
+    /// Origin of the torque limit.
     pub torque: LimitOrigin,
 }
 
-/// Where a limit is from.
+/// Origin of a limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LimitOrigin {
@@ -69,7 +69,7 @@ pub enum LimitOrigin {
     SafetyController,
 }
 
-/// Why a robot description cannot be used.
+/// The reason for which a robot description cannot be used.
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum UrdfError {
@@ -86,7 +86,7 @@ pub enum UrdfError {
     NotUrdf {
         /// The file.
         file: String,
-        /// What the parser said.
+        /// The parser's message.
         reason: String,
     },
     /// There is no such joint.
@@ -96,7 +96,7 @@ pub enum UrdfError {
         file: String,
         /// The name.
         joint: String,
-        /// What was probably meant.
+        /// The most similar known name.
         nearest: Option<String>,
         /// The joints that move.
         known: Vec<String>,
@@ -128,9 +128,9 @@ pub enum UrdfError {
         file: String,
         /// The joint.
         joint: String,
-        /// What the joint is.
+        /// Kind of the joint.
         kind: &'static str,
-        /// What the axis is.
+        /// Kind of the axis.
         travel: &'static str,
     },
     /// An axis may do more than the joint of its name.
@@ -144,9 +144,9 @@ pub enum UrdfError {
         axis: String,
         /// `position`, `velocity` or `torque`.
         limit: &'static str,
-        /// What the axis may do.
+        /// Value of the axis.
         value: String,
-        /// What the joint may do.
+        /// Value of the joint.
         allowed: String,
     },
     /// The limits of the position leave no room, or are not finite.
@@ -166,7 +166,7 @@ pub enum UrdfError {
 }
 
 impl UrdfError {
-    /// What to do about it.
+    /// Returns the remedy.
     pub fn help(&self) -> String {
         match self {
             Self::Unreadable { .. } => {
@@ -229,7 +229,7 @@ impl Urdf {
         self.robot.joints.iter().any(|joint| joint.name == name)
     }
 
-    /// What it says of the joint of an axis.
+    /// Returns the description of the joint of an axis.
     ///
     /// # Errors
     /// There is no such joint, or no axis of this travel can move it, or its limits leave no room.
@@ -339,7 +339,7 @@ fn is_too_deep(text: &str) -> bool {
     false
 }
 
-/// Where a tag ends: at the first `>` that is not within quotes.
+/// Returns the end of a tag: the first `>` that is not within quotes.
 fn tag_end(markup: &str) -> Option<usize> {
     let mut quote = None;
     markup.find(|letter| {
