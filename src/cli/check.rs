@@ -243,7 +243,7 @@ impl AxisCheck {
         self.shown_in.symbol()
     }
 
-    /// How many decimals of a position are shown in it.
+    /// Returns the number of decimals of a position.
     fn decimals(&self) -> usize {
         match self.shown_in {
             PositionUnit::Degree | PositionUnit::Millimetre => 2,

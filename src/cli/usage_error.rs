@@ -24,7 +24,7 @@ pub enum UsageError {
 struct Printed {
     error: String,
     problems: Vec<Problem>,
-    /// How many problems there are besides these.
+    /// Number of problems besides these.
     omitted: usize,
 }
 

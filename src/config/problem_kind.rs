@@ -232,9 +232,9 @@ pub enum ProblemKind {
     /// A target that is not one number for every axis.
     #[error("the move has {given} targets, but there are {axes} axes{}", of_group(group.as_deref()))]
     TargetCount {
-        /// How many targets there are.
+        /// Number of targets.
         given: usize,
-        /// How many axes there are.
+        /// Number of axes.
         axes: usize,
         /// The group that moves, where there are several.
         group: Option<String>,
@@ -332,9 +332,9 @@ pub enum ProblemKind {
     TooMany {
         /// `axes`, `buses` or `groups`.
         what: &'static str,
-        /// How many there are.
+        /// The configured number.
         given: usize,
-        /// How many there may be.
+        /// The largest possible number.
         limit: usize,
     },
 }

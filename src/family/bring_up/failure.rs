@@ -161,7 +161,7 @@ pub enum FailureCause {
     Mapping(MappingProblem),
     /// The node has restarted and lost its configuration.
     Restarted {
-        /// How many times.
+        /// Number of times.
         times: u8,
     },
 }

@@ -106,7 +106,7 @@ impl Device {
         self.dictionary.entry(address).filter(|_| !self.quirks.is_missing(address))
     }
 
-    /// How many axes the data sheet describes.
+    /// Returns the number of axes that the data sheet describes.
     pub fn axes(&self) -> u8 {
         let has = |node_axis: &u8| {
             let controlword = of_axis(CONTROLWORD.address, *node_axis);
@@ -145,7 +145,7 @@ impl Device {
         self.entry(address).is_some_and(|entry| entry.is_mappable)
     }
 
-    /// How many PDOs of a direction the axis has, of its first four.
+    /// Returns the number of PDOs of a direction, of the first four of the axis.
     pub(crate) fn pdo_slots(&self, direction: PdoDirection) -> u8 {
         let has_slot = |number: &u8| {
             let parameters = PdoParameters::at(direction, self.first_pdo() + u16::from(*number) - 1);
@@ -155,7 +155,7 @@ impl Device {
         (1..=4).take_while(has_slot).last().unwrap_or(0)
     }
 
-    /// How many objects one of the first RPDOs can map, by the sub-indices that its mapping has.
+    /// Returns the number of objects that one of the first RPDOs can map, by the sub-indices that its mapping has.
     pub fn mappable_objects(&self, number: u8) -> usize {
         if number > self.pdo_slots(PdoDirection::Receive) {
             return 0;

@@ -56,7 +56,7 @@ pub enum Failure {
     Length {
         /// The object.
         object: Object,
-        /// How many bytes came.
+        /// Number of received bytes.
         received: usize,
     },
     /// A value does not fit its object.

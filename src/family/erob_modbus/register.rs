@@ -40,7 +40,7 @@ pub enum Number {
 }
 
 impl Number {
-    /// How many registers it takes.
+    /// Number of registers.
     pub const fn words(self) -> u16 {
         match self {
             Self::Word | Self::SignedWord => 1,

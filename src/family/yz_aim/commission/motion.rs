@@ -22,7 +22,7 @@ use crate::procedure::AxisReading;
 const POLL_NS: Nanoseconds = 20_000_000;
 /// Time without motion after which a set-point counts as ignored. The first one after enabling may be ignored.
 const IGNORED_NS: Nanoseconds = 500_000_000;
-/// How many times a set-point is repeated.
+/// Repetitions of a set-point.
 const REPETITIONS: u8 = 3;
 
 /// Checks the drive, runs `work`, and disables the drive at standstill afterwards.

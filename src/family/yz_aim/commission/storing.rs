@@ -19,7 +19,7 @@ use crate::family::yz_aim::Alarm;
 const STORING_NS: Nanoseconds = 10_000_000_000;
 /// Longest time until 260A has its stored value again and the position is zero.
 const ZEROING_NS: Nanoseconds = 1_000_000_000;
-/// How many times the two keys are written.
+/// Number of times the two keys are written.
 const ZERO_ATTEMPTS: u8 = 3;
 /// Positions that count as zero: "0 or plus a single digit" (manual).
 const ZERO_COUNTS: std::ops::RangeInclusive<i64> = 0..=9;
