@@ -64,8 +64,10 @@ pub mod erob_can;
 pub mod erob_modbus;
 mod errors;
 mod feedback_defects;
+#[cfg(target_os = "linux")]
 pub mod hollow_lines;
 pub mod homing_switches;
+#[cfg(target_os = "linux")]
 pub mod line_faults;
 #[cfg(target_os = "linux")]
 pub mod live;
@@ -85,12 +87,14 @@ pub mod pseudo_terminal;
 pub mod random;
 pub mod sdo_reply;
 mod sdo_server;
+#[cfg(target_os = "linux")]
 pub mod serial_device;
 #[cfg(target_os = "linux")]
 pub mod serial_host;
 pub mod serial_line;
 mod servo;
 mod silent_drive;
+#[cfg(target_os = "linux")]
 pub mod slcan_adapter;
 pub mod yz_aim;
 
