@@ -265,6 +265,12 @@ impl Path {
             if points.velocities.is_none() && interpolation == Interpolation::Spline {
                 continue;
             }
+            // An axis that takes over from a motion that is about to end goes as that motion asks.
+            let is_at_rest = start.velocity.abs() <= SAME_RATE * limits.velocity
+                && start.acceleration.abs() <= SAME_RATE * limits.acceleration;
+            if !is_at_rest {
+                continue;
+            }
             let Some(found) = check::excursion(polynomial, duration_s) else { continue };
             let velocity = polynomial.state(duration_s).velocity;
             if found.distance() > largest_excursion(start, velocity, limits) {

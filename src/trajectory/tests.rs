@@ -105,12 +105,9 @@ fn a_wait_is_no_part_of_the_run_up_to_a_first_point_in_motion() {
         let points = [with_velocity(wait_s, 0.0, 0.3), with_velocity(wait_s + 1.5, 0.3, 0.0)];
         let error = from_rest(&points).unwrap_err();
         assert_eq!((error.point(), error.axis()), (Some(0), Some(0)), "{wait_s} s: {error}");
-        // The axis that goes on for so long leaves its way, too, with velocities at the points or without.
-        let start = [State { position: 0.2, velocity: 0.3, acceleration: 0.0 }];
-        for points in [[point(wait_s, &[0.2])], [with_velocity(wait_s, 0.2, 0.0)]] {
-            let error = from(&start, &points).unwrap_err();
-            assert_eq!((error.point(), error.axis()), (Some(0), Some(0)), "{wait_s} s: {error}");
-        }
+        // An axis in motion takes over, as from a trajectory that is about to end.
+        let start = [State { position: 0.2, velocity: -0.015, acceleration: 0.3 }];
+        assert!(wait_s > 10.0 || from(&start, &[point(wait_s, &[0.0])]).is_ok(), "{wait_s} s");
         // Standing, it waits and then begins.
         let waiting = from_rest(&[with_velocity(wait_s, 0.0, 0.0), with_velocity(wait_s + 1.5, 0.3, 0.0)]);
         assert_eq!(excursion(&waiting.unwrap(), wait_s), 0.0);
