@@ -367,9 +367,9 @@ fn put_trajectory_error(error: &TrajectoryError, put: &mut Put) {
         TrajectoryError::NoRoomToStop { axis, rest, limit } => {
             put.word(11).index(axis).number(rest).number(limit)
         }
-        TrajectoryError::Excursion { point, axis, time_s, position, nearest, present, velocity } => {
+        TrajectoryError::Excursion { point, axis, time_s, position, nearest, velocity } => {
             put.word(12).index(point).index(axis).number(time_s).number(position);
-            put.number(nearest).number(present).number(velocity)
+            put.number(nearest).number(velocity)
         }
     };
 }
@@ -425,7 +425,6 @@ fn take_trajectory_error(take: &mut Take<'_>) -> Result<TrajectoryError, Malform
             time_s: take.number()?,
             position: take.number()?,
             nearest: take.number()?,
-            present: take.number()?,
             velocity: take.number()?,
         },
         _ => return Err(Malformed),

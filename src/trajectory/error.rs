@@ -134,8 +134,8 @@ pub enum TrajectoryError {
         /// The limit, with the sign of the value.
         limit: f64,
     },
-    /// The way to the first point leads far out of the positions at both ends: by more than twice the shortest stop from the velocity
-    /// at its beginning and the shortest run-up to that of the point, and by more than 0.01 rad (m) or a hundredth of its range.
+    /// The way of an axis at rest to the first point leads far out of the positions at both ends: by more than twice the shortest run-up
+    /// to the velocity of the point, and by more than 0.01 rad (m) or a hundredth of its range.
     Excursion {
         /// The point.
         point: usize,
@@ -147,8 +147,6 @@ pub enum TrajectoryError {
         position: f64,
         /// The position at the nearer end of the way.
         nearest: f64,
-        /// The velocity at the beginning.
-        present: f64,
         /// The velocity at the point.
         velocity: f64,
     },
@@ -256,10 +254,9 @@ impl TrajectoryError {
                     limit = Shown(limit)
                 )
             }
-            Self::Excursion { time_s, position, nearest, present, velocity, .. } => format!(
-                "from the velocity {present:.6} to its velocity {velocity:.6}, the way to it turns round at {position:.6} \
+            Self::Excursion { time_s, position, nearest, velocity, .. } => format!(
+                "to reach its velocity {velocity:.6} from rest, the way to it turns round at {position:.6} \
                  ({time_s:.6} s), beyond {nearest:.6}; give it an earlier time, the velocity 0, or points on the way to it",
-                present = Shown(present),
                 velocity = Shown(velocity),
                 position = Shown(position),
                 time_s = Shown(time_s),

@@ -49,10 +49,10 @@ pub use time_law::RateError;
 const SAME_POSITION: f64 = 1e-6;
 /// The same for its velocity, relative to the limit; and for its acceleration.
 const SAME_RATE: f64 = 1e-6;
-/// How far the way to the first point may lead out of the positions at its ends, as a multiple of the shortest stop and the shortest
-/// run-up: polynomials do not use the limits to the full.
+/// Largest excursion of the way from rest to the first point, in multiples of the shortest run-up: polynomials do not use the limits to the
+/// full.
 const EXCURSION: f64 = 2.0;
-/// And beyond that, whatever the velocities: in rad (m), and as a share of the range of the axis.
+/// Excursion that is allowed beyond that, in rad (m), and as a share of the range of the axis.
 const SMALL_EXCURSION: f64 = 0.01;
 const SMALL_SHARE: f64 = 0.01;
 
@@ -90,10 +90,10 @@ impl Trajectory {
     /// A trajectory through these points, from the present set-points.
     ///
     /// A first point at the time 0 must be where the axes are. With a later one the trajectory goes there first, from the present
-    /// position, velocity and acceleration. An axis that stands at this point waits there. On this way no axis goes farther out of its
-    /// present position and that of the point than twice the shortest stop from its velocity and the shortest run-up to that of the
-    /// point, and by 0.01 rad (m) or a hundredth of its range: a point that is passed in motion does not make it swing far back in a long time before
-    /// ([`TrajectoryError::Excursion`]). Without velocities the trajectory ends at rest, and is nowhere beyond the points on both sides of it
+    /// position, velocity and acceleration. An axis at rest at this point waits there, and one at rest elsewhere leaves both positions by no
+    /// more than twice the shortest run-up to the velocity of the point and 0.01 rad (m) or a hundredth of its range: a first point that is
+    /// passed in motion is refused if the axis would swing farther back before it ([`TrajectoryError::Excursion`]). Without velocities the
+    /// trajectory ends at rest, and is nowhere beyond the points on both sides of it
     /// ([`Interpolation::Monotone`]).
     ///
     /// # Errors
@@ -251,8 +251,8 @@ impl Path {
         Ok(())
     }
 
-    /// Checks that the way to the first point turns round no farther out than the velocities at its ends ask for. The time before
-    /// that point would be the lever of an excursion. A spline may swing: that is what it is chosen for.
+    /// Checks that the way of an axis at rest to the first point turns round no farther out than the run-up to the velocity of that point
+    /// needs. The excursion of a polynomial grows with the time before the point. A spline may swing: that is what it is chosen for.
     fn check_way_to_first_point(
         &self,
         axes: &[AxisPoints],
@@ -273,33 +273,24 @@ impl Path {
             }
             let Some(found) = check::excursion(polynomial, duration_s) else { continue };
             let velocity = polynomial.state(duration_s).velocity;
-            if found.distance() > largest_excursion(start, velocity, limits) {
+            if found.distance() > largest_excursion(velocity, limits) {
                 let check::Excursion { time_s, position, nearest } = found;
-                let (point, present) = (self.point(0), start.velocity);
-                return Err(TrajectoryError::Excursion {
-                    point,
-                    axis,
-                    time_s,
-                    position,
-                    nearest,
-                    present,
-                    velocity,
-                });
+                let point = self.point(0);
+                return Err(TrajectoryError::Excursion { point, axis, time_s, position, nearest, velocity });
             }
         }
         Ok(())
     }
 }
 
-/// Returns how far a way from this state to a point that is passed at this velocity may lead out of both positions. A run-up is a stop
-/// that is played backwards.
-fn largest_excursion(start: &State, velocity: f64, limits: &AxisLimits) -> f64 {
+/// Returns the largest distance of the way from rest to a point that is passed at this velocity from both positions. A run-up is a
+/// stop that is played backwards.
+fn largest_excursion(velocity: f64, limits: &AxisLimits) -> f64 {
     let AxisLimits { acceleration, deceleration, .. } = *limits;
     let backwards = AxisLimits { acceleration: deceleration, deceleration: acceleration, ..*limits };
-    let stop = braking_distance(limits, start.velocity.abs(), start.acceleration.abs());
     let run_up = braking_distance(&backwards, velocity.abs(), 0.0);
     let small = SMALL_EXCURSION.min(SMALL_SHARE * (limits.position_max - limits.position_min));
-    EXCURSION * (stop + run_up) + small
+    EXCURSION * run_up + small
 }
 
 fn check_times(times_s: &[f64]) -> Result<(), TrajectoryError> {

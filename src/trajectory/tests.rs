@@ -116,7 +116,7 @@ fn a_wait_is_no_part_of_the_run_up_to_a_first_point_in_motion() {
 
 #[test]
 fn a_first_point_in_motion_is_reached_by_a_run_up_that_its_velocity_asks_for() {
-    let most = largest_excursion(&State::rest(0.0), 0.3, &LIMITS);
+    let most = largest_excursion(0.3, &LIMITS);
     for (time_s, position) in [(0.3, 0.0), (0.3, 0.03), (1.0, 0.15), (1.0, 0.12), (4.0, 1.0)] {
         let points = [with_velocity(time_s, position, 0.3), with_velocity(time_s + 1.5, position + 0.3, 0.0)];
         let trajectory = from_rest(&points).unwrap();

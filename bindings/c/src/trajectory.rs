@@ -34,7 +34,8 @@ unsafe impl Growing for takt_progress {
 /// has `axes` numbers for the first point, then as many for the second, and so on; so have `velocities` (rad/s, m/s) and `accelerations`
 /// (rad/s^2, m/s^2), which may be NULL. Without velocities a smooth curve leads through the points and ends at rest; nowhere is it beyond the
 /// points on both sides of it. A first point at the time 0 must be where the axes are; otherwise the trajectory goes there first: a way
-/// that would swing far out, for a velocity at the point or now, is TAKT_ERROR_ARGUMENT. All of it is checked before anything moves. While another trajectory is under way, this one takes its place without a step.
+/// from rest that would swing far back, for the velocity of that point, is TAKT_ERROR_ARGUMENT. All of it is checked before anything moves.
+/// While another trajectory is under way, this one takes its place without a step.
 ///
 /// Any thread, not in a callback; blocks until it is computed and granted: some cycles, more for thousands of points. takt_wait() waits
 /// for its end.

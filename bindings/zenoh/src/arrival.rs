@@ -5,7 +5,7 @@ use takt::telemetry::phase_words;
 use takt::{Client, ClientEvents, EventKind, Phase, RequestId, RunningController, Snapshot, Stopped};
 use thiserror::Error;
 
-/// Why a trajectory that has not begun is discarded.
+/// Reason for which a trajectory that has not begun is discarded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum Discarded {
     /// Its group has stopped, whatever the cause.
@@ -16,13 +16,13 @@ pub enum Discarded {
     Lease,
 }
 
-/// Why a group carries out no trajectory.
+/// Reason for which a group carries out no trajectory.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum NotReady {
     /// It is not in operation.
     #[error("its axes were {} when it came. Enable them first", phase_words(*phase))]
     Phase {
-        /// What it was doing.
+        /// Phase of the group.
         phase: Phase,
     },
     /// A fault has stopped it and has not been reset.

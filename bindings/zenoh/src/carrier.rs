@@ -11,7 +11,7 @@ use crate::inbox::{Inbox, Taken};
 use crate::messages::JointTrajectory;
 use crate::motion::{AxisPlace, Unfit, Wanted, wanted};
 
-/// How often the end and the stops of others are looked for.
+/// Period of the checks for the end and for stops of others.
 pub const LOOK: Duration = Duration::from_millis(100);
 
 /// A message of the topic of the trajectories.

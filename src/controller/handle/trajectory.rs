@@ -66,8 +66,8 @@ impl Handle {
     /// Starts a trajectory through points with times, as ROS' `JointTrajectory` has them: see [`Trajectory::new`]. All of it is checked
     /// before: what breaks a limit anywhere is refused, with the first point, axis and limit.
     ///
-    /// While the axes hold, a first point at the time 0 must be where they are; with a later one the trajectory goes there first. A way
-    /// there that would swing far out, for the velocity of the point, is refused.
+    /// While the axes hold, a first point at the time 0 must be where they are; with a later one the trajectory goes there first. If that
+    /// point is passed in motion, a way there from rest that would swing far back is refused.
     /// While another trajectory is under way, this one takes its place without a step, 20 ms later or as soon as it is computed: its
     /// first point then needs a time after 0. Returns when the real-time thread has granted it.
     ///

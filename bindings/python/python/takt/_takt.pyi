@@ -125,7 +125,8 @@ class Group:
 
         Without `qd` a smooth curve leads through the points and ends at rest; nowhere is it beyond the points on both sides of it. All of
         it is checked before anything moves: `TrajectoryError` has the first point, axis and limit. A first point at 0 must be where the
-        axes are; with a later one they go there first, unless that way would swing far out for a velocity at the point or now. While another trajectory is under way, this one takes its place without a step.
+        axes are; with a later one they go there first, unless a way from rest would swing far back for the velocity of that point. While
+        another trajectory is under way, this one takes its place without a step.
         """
 
     def follow(self) -> Stream:
