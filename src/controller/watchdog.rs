@@ -106,7 +106,7 @@ impl Watchdog {
     }
 }
 
-/// What the system shows of a thread of this process.
+/// Processor use of a thread of this process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct ThreadUse {
     /// It runs, or waits for nothing but a processor.

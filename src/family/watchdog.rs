@@ -144,7 +144,7 @@ pub fn unreached_words(config: &Config, unreached: &[usize]) -> Vec<String> {
     let words = |(fact, names): (Result<Watchdog, Unwatched>, Vec<&str>)| {
         let fact = match fact {
             Ok(watchdog) => {
-                format!("if it was brought up and obeys its watchdog, it {watchdog}, which nobody has seen")
+                format!("if it was brought up and obeys its watchdog, it {watchdog}, which is not confirmed")
             }
             Err(unwatched) => format!("it does not stop by itself ({unwatched})"),
         };

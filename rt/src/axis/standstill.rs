@@ -18,7 +18,7 @@ pub(super) const STANDING_REPORTS: u32 = 5 * SETTLED_CYCLES;
 /// obeyed the command that takes its power it gets faster by up to half of that again.
 const PLACE: f64 = AT_REST / 6.0;
 
-/// How large a place is at least, in counts of the encoder: noise of three counts either way, and the rounding of a position
+/// Smallest size of a place, in counts of the encoder: noise of three counts either way, and the rounding of a position
 /// between two counts.
 const NOISE_COUNTS: f64 = 8.0;
 

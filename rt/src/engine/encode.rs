@@ -194,7 +194,7 @@ impl<const AXES: usize, const BUSES: usize> Group<AXES, BUSES> {
         shared_frames.leave_out_incomplete(batch);
     }
 
-    /// Where a drive is led in this cycle, in which the group has this goal.
+    /// Returns the goal of a drive in this cycle, in which its group has this goal.
     ///
     /// A drive that falls out of operation enabled is not enabled again by what the others are still to do. None is enabled
     /// before its joint is at rest with its target there, nor before it watches the controller by the heartbeat.

@@ -348,7 +348,7 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     }
 }
 
-/// What a drive shows that is not expected of it. Taking its power changes neither: a drive with a fault is not enabled.
+/// The unexpected state of a drive. Taking its power changes neither: a drive with a fault is not enabled.
 #[derive(Clone, Copy)]
 struct Unexpected {
     /// True if it is out of operation enabled.

@@ -312,7 +312,7 @@ fn lasting(
     }
 }
 
-/// How many axes of a plan keep from their fastest profile what the profile of the common duration needs again. Further axes
+/// Number of axes of a plan that keep the problem behind the brake for the profile of the common duration. Further axes
 /// compute it twice.
 const KEPT_MAX: usize = 8;
 
