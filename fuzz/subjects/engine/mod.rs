@@ -365,7 +365,7 @@ impl Machine {
         // After its deadline, or behind a backlog, nothing leaves but what stops the drives: NMT and SDO requests.
         let may_stop = |frame: &Frame| matches!(frame.id().value() & 0x780, 0x000 | 0x600);
         for (bus, batch) in sent.iter().enumerate() {
-            let is_trial = self.is_trial(bus, held_back.contains(bus), !batch.is_empty());
+            let is_trial = self.is_trial(bus, held_back.contains(bus), !batch.iter().all(may_stop));
             let is_held = held_back.contains(bus) && !is_trial || disturbed == Disturbed::Late;
             assert!(!is_held || batch.iter().all(may_stop));
         }
@@ -384,8 +384,8 @@ impl Machine {
     }
 
     /// Returns `true` if frames may leave on a bus that is behind: it may only look so, and they show it. The next ones come after twice
-    /// the time.
-    fn is_trial(&mut self, bus: usize, is_behind: bool, has_frames: bool) -> bool {
+    /// the time. What may leave at any time is no trial.
+    fn is_trial(&mut self, bus: usize, is_behind: bool, has_held_frames: bool) -> bool {
         let has_cycle = self.slot.is_multiple_of(self.config.buses[bus].divider.into());
         let (slots, next) = &mut self.trials[bus];
         if has_cycle && !is_behind {
@@ -394,7 +394,7 @@ impl Machine {
         }
         *slots += u32::from(is_behind || *slots > 0);
         let is_trial = *slots >= *next;
-        if is_trial && has_frames {
+        if is_trial && has_held_frames {
             *next = 2 * *slots;
         }
         is_trial
