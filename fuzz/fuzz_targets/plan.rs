@@ -8,7 +8,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use takt_rt::plan::{
-    Limits, Problem, Profile, Return, State, Synchronisation, PlanOptions, stop, synchronised,
+    Limits, PlanOptions, Problem, Profile, Return, State, Synchronisation, stop, synchronised,
     synchronised_velocity,
 };
 
