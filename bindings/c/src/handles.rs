@@ -117,8 +117,8 @@ const LOOK: Duration = Duration::from_micros(100);
 
 struct Place {
     state: AtomicU64,
-    /// [`posix::forks`] when it was opened.
-    forks: AtomicU64,
+    /// [`posix::process_mark`] when it was opened.
+    process: AtomicU64,
     entry: AtomicPtr<Entry>,
 }
 
@@ -129,7 +129,7 @@ const _: fn() = || {
 };
 
 static TABLE: [Place; PLACES] = [const {
-    Place { state: AtomicU64::new(0), forks: AtomicU64::new(0), entry: AtomicPtr::new(ptr::null_mut()) }
+    Place { state: AtomicU64::new(0), process: AtomicU64::new(0), entry: AtomicPtr::new(ptr::null_mut()) }
 }; PLACES];
 /// Whoever opens a handle holds it. Nobody else needs it.
 static OPENING: Mutex<()> = Mutex::new(());
@@ -190,14 +190,14 @@ impl Drop for Used {
 /// Makes a handle.
 pub(crate) fn open(entry: Entry) -> Result<u64, Failure> {
     let _opening = OPENING.lock().unwrap_or_else(PoisonError::into_inner);
-    posix::count_forks();
+    posix::mark_process();
     let is_free = |place: &&Place| place.entry.load(Ordering::Acquire).is_null();
     let Some((number, place)) = (1..).zip(&TABLE).find(|(_, place)| is_free(place)) else {
         let words = format!("{PLACES} handles are open, and there is no room for another one; close some");
         return Err(Failure::new(takt_result::TAKT_ERROR_FULL, words));
     };
     place.entry.store(Box::into_raw(Box::new(entry)), Ordering::Release);
-    place.forks.store(posix::forks(), Ordering::Relaxed);
+    place.process.store(posix::process_mark(), Ordering::Relaxed);
     // Calls with old handles of this place may be counted for a moment.
     let state = place.state.fetch_or(OPEN, Ordering::AcqRel);
     Ok((state >> USES_SHIFT) << USES_SHIFT | number)
@@ -211,7 +211,7 @@ pub(crate) fn using(handle: u64) -> Result<Used, Unusable> {
     // Dropping it takes the count back.
     match is_open(state, handle) {
         false => Err(Unusable::Wrong),
-        true if place.forks.load(Ordering::Relaxed) != posix::forks() => Err(Unusable::Forked),
+        true if place.process.load(Ordering::Relaxed) != posix::process_mark() => Err(Unusable::Forked),
         true => Ok(used),
     }
 }

@@ -1,16 +1,13 @@
 //! What a library must know of the threads and processes of a program in C: cancellation, and forks.
 
-use std::ffi::c_int;
+use std::alloc::{self, Layout};
+use std::ffi::{c_int, c_void};
 use std::ptr;
-use std::sync::Once;
-use std::sync::atomic::{AtomicU64, Ordering};
-
-/// A handler of pthread_atfork().
-type ForkHandler = Option<unsafe extern "C" fn()>;
+use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
 
 unsafe extern "C" {
     fn pthread_setcancelstate(state: c_int, before: *mut c_int) -> c_int;
-    fn pthread_atfork(prepare: ForkHandler, parent: ForkHandler, child: ForkHandler) -> c_int;
+    fn madvise(at: *mut c_void, length: usize, advice: c_int) -> c_int;
 }
 
 unsafe extern "C-unwind" {
@@ -48,23 +45,46 @@ impl Drop for NotCancelled {
     }
 }
 
-/// Number of forks between the process that has called [`count_forks`] first and this one.
-static FORKS: AtomicU64 = AtomicU64::new(0);
+/// Mark of the process that has written it, in memory that a fork finds empty: also one by _Fork() or clone(), which run no handler of
+/// pthread_atfork() (madvise(2), Linux 4.14). To ask for the number of the process in every call would be a system call in each.
+static MARK: AtomicPtr<AtomicU64> = AtomicPtr::new(ptr::null_mut());
 
-unsafe extern "C" fn after_fork() {
-    FORKS.fetch_add(1, Ordering::Relaxed);
+/// Marks of this process and those before it.
+static MARKS: AtomicU64 = AtomicU64::new(0);
+
+/// Marks this process, if it is not marked yet. Without memory this fails, and forks are not noticed.
+pub(crate) fn mark_process() {
+    if MARK.load(Ordering::Relaxed).is_null() {
+        MARK.store(wiped_on_fork().unwrap_or(ptr::null_mut()), Ordering::Relaxed);
+    }
+    if let Some(mark) = mark().filter(|mark| mark.load(Ordering::Relaxed) == 0) {
+        mark.store(MARKS.fetch_add(1, Ordering::Relaxed) + 1, Ordering::Relaxed);
+    }
 }
 
-/// Counts forks from now on. To ask for the number of the process in every call would be a system call in each.
-pub(crate) fn count_forks() {
-    static ONCE: Once = Once::new();
-    // SAFETY: the handler is one atomic operation. Without memory this fails, and forks are not counted.
-    ONCE.call_once(|| unsafe {
-        pthread_atfork(None, None, Some(after_fork));
-    });
+/// Returns the mark of this process: 0 before it is marked.
+pub(crate) fn process_mark() -> u64 {
+    mark().map_or(0, |mark| mark.load(Ordering::Relaxed))
 }
 
-/// Number of forks before this process.
-pub(crate) fn forks() -> u64 {
-    FORKS.load(Ordering::Relaxed)
+fn mark() -> Option<&'static AtomicU64> {
+    // SAFETY: it is null, or points to a page that is never unmapped.
+    unsafe { MARK.load(Ordering::Relaxed).as_ref() }
+}
+
+fn wiped_on_fork() -> Option<*mut AtomicU64> {
+    /// `MADV_WIPEONFORK` of Linux.
+    const WIPE_ON_FORK: c_int = 18;
+    /// Pages are no larger on any machine that Linux runs on.
+    #[repr(align(65536))]
+    struct Page([u8; 65536]);
+    // SAFETY: the memory is whole pages of its own, and is never freed. The word is written before anybody reads it.
+    unsafe {
+        let page = alloc::alloc(Layout::new::<Page>());
+        if page.is_null() || madvise(page.cast(), size_of::<Page>(), WIPE_ON_FORK) != 0 {
+            return None;
+        }
+        page.cast::<u64>().write(0);
+        Some(page.cast())
+    }
 }
