@@ -38,5 +38,6 @@ pub(crate) use last_resort::stop_drives;
 pub use lines::{LinePort, Lines, SharedLine};
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};
+pub(crate) use supervisor::unreleased_stop;
 pub use supervisor::{AfterBringUp, Supervisor};
 pub use virtual_time::{VirtualClock, VirtualRun};

@@ -316,6 +316,18 @@ fn a_run_whose_messages_nobody_reads_any_more_stops_and_reports_as_ever() {
     );
 }
 
+/// The drive has no torque in the end, by SDO, and its statusword had said otherwise for longer than a drive may take to switch off.
+#[test]
+fn power_is_not_said_to_be_off_where_a_drive_has_contradicted_itself() {
+    let place = Place::new();
+    let scenario = place.folder.path().join("faults.toml");
+    let fault = "[[fault]]\nkind = \"statusword\"\naxis = \"joint2\"\nset = 0x0007\nwhen = \"moving\"\nat = \"100 ms\"\n";
+    fs::write(&scenario, fault).unwrap();
+    let output = place.run_to_end(&["--json", "--faults", scenario.to_str().unwrap()]);
+    let report = report(&output);
+    assert_eq!(report["is_power_off"], Value::from(false), "{report}");
+}
+
 #[test]
 fn a_duration_that_cannot_be_is_named_with_its_option() {
     let place = Place::new();

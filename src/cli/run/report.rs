@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::config::Config;
-use crate::controller::Outcome;
 use crate::controller::realtime_thread::StartError;
 use crate::controller::session::{Session, SessionError};
+use crate::controller::{Outcome, unreleased_stop};
 use crate::family;
 use crate::telemetry::{RealtimeReport, RunEnd, RunOutcome, RunReport};
 use takt_rt::{Fault, Phase, StopReason};
@@ -79,9 +79,7 @@ pub(super) fn tell(config: &Config, session: &Session, as_json: bool) -> Exit {
         buses_open_ns: session.open_ns,
         targets: session.targets.clone(),
         stop: stop_of(session),
-        // Drives that have never been active have confirmed nothing.
-        is_power_off: session.unreached.is_empty()
-            && session.snapshot.groups().iter().all(|group| group.phase == Phase::Disabled),
+        is_power_off: is_power_off(session),
     };
     let report = RunReport::new(&session.log, &outcome);
     let unreached: Vec<&str> = session
@@ -112,6 +110,13 @@ pub(super) fn tell(config: &Config, session: &Session, as_json: bool) -> Exit {
         }
         None => print::text(&report.render(print::emphasis()), exit),
     }
+}
+
+/// Drives that have never been active have confirmed nothing, and one whose reports contradict one another has not either.
+fn is_power_off(session: &Session) -> bool {
+    session.unreached.is_empty()
+        && unreleased_stop(&session.snapshot).is_none()
+        && session.snapshot.groups().iter().all(|group| group.phase == Phase::Disabled)
 }
 
 /// The errors of the drives that the stop does not tell already.

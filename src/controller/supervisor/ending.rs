@@ -152,6 +152,7 @@ impl Supervisor {
                 let codes = facts.iter().map(|facts| facts.error_code.0).enumerate();
                 self.drive_errors = codes.filter(|(_, code)| *code != 0).collect();
             }
+            self.note_unreleased(snapshot);
             self.unreached = unconfirmed;
             self.request(Request::Sync(false));
             self.request(Request::Shutdown);

@@ -34,6 +34,8 @@ use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
 use phases::fault_stop;
 
+pub(crate) use phases::unreleased_stop;
+
 /// A stage must be completed within this time, where every drive can be enabled at once. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
 /// From one question of a client to the next: one frame of a bus in a cycle is for all services, and those of the controller go on.

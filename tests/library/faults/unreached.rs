@@ -9,7 +9,7 @@ use takt::faults::FaultInjector;
 use takt::internals::RunInside;
 use takt::sim::SimulatedBus;
 use takt::{Interrupt, Outcome, Port, VirtualRun};
-use takt_rt::{BusHealth, BusPort, Frame, Id, Phase, ReceiveBatch};
+use takt_rt::{BusHealth, BusPort, Frame, Id, Phase, ReceiveBatch, Rule};
 
 use crate::faults::arm::{folder, scenario};
 
@@ -57,6 +57,21 @@ drive = "erob-can"
 limits = { position = [-2, 2], velocity = 1, acceleration = 2, torque = 31 }
 [[program.move]]
 to = 1
+"#;
+const ONE_EROB: &str = r#"
+name = "one"
+[[bus]]
+name = "can"
+[[axis]]
+name = "joint"
+bus = "can"
+node = 1
+drive = "erob-canopen"
+limits = { position = [-2, 2], velocity = 1, acceleration = 6, torque = 31 }
+[[program.move]]
+to = 1
+[[program.move]]
+to = 0
 "#;
 const LINE: &str = r#"
 name = "turntable"
@@ -257,33 +272,54 @@ fn after_disobedience(config: &Config, how: &str) -> (Vec<usize>, f64, bool) {
 
 #[test]
 fn a_drive_that_has_not_shown_that_it_has_no_torque_keeps_its_watchdog() {
-    let erob = r#"
-name = "one"
-[[bus]]
-name = "can"
-[[axis]]
-name = "joint"
-bus = "can"
-node = 1
-drive = "erob-canopen"
-limits = { position = [-2, 2], velocity = 1, acceleration = 6, torque = 31 }
-[[program.move]]
-to = 1
-[[program.move]]
-to = 0
-"#;
     let sheet = folder().join("eds/erob-canopen.eds").display().to_string();
-    let by_sheet = erob.replace(
+    let by_sheet = ONE_EROB.replace(
         "drive = \"erob-canopen\"",
         &format!("drive = \"cia402\"\neds = {sheet:?}\ncounts_per_turn = 524288"),
     );
-    for text in [erob, &by_sheet] {
+    for text in [ONE_EROB, &by_sheet] {
         for how in ["keeps-state", "local", "enables-itself"] {
             let (unreached, velocity, has_torque) = after_disobedience(&config(text), how);
             assert!(velocity == 0.0 && !has_torque, "{how}: {velocity} rad/s, {has_torque}\n{text}");
             assert_eq!(unreached, [0], "{how}");
         }
     }
+}
+
+/// Runs to the end with a fault of the joint, and returns the outcome and the time from the first motion until the group was disabled.
+fn disabled_after(config: &Config, fault: &str) -> (Option<Outcome>, u64) {
+    let injector = Arc::new(FaultInjector::new(scenario(fault, config)));
+    let (mut run, _) = VirtualRun::<Port>::with_faults(config, injector).unwrap();
+    let (mut moving_ns, mut disabled_ns) = (None, None);
+    let outcome = run.run(120_000, |run| {
+        let snapshot = run.snapshot();
+        match snapshot.groups[0].phase {
+            Phase::Moving => moving_ns = moving_ns.or(Some(snapshot.at_ns)),
+            Phase::Disabled if moving_ns.is_some() => disabled_ns = disabled_ns.or(Some(snapshot.at_ns)),
+            _ => {}
+        }
+    });
+    (outcome, disabled_ns.unwrap() - moving_ns.unwrap())
+}
+
+#[test]
+fn a_drive_that_shows_torque_while_it_is_shut_down_is_the_outcome_of_the_run() {
+    let config = config(ONE_EROB);
+    // The drive goes on to report until the shut-down has asked it for its state.
+    let shows_torque = |at_us: u64| {
+        let time = format!("when = \"moving\"\nat = \"{at_us} us\"\n");
+        format!(
+            "[[fault]]\nkind = \"statusword\"\naxis = \"joint\"\nset = 0x0027\nclear = 0x0048\n{time}\
+             [[fault]]\nkind = \"drop\"\nfunction = \"nmt\"\n{time}"
+        )
+    };
+    let (outcome, disabled_ns) = disabled_after(&config, &shows_torque(3_600_000_000));
+    assert_eq!(outcome, Some(Outcome::Finished));
+    let (outcome, _) = disabled_after(&config, &shows_torque(disabled_ns / 1000 + 1));
+    assert!(
+        matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::DriveEnabled),
+        "{outcome:?}"
+    );
 }
 
 #[test]
