@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 32] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 34] = [
     (34_714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27_432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11_882, "The same in profile velocity"),
@@ -319,6 +319,11 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 32] = [
         300_039_251,
         "A stream led a joint back from beyond a position limit, which turned outward and inward again within a cycle, and was stopped",
     ),
+    (
+        700_018_378,
+        "A corrupted command enabled a drive for less than a cycle, and the storm blamed a joint without torque that moved",
+    ),
+    (700_032_029, "A joint caught up after a pause, and the storm took its following error for unfounded"),
 ];
 
 /// The same of those whose streams command every kind of point.

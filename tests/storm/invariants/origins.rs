@@ -67,9 +67,9 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
         {
             true
         }
-        // A joint swings where the machine is too late to close its loop, and goes on with its last torque while that is away.
+        // A joint swings where the machine is too late to close its loop, and one that is led anew after a pause has to catch up.
         (Rule::FollowingError, Origin::Axis(axis))
-            if (is_crowded(axis) || has_paused(axis)) && is_loop_closed_here(axis) =>
+            if is_crowded(axis) && is_loop_closed_here(axis) || has_paused(axis) =>
         {
             true
         }
