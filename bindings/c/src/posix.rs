@@ -72,16 +72,17 @@ fn mark() -> Option<&'static AtomicU64> {
     unsafe { MARK.load(Ordering::Relaxed).as_ref() }
 }
 
+/// Returns zero in memory that the kernel wipes in every child.
 fn wiped_on_fork() -> Option<*mut AtomicU64> {
     /// `MADV_WIPEONFORK` of Linux.
     const WIPE_ON_FORK: c_int = 18;
     /// Pages are no larger on any machine that Linux runs on.
-    #[repr(align(65536))]
-    struct Page([u8; 65536]);
+    const LARGEST_PAGE: usize = 1 << 16;
+    let pages = Layout::from_size_align(LARGEST_PAGE, LARGEST_PAGE).ok()?;
     // SAFETY: the memory is whole pages of its own, and is never freed. The word is written before anybody reads it.
     unsafe {
-        let page = alloc::alloc(Layout::new::<Page>());
-        if page.is_null() || madvise(page.cast(), size_of::<Page>(), WIPE_ON_FORK) != 0 {
+        let page = alloc::alloc(pages);
+        if page.is_null() || madvise(page.cast(), pages.size(), WIPE_ON_FORK) != 0 {
             return None;
         }
         page.cast::<u64>().write(0);
