@@ -7,7 +7,7 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use takt::internals::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
+use takt::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
     AxisDescription, Logger, LoggerOptions, Machine, RecordingDestination, RecordingOptions,
     SetPointMagnitudes, Unit, WallClock,

@@ -3,7 +3,7 @@
 #![allow(missing_docs, reason = "made by the macros of the framework")]
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use takt::internals::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};

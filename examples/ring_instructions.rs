@@ -9,9 +9,9 @@
 use std::hint::black_box;
 use std::path::Path;
 
-use takt::internals::RunInside;
-use takt::internals::channels::{ChannelSizes, GroupStream, channels};
-use takt::internals::link::trace::{Trace, traced};
+use takt::channels::{ChannelSizes, GroupStream, channels};
+use takt::controller::AfterBringUp;
+use takt::link::trace::{Trace, traced};
 use takt::{Config, Phase, VirtualRun};
 use takt_rt::{BusHealth, BusPort, CycleRecord, Frame, HostInterface, Id, ReceiveBatch, Received, Snapshot};
 
@@ -65,7 +65,7 @@ fn run_cycles<P: BusPort>(
     is_noted: bool,
     cycles: u32,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let (mut run, mut log) = <VirtualRun<P> as RunInside<P>>::serving(config, ports)?;
+    let (mut run, mut log) = VirtualRun::serving(config, ports, AfterBringUp::Enable)?;
     let mut journal = is_noted.then(|| run.journal());
     while run.snapshot().groups().iter().any(|group| group.phase != Phase::Holding) {
         run.step();

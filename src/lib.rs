@@ -62,10 +62,6 @@
 //! Each folder uses only what stands below it in this picture (`tests/repository/arrows.rs` proves it):
 //!
 //! ```text
-//! internals                           what the tests see beyond the public face
-//! cli browser                         the program `takt`; takt in a page without a machine
-//! panel                               a running controller in the browser, and commissioning without one
-//! doctor jitter commission play replay  is the machine fit; one drive apart from any run; motion from a file; a run again
 //! error                               one error for a program that embeds takt
 //! serve                               a running controller, offered to other processes
 //! controller                          the engine of a configuration, its life, its ports, the handles
@@ -73,7 +69,6 @@
 //! command                             what may be asked of a running controller, and how it is refused
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! faults                              faults on purpose
-//! monitor                             the meaning of every frame on a bus
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
 //! journal                             what a run was told from outside, so that it can be replayed
 //! link                                sockets and serial lines
@@ -83,67 +78,49 @@
 //! trajectory packet sleep_alignment monotonic_clock
 //! ```
 //!
-//! Below all of them are the crates [`takt_sim`] (simulated buses and drives), [`takt_wire`] (protocols without I/O, times of frames on the
-//! wire, logs of frames) and [`takt_rt`].
+//! The tools, the panel and the program `takt` stand on this crate, as crates of their own. It stands on [`takt_sim`] (simulated buses and
+//! drives), [`takt_wire`] (protocols without I/O, times of frames on the wire, logs of frames) and [`takt_rt`].
 //!
 //! A run meets the parts in this order: `config` reads the file, `link` opens the buses, `schedule` says whether everything fits,
 //! `controller` assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its life (bring-up by
 //! `family`, `procedure` and `canopen`; enable, program, stop, disable, leave), and `telemetry` writes down what happened.
 #![deny(unsafe_code)]
-// Some names are passed on for the tests alone, to whom types of private modules are open, and some for the program alone.
-#![cfg_attr(not(all(feature = "internals", feature = "cli")), allow(unused_imports))]
-#![cfg_attr(feature = "internals", allow(unnameable_types))]
-// So are some functions.
-#![cfg_attr(not(feature = "cli"), allow(dead_code))]
 
-#[cfg(feature = "browser")]
-#[doc(hidden)]
-pub mod browser;
-mod channels;
-#[cfg(feature = "cli")]
-mod cli;
-mod command;
-#[cfg(feature = "cli")]
-mod commission;
 pub mod config;
-mod controller;
-#[cfg(feature = "cli")]
-mod doctor;
 pub mod error;
 pub mod family;
 pub mod faults;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod internals;
-#[cfg(feature = "cli")]
-mod jitter;
-mod journal;
 pub mod link;
-#[cfg(any(feature = "cli", feature = "internals"))]
-mod monitor;
-mod monotonic_clock;
-mod packet;
-#[cfg(feature = "browser")]
-mod panel;
-#[cfg(feature = "cli")]
-mod play;
-mod procedure;
-#[cfg(target_os = "linux")]
-mod remote;
-#[cfg(feature = "browser")]
-mod replay;
 pub mod schedule;
-#[cfg(target_os = "linux")]
-mod serve;
-
-#[cfg(target_os = "linux")]
-mod sleep_alignment;
 pub mod telemetry;
 pub mod trajectory;
 
-#[cfg(feature = "cli")]
+// What the other crates of this project stand on. It may change in any release.
 #[doc(hidden)]
-pub use cli::main as program;
+#[allow(unnameable_types, reason = "the other crates of this project are handed them")]
+pub mod channels;
+#[doc(hidden)]
+pub mod command;
+#[doc(hidden)]
+#[allow(unnameable_types, reason = "the other crates of this project are handed them")]
+pub mod controller;
+#[doc(hidden)]
+pub mod journal;
+#[doc(hidden)]
+pub mod procedure;
+#[cfg(target_os = "linux")]
+#[doc(hidden)]
+#[allow(unnameable_types, reason = "the other crates of this project are handed them")]
+pub mod remote;
+#[cfg(target_os = "linux")]
+#[doc(hidden)]
+pub mod serve;
+
+mod monotonic_clock;
+mod packet;
+#[cfg(target_os = "linux")]
+#[doc(hidden)]
+pub mod sleep_alignment;
 
 pub use channels::{Consumer, Producer, ring};
 pub use command::{

@@ -11,7 +11,7 @@ const [moduleFolder, page] = process.argv.slice(2);
 const here = path.dirname(fileURLToPath(import.meta.url));
 const root = path.join(here, "../..");
 const read = (...parts) => readFileSync(path.join(...parts), "utf8");
-const panel = path.join(root, "src/panel/page");
+const panel = path.join(root, "crates/panel/src/page");
 
 const SCRIPTS = {
   ...Object.fromEntries(["connection", "texts", "frame", "units", "panel", "axes", "motion", "monitor", "plots"].map((name) => [`${name}.js`, read(panel, `${name}.js`)])),

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use takt::Config;
-use takt::internals::monitor::{BusDecoder, BusStatistics};
 use takt_rt::Frame;
+use takt_tools::monitor::{BusDecoder, BusStatistics};
 use takt_wire::bus_log::{self, Direction, LogFormat, LogWriter, LoggedFrame};
 
 use super::input::Input;
@@ -84,7 +84,7 @@ fn decoders() -> Vec<BusDecoder> {
         let names = ["canopen", "hollow", "own_protocol", "two_buses"];
         let load = |name: &str| {
             let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-            let path = format!("tests/monitor/{name}.toml");
+            let path = format!("crates/cli/tests/monitor/{name}.toml");
             let path =
                 [folder.join(&path), folder.join("..").join(&path)].into_iter().find(|path| path.exists());
             Config::load(&path.expect("the configuration is there")).expect("the configuration is right")

@@ -1,7 +1,7 @@
 //! Fuzzes the reader of configurations with arbitrary text.
 
 use takt::config::{Config, ConfigError};
-use takt::internals::controller::assemble;
+use takt::controller::assemble;
 use takt::schedule;
 
 /// Reads a text as a configuration. A valid one can be checked and assembled. An error says what is wrong, and where.

@@ -4,8 +4,8 @@ use std::collections::VecDeque;
 use std::sync::OnceLock;
 
 use takt::config::Config;
+use takt::family::erob_can::follower::Follower;
 use takt::family::{OffCycleDrive, OffCycleTarget, OffCycleWish};
-use takt::internals::family::erob_can::follower::Follower;
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, DriveState, Frame, ReceiveBatch};
 use takt_wire::erob_can::entries;

@@ -2,8 +2,8 @@
 
 use std::sync::OnceLock;
 
+use takt::config::bit_fields::{compile, parse};
 use takt::config::{Axis, Config};
-use takt::internals::bit_fields::{compile, parse};
 use takt_rt::{
     FieldDrive, FieldDriveParameters, FieldMode, FieldTargets, Frame, FrameFormat, LifeWish, ReplyValue,
 };

@@ -3,8 +3,8 @@
 use std::sync::OnceLock;
 
 use takt::config::Config;
-use takt::internals::journal::Journal;
-use takt::internals::replay::Replay;
+use takt::journal::Journal;
+use takt_tools::replay::Replay;
 
 /// More cycles than that show nothing new.
 const CYCLES: usize = 300;

@@ -1,9 +1,9 @@
 //! Fuzzes both sides of a Modbus line with arbitrary bytes.
 
-use takt::internals::sim::commanded_module::ModuleParameters;
-use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
-use takt::internals::sim::serial_line::DevicesOnLine;
+use takt::sim::commanded_module::ModuleParameters;
+use takt::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::sim::plant::{Encoder, JointParameters};
+use takt::sim::serial_line::DevicesOnLine;
 use takt_wire::modbus::exception::ExceptionCode;
 use takt_wire::modbus::frame::{
     Received, ReceivedRequest, RegisterRange, RegisterValues, Request, SlaveAddress, evaluate, reply_frame,

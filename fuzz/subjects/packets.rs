@@ -1,6 +1,6 @@
 //! Fuzzes both sides of the packets between a controller and clients in other processes.
 
-use takt::internals::remote::{Answer, Demand, Reply, Role, StopRequest};
+use takt::remote::{Answer, Demand, Reply, Role, StopRequest};
 use takt::telemetry::Machine;
 
 /// What is decoded is encoded to words that are decoded to the same. Nothing asks for more memory than the packet has.

@@ -1,8 +1,8 @@
 //! Fuzzes the reader of trajectory problems of `takt plan`, in JSON lines, with arbitrary text.
 
-#[path = "../../src/cli/plan/answer.rs"]
+#[path = "../../crates/cli/src/plan/answer.rs"]
 mod answer;
-#[path = "../../src/cli/plan/question.rs"]
+#[path = "../../crates/cli/src/plan/question.rs"]
 mod question;
 
 use answer::Answer;

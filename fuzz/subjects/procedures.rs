@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use takt::config::Config;
 use takt::family::bring_up::BringUpTiming;
-use takt::internals::family::bring_up::{BringUp, Shutdown};
+use takt::family::bring_up::stages::{BringUp, Shutdown};
 use takt::sim::SimulatedBus;
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 use takt_wire::canopen::lss::{

@@ -139,7 +139,6 @@ impl GivenCallback {
     }
 
     /// The group.
-    #[cfg(feature = "internals")]
     pub fn group(&self) -> u8 {
         self.group
     }

@@ -23,7 +23,6 @@ impl GroupAxes {
     }
 
     /// How many axes the group has.
-    #[cfg(feature = "internals")]
     pub fn count(&self) -> usize {
         self.places.len()
     }

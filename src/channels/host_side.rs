@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-#[cfg(feature = "internals")]
 use takt_rt::CallbackRun;
 use takt_rt::{
     ExecutionStart, Frame, OffCycleReport, Received, Request, RequestEnvelope, RequestId, RequestTarget,
@@ -11,7 +10,6 @@ use takt_rt::{
 
 use super::bring_up_failures::BringUpFailures;
 use super::callbacks::CallbackGiver;
-#[cfg(feature = "internals")]
 use super::callbacks::GivenCallback;
 use super::client_requests::ClientRequests;
 use super::observed_events::EventReader;
@@ -87,7 +85,6 @@ impl HostSide {
     ///
     /// # Errors
     /// [`ChannelError::Full`]; nothing is sent then.
-    #[cfg(feature = "internals")]
     pub fn run_callback(
         &mut self,
         given: GivenCallback,

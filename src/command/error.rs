@@ -21,7 +21,7 @@ pub struct Refused {
 }
 
 impl Refused {
-    pub(crate) fn new(refusal: Option<RequestError>, machine: &Machine) -> Self {
+    pub fn new(refusal: Option<RequestError>, machine: &Machine) -> Self {
         let forgotten = || {
             "the request was refused; the reason is no longer known, because many later requests were refused"
                 .to_owned()
@@ -47,7 +47,8 @@ impl Stopped {
 }
 
 /// Modes that commands need, as [`CommandError::WrongMode`] names them.
-pub(crate) mod needed {
+#[doc(hidden)]
+pub mod needed {
     /// For a velocity.
     pub const PROFILE_VELOCITY: &str = "profile velocity, mode = \"pv\"";
     /// For a torque.

@@ -10,7 +10,8 @@ mod question;
 mod running_controller;
 
 pub use axis_properties::AxisProperties;
-pub(crate) use error::needed;
+#[doc(hidden)]
+pub use error::needed;
 pub use error::{
     CommandError, LeaseError, MotionError, RecoveryError, Refused, Stopped, StreamError, WaitError,
 };

@@ -50,7 +50,7 @@ impl FromStr for Interface {
 
 impl Interface {
     /// Why frames of CANopen cannot pass; `None` where every frame can.
-    pub(crate) fn lacks_canopen(&self) -> Option<String> {
+    pub fn lacks_canopen(&self) -> Option<String> {
         matches!(self, Self::Converter(_)).then(|| {
             format!("{self} carries CAN FD frames of 16 bytes alone, those of drives of bit fields: name a CAN bus")
         })

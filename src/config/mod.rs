@@ -4,7 +4,8 @@
 //! [`ConfigError`] with every problem of the file, each with its line and a way out. Quantities are bare numbers in SI
 //! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
 
-pub(crate) mod bit_fields;
+#[doc(hidden)]
+pub mod bit_fields;
 pub(crate) mod bounds;
 mod data_file;
 pub(crate) mod defaults;

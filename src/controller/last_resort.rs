@@ -54,7 +54,7 @@ impl LastResort {
     }
 
     /// Stops the drives as far as that is possible. Returns a sentence for each bus.
-    pub(super) fn stop_drives(&self) -> Vec<String> {
+    pub fn stop_drives(&self) -> Vec<String> {
         self.buses.iter().map(Bus::stop_drives).collect()
     }
 }
@@ -95,8 +95,7 @@ impl Bus {
 }
 
 /// Stops the drives of a configuration at once.
-#[cfg(feature = "internals")]
-pub(crate) fn stop_drives(config: &Config) -> Vec<String> {
+pub fn stop_drives(config: &Config) -> Vec<String> {
     LastResort::prepare(config).stop_drives()
 }
 

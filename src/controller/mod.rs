@@ -33,11 +33,13 @@ pub use handle::{
     CallbackHandle, CallbackOptions, Events, GroupHandle, Handle, StartFailure, StreamHandle,
     VirtualController,
 };
-#[cfg(all(target_os = "linux", feature = "internals"))]
-pub(crate) use last_resort::stop_drives;
+#[cfg(target_os = "linux")]
+#[doc(hidden)]
+pub use last_resort::stop_drives;
 pub use lines::{LinePort, Lines, SharedLine};
 pub use outcome::{Interrupt, Outcome, Progress};
 pub use program::{ProgramRunner, ProgramStep};
-pub(crate) use supervisor::unreleased_stop;
+#[doc(hidden)]
+pub use supervisor::unreleased_stop;
 pub use supervisor::{AfterBringUp, Supervisor};
 pub use virtual_time::{VirtualClock, VirtualRun};

@@ -11,13 +11,11 @@ use super::outcome::{Interrupt, Outcome};
 use super::port::Port;
 use super::supervisor::{AfterBringUp, Supervisor};
 use super::time_of_day::TimeOfDayKeeper;
-#[cfg(any(feature = "browser", feature = "internals"))]
 use crate::channels;
 use crate::channels::{CallbackClock, ChannelSizes, HostSide, LogSide, RtSide, channels};
 use crate::config::Config;
 use crate::faults::FaultInjector;
 use crate::journal::JournaledClock;
-#[cfg(any(feature = "browser", feature = "internals"))]
 use crate::journal::{RunJournal, clock_journal};
 use crate::telemetry::WallClock;
 use takt_sim::SimulatedBus;
@@ -149,7 +147,7 @@ impl<P: BusPort> VirtualRun<P> {
     ///
     /// # Errors
     /// See [`AssembleError`].
-    pub(crate) fn faulty(
+    pub fn faulty(
         config: &Config,
         fault_injector: &FaultInjector,
         supervisor: Supervisor,
@@ -179,7 +177,7 @@ impl<P: BusPort> VirtualRun<P> {
     ///
     /// # Errors
     /// See [`AssembleError`].
-    pub(crate) fn serving(
+    pub fn serving(
         config: &Config,
         ports: Vec<P>,
         after_bring_up: AfterBringUp,
@@ -265,8 +263,7 @@ impl<P: BusPort> VirtualRun<P> {
 
     /// Notes from now on everything that the cycle is told from outside but for what its ports do, which a
     /// [`TracedPort`](crate::link::trace::TracedPort) notes. Call it before the first cycle.
-    #[cfg(any(feature = "browser", feature = "internals"))]
-    pub(crate) fn journal(&mut self) -> RunJournal {
+    pub fn journal(&mut self) -> RunJournal {
         let (answers, clock) = clock_journal();
         self.clock = JournaledClock::noted_in(self.clock.clock, Some(answers));
         let period_ns = self.engine.period_ns().max(1);
@@ -285,12 +282,12 @@ impl<P: BusPort> VirtualRun<P> {
     }
 
     /// The life cycle.
-    pub(crate) fn supervisor(&self) -> &Supervisor {
+    pub fn supervisor(&self) -> &Supervisor {
         &self.supervisor
     }
 
     /// The host's side of the host interface, to command the group directly.
-    pub(crate) fn host(&mut self) -> &mut HostSide {
+    pub fn host(&mut self) -> &mut HostSide {
         &mut self.host
     }
 

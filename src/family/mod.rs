@@ -10,19 +10,16 @@ pub mod bring_up;
 pub mod cia402;
 pub mod commission;
 mod data_sheet;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "the procedures of two families alone name its types")
-)]
-pub(crate) mod erob;
-pub(crate) mod erob_can;
-pub(crate) mod erob_canopen;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "sessions name its types, and nobody outside names those sessions")
-)]
-pub(crate) mod erob_modbus;
+#[doc(hidden)]
+pub mod erob;
+#[doc(hidden)]
+pub mod erob_can;
+#[doc(hidden)]
+pub mod erob_canopen;
+#[doc(hidden)]
+pub mod erob_modbus;
 mod error_words;
+#[allow(unnameable_types, reason = "sessions name its types, and nobody outside names those sessions")]
 pub(crate) mod hollow;
 mod off_cycle;
 mod registry;
@@ -31,7 +28,8 @@ mod simulated_bus;
 mod simulated_joint;
 mod warning;
 mod watchdog;
-pub(crate) mod yz_aim;
+#[doc(hidden)]
+pub mod yz_aim;
 
 use std::pin::Pin;
 
@@ -46,9 +44,11 @@ pub(crate) use error_words::{drive_error_words, own_error_words, own_errors};
 pub use error_words::{error_cure, error_words};
 pub use off_cycle::{LineCounts, OffCycleBudget, OffCycleDrive, OffCycleLine, OffCycleTarget, OffCycleWish};
 pub use registry::{NameTaken, all, register};
-pub(crate) use registry::{named, of};
+#[doc(hidden)]
+pub use registry::{named, of};
 pub use simulated_bus::simulated_bus;
-pub(crate) use simulated_bus::simulated_drives;
+#[doc(hidden)]
+pub use simulated_bus::simulated_drives;
 pub(crate) use warning::is_rounded;
 pub use warning::{Warning, WarningKind, WarningSubject};
 pub(crate) use watchdog::least_shut_down_ns;
@@ -362,7 +362,7 @@ pub(crate) fn of_line(config: &Config, bus: usize) -> Option<&'static dyn Family
 }
 
 /// From one report of each drive of a serial line to the next, at the longest.
-pub(crate) fn line_report_ns(config: &Config, bus: usize) -> Option<u64> {
+pub fn line_report_ns(config: &Config, bus: usize) -> Option<u64> {
     let budgets = config.axes_of_bus(bus).filter_map(|axis| of(&axis.drive).off_cycle_budget(axis, config));
     budgets.map(|budget| budget.report_ns).max().filter(|_| config.is_serial_line(bus))
 }

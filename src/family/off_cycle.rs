@@ -43,7 +43,7 @@ impl OffCycleWish {
 
 impl OffCycleTarget {
     /// What a cycle wants of an axis.
-    pub(crate) fn of(axis: &AxisSnapshot, phase: Phase, at_ns: u64) -> Self {
+    pub fn of(axis: &AxisSnapshot, phase: Phase, at_ns: u64) -> Self {
         let wish = match Command::decode(axis.controlword) {
             _ if phase == Phase::Passive => OffCycleWish::Observe,
             _ if axis.controlword & takt_rt::controlword::FAULT_RESET != 0 => OffCycleWish::ClearFaults,

@@ -51,7 +51,7 @@ pub fn all() -> Vec<&'static dyn Family> {
 }
 
 /// The family with this word.
-pub(crate) fn named(word: &str) -> Option<&'static dyn Family> {
+pub fn named(word: &str) -> Option<&'static dyn Family> {
     all().into_iter().find(|family| family.word() == word)
 }
 
@@ -59,6 +59,6 @@ pub(crate) fn named(word: &str) -> Option<&'static dyn Family> {
 ///
 /// # Panics
 /// Nobody has registered a family of this name: a program has made a [`DriveFamily`] for which there is no [`Family`].
-pub(crate) fn of(drive: &DriveFamily) -> &'static dyn Family {
+pub fn of(drive: &DriveFamily) -> &'static dyn Family {
     named(drive.word).expect("the family of a drive is registered")
 }

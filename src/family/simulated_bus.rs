@@ -20,7 +20,7 @@ pub(super) fn gravity(axis: &Axis) -> Gravity {
 }
 
 /// The drives that simulate the axes of a bus, one for each node, with all of its axes.
-pub(crate) fn simulated_drives(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
+pub fn simulated_drives(config: &Config, bus: usize) -> Vec<Box<dyn Drive>> {
     // Those of a serial line are on that line.
     let axes =
         || config.axes.iter().filter(|axis| axis.bus == bus && !axis.drive.protocol.is_of_serial_line());

@@ -16,7 +16,7 @@ const CAN_HARDWARE_TYPE: &str = "280";
 
 /// The length to which the queue of an interface is to be set (`txqueuelen`): as many frames as takt hands to an interface at once, at most.
 /// A shorter queue can be full on a healthy bus; from a much longer one, set-points leave late.
-pub(crate) const QUEUE_FRAMES: u32 = 64;
+pub const QUEUE_FRAMES: u32 = 64;
 
 /// The bit rates of a bus, and how its controller recovers from bus-off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

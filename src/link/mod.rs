@@ -4,35 +4,38 @@ mod adapter_latency;
 #[cfg(target_os = "linux")]
 mod converter;
 #[cfg(target_os = "linux")]
-pub(crate) mod interface;
-#[cfg(feature = "cli")]
-pub(crate) mod modbus_line;
+#[doc(hidden)]
+pub mod interface;
+#[doc(hidden)]
+pub mod modbus_line;
 #[cfg(target_os = "linux")]
 mod open;
 #[cfg(target_os = "linux")]
-pub(crate) mod ownership;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "it becomes the port of a controller")
-)]
+#[doc(hidden)]
+pub mod ownership;
 #[cfg_attr(not(target_os = "linux"), path = "no_port.rs")]
 mod port;
 mod process;
 #[cfg(target_os = "linux")]
 pub(crate) mod real_interface;
 #[cfg(target_os = "linux")]
-pub(crate) mod serial_line;
+#[doc(hidden)]
+pub mod serial_line;
 #[cfg(target_os = "linux")]
 mod slcan;
 #[cfg(target_os = "linux")]
-pub(crate) mod socketcan;
-pub(crate) mod trace;
+#[doc(hidden)]
+pub mod socketcan;
+#[doc(hidden)]
+pub mod trace;
 
-pub(crate) use adapter_latency::{adapter_latency_ns, shortest_latency_command};
+#[doc(hidden)]
+pub use adapter_latency::{adapter_latency_ns, shortest_latency_command};
 #[cfg(target_os = "linux")]
 pub use converter::ConverterError;
 #[cfg(target_os = "linux")]
-pub(crate) use interface::{
+#[doc(hidden)]
+pub use interface::{
     ControllerTiming, InterfaceSettings, InterfaceStatus, QUEUE_FRAMES, interface_status, restart_command,
     transmit_queue_length,
 };
@@ -41,15 +44,18 @@ pub use interface::{InterfaceError, UnfitMode};
 #[cfg(target_os = "linux")]
 pub use open::OpenError;
 #[cfg(target_os = "linux")]
-pub(crate) use open::{open_interface, open_to_listen};
+#[doc(hidden)]
+pub use open::{open_interface, open_to_listen};
 #[cfg(target_os = "linux")]
 pub use ownership::{
     ClaimError, HeardMaster, IfOwned, LockError, MasterActivity, ReleaseError, Role, TakeOverError,
 };
-pub(crate) use port::LinkPort;
+#[doc(hidden)]
+pub use port::LinkPort;
 pub use process::Process;
 #[cfg(target_os = "linux")]
-pub(crate) use real_interface::RealInterface;
+#[doc(hidden)]
+pub use real_interface::RealInterface;
 #[cfg(target_os = "linux")]
 pub use serial_line::SerialLineError;
 #[cfg(target_os = "linux")]
@@ -57,5 +63,6 @@ pub use slcan::SlcanError;
 #[cfg(target_os = "linux")]
 pub use socketcan::SocketCanError;
 #[cfg(target_os = "linux")]
-pub(crate) use socketcan::SocketCanOptions;
+#[doc(hidden)]
+pub use socketcan::SocketCanOptions;
 pub use trace::{PortAnswer, PortMark, Trace, Traced, TracedFrame, TracedHealth, TracedPort};

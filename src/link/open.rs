@@ -67,10 +67,9 @@ pub enum OpenError {
     },
 }
 
-#[cfg(feature = "cli")]
 impl OpenError {
     /// Returns `true` if another program has the serial line.
-    pub(crate) const fn is_line_taken(&self) -> bool {
+    pub const fn is_line_taken(&self) -> bool {
         matches!(
             self,
             Self::Slcan { error: SlcanError::Line(SerialLineError::Busy { .. }), .. }

@@ -4,7 +4,6 @@ use arrayvec::ArrayVec;
 use takt_rt::linux::{Attachment, SlcanPort, SocketCanPort, TransparentPort};
 use takt_rt::{BusHealth, BusPort, Frame, MAX_BUSES, Nanoseconds, Outgoing, ReceiveBatch};
 
-#[cfg(feature = "cli")]
 use takt_sim::LivePort;
 
 /// The port of a real interface.
@@ -28,7 +27,6 @@ impl LinkPort {
     }
 }
 
-#[cfg(feature = "cli")]
 impl LinkPort {
     /// This port for simulated drives.
     pub fn into_live(self) -> Box<dyn LivePort> {

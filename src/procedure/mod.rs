@@ -24,16 +24,8 @@ mod canopen_client;
 mod canopen_session;
 mod client;
 mod event;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "the procedures of one family alone name it")
-)]
 mod modbus_session;
 mod parallel;
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "it is the error of commissioning, which is for the program")
-)]
 mod running;
 mod sdo_quirks;
 mod session;

@@ -57,6 +57,8 @@ pub use commands::{Command, Demand, StopRequest};
 pub(crate) use layout::{Description, LeaseShown, STOP_WORDS};
 pub(crate) use memory::Memory;
 pub use replies::{Answer, Reply};
-pub(crate) use shown::{ShownWriter, now_ns};
-pub(crate) use socket::{Claimed, Listener, NameError, Names, SocketError, accept};
+#[doc(hidden)]
+pub use shown::{ShownWriter, now_ns};
+#[doc(hidden)]
+pub use socket::{Claimed, Listener, NameError, Names, SocketError, accept};
 pub use socket::{PACKET_WORDS, Packets, Received, Role};

@@ -86,10 +86,6 @@ pub struct Names {
     "{name:?} is not a name to serve by: letters, digits, '.', '-' and '_', or the beginning of a path, of at most {} bytes",
     PATH_BYTES - ".command.new".len()
 )]
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "it becomes a ConnectError or a ServeError at once")
-)]
 pub struct NameError {
     name: String,
 }
@@ -156,7 +152,7 @@ impl Names {
 
 /// Why a process cannot listen, or cannot connect.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum SocketError {
+pub enum SocketError {
     /// Another process has the name.
     #[error("another process serves by this name")]
     InUse,
@@ -270,7 +266,6 @@ pub struct Listener {
 
 impl Listener {
     /// The plain names by which controllers are served that this process may observe, in their order.
-    #[cfg(feature = "cli")]
     pub fn names_in_use() -> Vec<String> {
         let folders = own_folder().into_iter().chain([PathBuf::from(SHARED_FOLDER)]);
         let entries = folders.filter_map(|folder| fs::read_dir(folder).ok()).flatten().flatten();

@@ -20,10 +20,12 @@ mod command_phase;
 mod loading;
 mod messages;
 mod remedy;
-pub(crate) mod response_time;
+#[doc(hidden)]
+pub mod response_time;
 mod send_phase;
 mod slot;
-pub(crate) mod text;
+#[doc(hidden)]
+pub mod text;
 
 use serde::Serialize;
 use thiserror::Error;

@@ -195,7 +195,7 @@ pub fn serve(
 }
 
 /// A name that this process will serve by. No other process can, from now on.
-pub(crate) struct Claim {
+pub struct Claim {
     claimed: Claimed,
     options: ServeOptions,
 }
@@ -205,7 +205,7 @@ impl Claim {
     ///
     /// # Errors
     /// See [`ServeError`].
-    pub(crate) fn new(name: &str, options: ServeOptions) -> Result<Self, ServeError> {
+    pub fn new(name: &str, options: ServeOptions) -> Result<Self, ServeError> {
         if options.mode & !0o666 != 0 {
             return Err(ServeError::Mode { mode: options.mode });
         }
@@ -217,7 +217,7 @@ impl Claim {
     }
 
     /// See [`serve()`].
-    pub(crate) fn serve(self, controller: impl RunningController + 'static) -> Result<Server, ServeError> {
+    pub fn serve(self, controller: impl RunningController + 'static) -> Result<Server, ServeError> {
         let Self { claimed, options } = self;
         let shown = ShownWriter::new(&description(&controller))?;
         let memory = shown.memory();

@@ -224,7 +224,6 @@ impl BlackBox {
     }
 
     /// The same, with its files in memory.
-    #[cfg(feature = "browser")]
     pub fn in_memory(
         span_ns: Nanoseconds,
         files: FilesInMemory,

@@ -95,7 +95,6 @@ impl PartNames {
     }
 
     /// The names that this file is one of.
-    #[cfg(feature = "browser")]
     pub(crate) fn of_part(path: &Path) -> Option<Self> {
         let extension = path.extension()?;
         let stem = Path::new(path.file_stem()?);

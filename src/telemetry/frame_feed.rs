@@ -32,7 +32,7 @@ pub struct FrameReader {
 
 impl FrameFeed {
     /// A reader of what comes from now on.
-    pub(crate) fn reader(&self) -> FrameReader {
+    pub fn reader(&self) -> FrameReader {
         let (sender, frames) = sync_channel(WAITING);
         let lost = Arc::<AtomicU64>::default();
         let reader = Reader { frames: sender, lost: Arc::clone(&lost) };

@@ -194,16 +194,15 @@ impl Logger {
     }
 
     /// Also keeps this black box.
-    #[cfg(feature = "browser")]
     #[must_use]
-    pub(crate) fn with_black_box(self, black_box: BlackBox) -> Self {
+    pub fn with_black_box(self, black_box: BlackBox) -> Self {
         Self { black_box: Some(black_box), ..self }
     }
 
     /// Also writes the journal of the run, and the files of its configuration, into the recording, if there is one; and into the files of
     /// the black box, if there is one and `again` runs the engine once more for it.
     #[must_use]
-    pub(crate) fn with_journal(
+    pub fn with_journal(
         mut self,
         journal: Option<RunJournal>,
         again: Option<RerunParts>,

@@ -99,7 +99,7 @@ impl Unit {
     }
 
     /// `mrad` or `mm`.
-    pub(crate) const fn milli_symbol(self) -> &'static str {
+    pub const fn milli_symbol(self) -> &'static str {
         match self {
             Self::Radian => "mrad",
             Self::Metre => "mm",
@@ -139,7 +139,7 @@ impl Machine {
     }
 
     /// The name of a group; its number if it is unknown.
-    pub(crate) fn group_name(&self, group: u8) -> String {
+    pub fn group_name(&self, group: u8) -> String {
         self.groups.get(usize::from(group)).map_or_else(|| format!("group {group}"), Clone::clone)
     }
 
@@ -154,13 +154,13 @@ impl Machine {
     }
 
     /// An error code of the drive of an axis, in words.
-    pub(crate) fn drive_error(&self, axis: u8, code: u16) -> String {
+    pub fn drive_error(&self, axis: u8, code: u16) -> String {
         let own = self.axes.get(usize::from(axis)).map_or(&[][..], |axis| &axis.own_errors);
         family::own_error_words(own, code).unwrap_or_else(|| family::error_words(self.family(axis), code))
     }
 
     /// The cure of an error of the drive of an axis.
-    pub(crate) fn drive_cure(&self, axis: u8, code: u16) -> &'static str {
+    pub fn drive_cure(&self, axis: u8, code: u16) -> &'static str {
         family::error_cure(self.family(axis), code)
     }
 
@@ -178,7 +178,7 @@ impl Machine {
     }
 
     /// The unit of an axis.
-    pub(crate) fn axis_unit(&self, axis: u8) -> Unit {
+    pub fn axis_unit(&self, axis: u8) -> Unit {
         self.axes.get(usize::from(axis)).map_or(Unit::Radian, |axis| axis.unit)
     }
 }

@@ -7,7 +7,7 @@ use super::words;
 
 /// Missed slots of a run, for those who are told of events as they happen.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct MissedSlotsSoFar {
+pub struct MissedSlotsSoFar {
     count: u64,
     told: u64,
 }
@@ -15,7 +15,7 @@ pub(crate) struct MissedSlotsSoFar {
 impl MissedSlotsSoFar {
     /// Takes an event. Returns what is to be told: missed slots with their number so far, the first time and each time that it has doubled;
     /// every other event as it is.
-    pub(crate) fn told(&mut self, event: Event) -> Option<Event> {
+    pub fn told(&mut self, event: Event) -> Option<Event> {
         let EventKind::MissedSlots { count } = event.kind else { return Some(event) };
         self.count = self.count.saturating_add(count);
         if self.count < self.told.saturating_mul(2) {
@@ -27,7 +27,7 @@ impl MissedSlotsSoFar {
 }
 
 /// The events of a recording, with all of its missed slots in the place of the first ones.
-pub(crate) fn counted_once(events: &[RecordedEvent]) -> Vec<RecordedEvent> {
+pub fn counted_once(events: &[RecordedEvent]) -> Vec<RecordedEvent> {
     let missed = |event: &RecordedEvent| match event.kind {
         Some(EventKind::MissedSlots { count }) => Some(count),
         _ => None,

@@ -27,7 +27,8 @@ mod logger;
 mod loop_timing;
 mod machine;
 mod messages;
-pub(crate) mod missed_slots;
+#[doc(hidden)]
+pub mod missed_slots;
 mod own_errors;
 #[cfg(target_os = "linux")]
 mod realtime;
@@ -35,8 +36,8 @@ mod recorded;
 mod recording;
 mod recording_report;
 mod recording_series;
-pub(crate) mod render;
-#[cfg(feature = "cli")]
+#[doc(hidden)]
+pub mod render;
 mod replay_recording;
 mod report;
 mod severity;
@@ -44,19 +45,20 @@ mod statistics;
 #[cfg(target_os = "linux")]
 pub(crate) mod thread;
 mod wall_clock;
-pub(crate) mod words;
+#[doc(hidden)]
+pub mod words;
 
 pub use crate::channels::LogSide;
-#[cfg(feature = "browser")]
-pub(crate) use black_box::BlackBox;
+#[doc(hidden)]
+pub use black_box::BlackBox;
 pub use black_box::{BlackBoxOptions, Incident};
 pub use cdr::{CdrDecoder, CdrEncoder};
 pub use destination::RecordingDestination;
-#[cfg(feature = "browser")]
-pub(crate) use files_in_memory::FilesInMemory;
-pub use frame_feed::FrameFeed;
-#[cfg(feature = "panel")]
-pub(crate) use history::OnBus;
+#[doc(hidden)]
+pub use files_in_memory::{FileInMemory, FilesInMemory};
+pub use frame_feed::{FrameFeed, FrameReader};
+#[doc(hidden)]
+pub use history::OnBus;
 pub use listener::Notify;
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
 pub(crate) use loop_timing::{LOOP_TIMING_WORDS, ShownTiming, newest_timing, shown_timing};
@@ -67,8 +69,8 @@ pub use recorded::{
     Cause, Recorded, RecordedCycle, RecordedError, RecordedEvent, RecordedFrame, RecordedFrames,
     RecordedLoad, WalkError,
 };
-#[cfg(feature = "browser")]
-pub(crate) use recorded::{
+#[doc(hidden)]
+pub use recorded::{
     RecordedJournal, journal as recorded_journal, journal_in_memory as recorded_journal_in_memory,
 };
 pub use recording_report::{
@@ -77,16 +79,17 @@ pub use recording_report::{
 };
 pub use recording_series::RecordingOptions;
 pub use render::Emphasis;
-#[cfg(feature = "cli")]
-pub(crate) use replay_recording::ReplayRecording;
+#[doc(hidden)]
+pub use replay_recording::{ReplayRecording, ReplayRecordingError};
 pub use report::{
     AxisReport, BusReport, GroupReport, LatencyReport, RealtimeReport, RunEnd, RunOutcome, RunReport,
     SetPointParts, StopReport, TelemetryReport,
 };
-#[cfg(feature = "cli")]
-pub(crate) use severity::Severity;
+#[doc(hidden)]
+pub use severity::Severity;
 pub use statistics::{AxisStatistics, FollowingErrorMaximum, Latency, Statistics};
 #[cfg(target_os = "linux")]
-pub(crate) use thread::LoggerThread;
+#[doc(hidden)]
+pub use thread::LoggerThread;
 pub use wall_clock::WallClock;
 pub use words::{event as event_words, phase as phase_words};

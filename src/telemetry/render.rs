@@ -38,23 +38,23 @@ impl Emphasis {
         }
     }
 
-    pub(crate) fn heading(self, text: &str) -> String {
+    pub fn heading(self, text: &str) -> String {
         self.apply("1", text)
     }
 
-    pub(crate) fn faint(self, text: &str) -> String {
+    pub fn faint(self, text: &str) -> String {
         self.apply("2", text)
     }
 
-    pub(crate) fn accent(self, text: &str) -> String {
+    pub fn accent(self, text: &str) -> String {
         self.apply("36", text)
     }
 
-    pub(crate) fn good(self, text: &str) -> String {
+    pub fn good(self, text: &str) -> String {
         self.apply("32", text)
     }
 
-    pub(crate) fn bad(self, text: &str) -> String {
+    pub fn bad(self, text: &str) -> String {
         self.apply("1;31", text)
     }
 }
@@ -210,7 +210,7 @@ impl RunReport {
 
 /// The histograms of wake-up latency and SYNC release error, one above the other on one axis of time. All axes are logarithmic, so that a
 /// single late cycle among millions is visible.
-pub(crate) fn histograms(text: &mut String, emphasis: Emphasis, wake: &LatencyReport, sync: &LatencyReport) {
+pub fn histograms(text: &mut String, emphasis: Emphasis, wake: &LatencyReport, sync: &LatencyReport) {
     for (title, latency) in [("wake-up latency (cycles, logarithmic)", wake), ("SYNC release error", sync)] {
         line(text, &emphasis.heading(&format!("       {title}")));
         bars(latency).iter().for_each(|row| line(text, row));
@@ -249,7 +249,7 @@ fn stop_words(stop: &StopReport) -> String {
 }
 
 /// A table with one row for each latency.
-pub(crate) fn latency_table(text: &mut String, emphasis: Emphasis, rows: &[(&str, &LatencyReport)]) {
+pub fn latency_table(text: &mut String, emphasis: Emphasis, rows: &[(&str, &LatencyReport)]) {
     let titles = ["latency", "min", "median", "99 %", "99.9 %", "max"].map(str::to_owned);
     line(text, &emphasis.heading(&latency_row(titles)));
     for (name, latency) in rows {
@@ -260,7 +260,7 @@ pub(crate) fn latency_table(text: &mut String, emphasis: Emphasis, rows: &[(&str
 }
 
 /// The number of missed slots, out of all slots, and whether that is good.
-pub(crate) fn missed_slots(text: &mut String, emphasis: Emphasis, missed: u64, cycles: u64) {
+pub fn missed_slots(text: &mut String, emphasis: Emphasis, missed: u64, cycles: u64) {
     let words = format!("{missed} of {}", cycles + missed);
     let words = format!("{:<20}{words:>12}", "missed slots");
     if missed == 0 {
@@ -277,7 +277,7 @@ pub(crate) fn missed_slots(text: &mut String, emphasis: Emphasis, missed: u64, c
 }
 
 /// The real-time set-up that the operating system granted, and the commands that grant the rest.
-pub(crate) fn realtime(text: &mut String, emphasis: Emphasis, realtime: &RealtimeReport) {
+pub fn realtime(text: &mut String, emphasis: Emphasis, realtime: &RealtimeReport) {
     wrap(text, &emphasis.heading("real-time"), 9, &realtime_lines(realtime));
     for command in &realtime.grant_with {
         line(text, &format!("{:INDENT$}  {command}", ""));
@@ -403,7 +403,7 @@ fn short_count(count: u64) -> String {
 }
 
 /// A time with three digits and its unit.
-pub(crate) fn duration(ns: u64) -> String {
+pub fn duration(ns: u64) -> String {
     let (value, unit) = match ns {
         0..=999 => return format!("{ns} ns"),
         1_000..=999_999 => (ns as f64 * 1e-3, "µs"),
@@ -424,7 +424,7 @@ fn bytes(count: u64) -> String {
     }
 }
 
-pub(crate) fn line(text: &mut String, line: &str) {
+pub fn line(text: &mut String, line: &str) {
     text.push_str(line.trim_end());
     text.push('\n');
 }
@@ -440,7 +440,7 @@ pub(crate) fn wrap(text: &mut String, label: &str, label_columns: usize, lines: 
 
 /// Writes words behind a label of `indent` visible characters, broken between words where a line gets too long; the lines after the first
 /// begin at `hanging`.
-pub(crate) fn paragraph(text: &mut String, label: &str, words: &str, indent: usize, hanging: usize) {
+pub fn paragraph(text: &mut String, label: &str, words: &str, indent: usize, hanging: usize) {
     let mut current = label.to_owned();
     let (mut begin, mut columns) = (indent, indent);
     // A number stays with its unit: the space between them is no place for a break.

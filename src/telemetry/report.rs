@@ -387,7 +387,7 @@ impl AxisReport {
 
 impl BusReport {
     /// The name of a fault confinement state.
-    pub(crate) const fn state_words(state: BusState) -> &'static str {
+    pub const fn state_words(state: BusState) -> &'static str {
         match state {
             BusState::ErrorActive => "error active",
             BusState::ErrorPassive => "error passive",

@@ -26,7 +26,7 @@ impl WallClock {
     }
 
     /// Nanoseconds since 1970-01-01 UTC at an instant of the monotonic clock.
-    pub(crate) const fn unix_ns(self, at_ns: Nanoseconds) -> u64 {
+    pub const fn unix_ns(self, at_ns: Nanoseconds) -> u64 {
         self.unix_at_zero_ns.saturating_add(at_ns)
     }
 
@@ -37,7 +37,7 @@ impl WallClock {
     }
 
     /// An instant of the monotonic clock as `2025-01-31 23:59:59.123 UTC`, for people.
-    pub(crate) fn moment(self, at_ns: Nanoseconds) -> String {
+    pub fn moment(self, at_ns: Nanoseconds) -> String {
         let ([year, month, day], [hour, minute, second]) = self.date_and_time(at_ns);
         let milliseconds = self.unix_ns(at_ns) % NANOSECONDS_PER_SECOND / 1_000_000;
         format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02}.{milliseconds:03} UTC")

@@ -13,7 +13,8 @@ mod stop;
 
 pub use rejection::rejection;
 pub use stop::stop;
-pub(crate) use stop::{stop_cause, stop_cure};
+#[doc(hidden)]
+pub use stop::{stop_cause, stop_cure};
 
 /// The name of a phase: "moving".
 pub const fn phase(phase: Phase) -> &'static str {

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use takt::Port;
 use takt::VirtualRun;
-use takt::config::Config;
-use takt::internals::{RunInside, with_journal};
+use takt::config::{Config, ConfigSources};
+use takt::controller::assemble;
 use takt::telemetry::{
     BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingDestination, RecordingOptions, WallClock,
 };
@@ -55,7 +55,8 @@ fn held_every_minute(minutes: usize, recording: Option<RecordingDestination>) ->
         traces,
     };
     let logger = Logger::new(log, options, Box::new(|_| {}));
-    let mut logger = with_journal(logger, run.journal(), &config).unwrap();
+    let again = assemble::rerun_parts(&config).unwrap();
+    let mut logger = logger.with_journal(Some(run.journal()), Some(again), &ConfigSources::default());
     let mut held = Vec::with_capacity(minutes);
     for cycle in 1..=minutes as u64 * 60_000 {
         assert!(run.step(), "the run has ended in cycle {cycle}: {:?}", run.supervisor().outcome());

@@ -8,11 +8,11 @@ use std::time::Duration;
 
 use takt::Outcome;
 use takt::Port;
+use takt::channels::{ChannelSizes, channels};
 use takt::config::Config;
-use takt::internals::channels::{ChannelSizes, channels};
-use takt::internals::controller::realtime_thread::{self, LoopParts, ThreadSetup};
-use takt::internals::controller::{Supervisor, assemble};
-use takt::internals::telemetry::LoggerThread;
+use takt::controller::realtime_thread::{self, LoopParts, ThreadSetup};
+use takt::controller::{Supervisor, assemble};
+use takt::telemetry::LoggerThread;
 use takt::telemetry::{BlackBoxOptions, Logger, LoggerOptions, Machine, RecordingOptions, WallClock};
 use takt_rt::Frame;
 use takt_rt::linux::MonotonicClock;

@@ -9,11 +9,11 @@ use takt::faults::{
     DelayPlace, DriveEffect, Effect, FaultProgress, FaultyPort, ForeignFrames, FrameEffect, InterfaceEffect,
     Part, ScenarioFault, Selection, Trigger, Window,
 };
-use takt::internals::sim::erob::{ErobJoint, ErobParameters};
-use takt::internals::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
+use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::homing_switches::ReferenceSwitches;
 use takt::sim::plant::{Encoder, JointParameters};
+use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
 use takt::sim::{Defect, Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 use takt_wire::canopen::eds;

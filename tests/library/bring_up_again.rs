@@ -4,8 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-use takt::faults::DriveEffect;
-use takt::internals::inject;
+use takt::faults::{DriveEffect, Injectable};
 use takt::rt::RequestTarget;
 use takt::{
     CommandError, Config, Handle, Outcome, Phase, RecoveryError, RejectReason, Rule, RunningController,
@@ -34,7 +33,8 @@ fn start(name: &str) -> VirtualController {
 /// Does something to the drive of an axis.
 fn does(arm: &VirtualController, axis: usize, effect: DriveEffect, is_present: bool) {
     let drive = &arm.axes()[axis];
-    inject(arm, drive.bus, drive.node, effect, is_present).unwrap();
+    let done = arm.with_ports(|ports| ports[drive.bus].inject(drive.node, effect, is_present));
+    done.unwrap().unwrap();
 }
 
 /// Cuts the power of a drive for a moment, and waits for the stop that follows. A drive that answers as before, and has lost its power

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
-use takt::internals::RunInside;
-use takt::internals::channels::{CallbackRecord, GivenCallback};
+use takt::channels::{CallbackRecord, GivenCallback};
+use takt::controller::AfterBringUp;
 use takt::rt::{AxisLimits, CallbackId, CallbackRun, MotionState};
 use takt::sim::SimulatedBus;
 use takt::{
@@ -173,7 +173,7 @@ const RUN: CallbackRun =
 fn holding() -> VirtualRun<SimulatedBus> {
     let config = config("single-erob.toml");
     let ports = vec![takt::simulated_bus(&config, 0)];
-    let mut run = VirtualRun::serving(&config, ports).unwrap().0;
+    let mut run = VirtualRun::serving(&config, ports, AfterBringUp::Enable).unwrap().0;
     while run.snapshot().groups[0].phase != Phase::Holding {
         assert!(run.step());
     }

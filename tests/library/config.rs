@@ -411,7 +411,7 @@ fn a_simulated_yz_aim_may_power_up_operational() {
     let gantry = parse(&text.replace("[defaults.axis.joint]", operational));
     for axis in &gantry.axes {
         assert_eq!(axis.simulated.power_up, PowerUpState::Operational);
-        let unit = takt::internals::sim::yz_aim::simulated_parameters(axis, 1_000_000, &gantry.simulation);
+        let unit = takt::family::yz_aim::simulated_parameters(axis, 1_000_000, &gantry.simulation);
         assert!(unit.starts_operational);
     }
     assert_eq!(parse(&text).axes[0].simulated.power_up, PowerUpState::PreOperational);

@@ -85,7 +85,7 @@ fn a_group_has_its_axes_in_its_own_order_and_a_program_moves_them_in_it() {
     assert_eq!(moves[0].target, ProgramTarget::Position(vec![10_f64.to_radians(), 0.5]));
     assert_eq!(moves[1].target, ProgramTarget::Position(vec![20_f64.to_radians()]));
     config.validate().unwrap();
-    takt::internals::controller::assemble::engine(&config).unwrap();
+    takt::controller::assemble::engine(&config).unwrap();
 }
 
 #[test]

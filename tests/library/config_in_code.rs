@@ -7,8 +7,8 @@ use takt::config::{
     Axis, Bus, CanLine, Config, Control, DriveFamily, Feedback, Interface, Limits, Program, ProgramMove,
     ProgramTarget, StreamDelay, Travel,
 };
+use takt::controller::assemble;
 use takt::family;
-use takt::internals::controller::assemble;
 use takt::{Controller, Outcome, VirtualController, VirtualRun};
 
 fn sound() -> Config {

@@ -457,7 +457,7 @@ fn a_bus_whose_cycle_has_more_cycles_than_the_engine_can_wait_is_refused_at_its_
     // The longest one can be set up.
     let config = Config::parse("longest.toml", &with("period = \"32 ms\""));
     let config = config.unwrap_or_else(|error| panic!("{error:?}"));
-    takt::internals::controller::assemble::engine(&config).unwrap_or_else(|error| panic!("{error:?}"));
+    takt::controller::assemble::engine(&config).unwrap_or_else(|error| panic!("{error:?}"));
 }
 
 fn rendered(error: &ConfigError) -> String {

@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
 
 use takt::config::{Config, Control};
-use takt::internals::RunInside;
+use takt::controller::AfterBringUp;
 use takt::sim::{DriveFault, Observation, SimulatedBus};
 use takt::{Interrupt, Outcome, VirtualRun};
 use takt_rt::{
@@ -415,7 +415,7 @@ fn move_to(target: [f64; MAX_AXES], minimum_duration_s: f64) -> Move {
 fn a_client_that_keeps_moving_the_group_does_not_prevent_the_end_of_the_run() {
     let config = load("arm6-erob.toml");
     let ports = (0..config.buses.len()).map(|bus| takt::simulated_bus(&config, bus)).collect();
-    let mut run = VirtualRun::serving(&config, ports).unwrap().0;
+    let mut run = VirtualRun::serving(&config, ports, AfterBringUp::Enable).unwrap().0;
     while run.snapshot().groups[0].phase != Phase::Holding {
         assert!(run.step());
     }
@@ -441,7 +441,7 @@ fn a_client_that_keeps_moving_the_group_does_not_prevent_the_end_of_the_run() {
 fn a_group_that_a_client_moves_before_the_life_cycle_sees_it_hold_goes_on() {
     let config = load("arm6-erob.toml");
     let ports = (0..config.buses.len()).map(|bus| takt::simulated_bus(&config, bus)).collect();
-    let mut run = VirtualRun::serving(&config, ports).unwrap().0;
+    let mut run = VirtualRun::serving(&config, ports, AfterBringUp::Enable).unwrap().0;
     while run.snapshot().groups[0].phase != Phase::Enabling {
         assert!(run.step());
     }

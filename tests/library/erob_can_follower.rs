@@ -1,7 +1,7 @@
 //! An axis that speaks eRob's own CAN protocol follows its group beside the cycle, in virtual time.
 
+use takt::family::erob_can::follower::Follower;
 use takt::family::{OffCycleDrive, OffCycleTarget, OffCycleWish};
-use takt::internals::family::erob_can::follower::Follower;
 use takt::schedule::{self, MessageKind};
 use takt::sim::{Defect, DriveFault, SimulatedBus};
 use takt::{Config, Outcome, VirtualRun};

@@ -4,8 +4,7 @@
 use std::path::Path;
 
 use takt::family::OffCycleBudget;
-use takt::internals::RunInside;
-use takt::internals::family::erob_modbus::budget::LineBudget;
+use takt::family::erob_modbus::budget::LineBudget;
 use takt::sim::{Defect, DriveFault, LineDisturbance, SimulatedBus};
 use takt::{Config, Interrupt, Outcome, VirtualRun};
 use takt_rt::{AxisSnapshot, DriveState, Fault, Origin, Phase, StopReason};

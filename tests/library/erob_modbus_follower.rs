@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use takt::family::erob_modbus::follower::FollowerParameters;
+use takt::family::erob_modbus::line::FollowedLine;
 use takt::family::{OffCycleLine, OffCycleTarget, OffCycleWish};
-use takt::internals::family::erob_modbus::follower::FollowerParameters;
-use takt::internals::family::erob_modbus::line::FollowedLine;
-use takt::internals::sim::commanded_module::ModuleParameters;
-use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
+use takt::sim::commanded_module::ModuleParameters;
+use takt::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
 use takt::sim::plant::Encoder;
 use takt::sim::{Defect, DevicesOnLine, Drive, LineDisturbance, Observation};
 use takt_rt::{DriveState, OffCycleReport};

@@ -1,8 +1,8 @@
 //! eRob's Modbus-RTU against what the manual prints: its frames, and its table of registers.
 
 use crate::rows::columns;
-use takt::internals::family::erob_modbus::register::{Number, Register};
-use takt::internals::family::erob_modbus::registers;
+use takt::family::erob_modbus::register::{Number, Register};
+use takt::family::erob_modbus::registers;
 use takt_wire::erob_can::parameter::{Access, Unit};
 use takt_wire::modbus::frame::{
     Received, ReceivedRequest, RegisterRange, RegisterValues, Reply, Request, SlaveAddress, evaluate,

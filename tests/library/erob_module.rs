@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use takt::internals::sim::commanded_module::ModuleParameters;
+use takt::sim::commanded_module::ModuleParameters;
 use takt::sim::plant::{Encoder, JointParameters};
 
 /// Its encoder has 524288 counts per turn, and the zero of the joint. It can be enabled as soon as it is switched on.

@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::time::Duration;
 
-use takt::internals::RunInside;
 use takt::{
     AxisPoint, CommandError, Config, MotionError, Outcome, TrajectoryPoint, VirtualController, VirtualRun,
 };

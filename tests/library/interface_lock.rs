@@ -11,9 +11,7 @@ use std::time::{Duration, Instant};
 
 use nix::sys::socket::{AddressFamily, Backlog, SockFlag, SockType, UnixAddr, bind, connect, listen, socket};
 use nix::unistd::{geteuid, getuid};
-use takt::internals::link::ownership::{
-    InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError,
-};
+use takt::link::ownership::{InterfaceLock, LockError, Process, ReleaseError, Role, TakeOverError};
 use tempfile::TempDir;
 
 /// Names the interface for the other process.

@@ -32,7 +32,6 @@ mod realtime_survives;
 mod rows;
 mod schedule;
 mod schedule_bounds;
-mod socketcan;
 mod stale_commands;
 mod stream_clients;
 mod telemetry;

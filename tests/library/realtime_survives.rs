@@ -11,13 +11,13 @@ use std::time::Duration;
 use takt::Ended;
 use takt::Outcome;
 use takt::Port;
+use takt::channels::{ChannelSizes, HostSide, LogSide, channels};
 use takt::config::Config;
-use takt::internals::channels::{ChannelSizes, HostSide, LogSide, channels};
-use takt::internals::controller::realtime_thread::{self, LoopParts, ThreadSetup};
-use takt::internals::controller::session::{self};
-use takt::internals::controller::{Supervisor, assemble};
-use takt::internals::link::trace::Trace;
-use takt::internals::telemetry::LoggerThread;
+use takt::controller::realtime_thread::{self, LoopParts, ThreadSetup};
+use takt::controller::session::{self};
+use takt::controller::{Supervisor, assemble};
+use takt::link::trace::Trace;
+use takt::telemetry::LoggerThread;
 use takt::telemetry::{
     BlackBoxOptions, Incident, Logger, LoggerOptions, Machine, Notice, Recorded, RecordingOptions, WallClock,
 };

@@ -19,9 +19,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use nix::unistd::geteuid;
-use takt::internals::remote::{
-    self, Answer, Demand, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest,
-};
+use takt::remote::{self, Answer, Demand, PACKET_WORDS, Packets, Received, Reply, Role, StopRequest};
 use takt::{
     AxisPoint, Client, ClientStream, CommandError, Config, ConnectError, Controller, EventKind, LeaseError,
     MotionError, MoveOptions, OperationMode, Phase, RunningController, ServeError, ServeOptions, Server,

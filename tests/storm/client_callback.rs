@@ -1,10 +1,9 @@
 //! Somebody whose callbacks lead the group anywhere within reason, take too long now and then, and panic.
 
 use takt::VirtualRun;
+use takt::channels::GivenCallback;
 use takt::config::{Axis, Compliance, Config, Control};
-use takt::internals::RunInside;
-use takt::internals::channels::GivenCallback;
-use takt::internals::link::trace::TracedPort;
+use takt::link::trace::TracedPort;
 use takt::{CallbackCommand, CallbackCycle, CallbackState};
 use takt_rt::{AxisLimits, CallbackId, CallbackRun, Follow, Phase, Snapshot};
 

@@ -2,8 +2,7 @@
 
 use takt::VirtualRun;
 use takt::config::{Axis, Config, Control};
-use takt::internals::RunInside;
-use takt::internals::link::trace::TracedPort;
+use takt::link::trace::TracedPort;
 use takt_rt::{MAX_AXES, ModeChange, OperationMode, Phase, Request, RequestTarget, Snapshot};
 
 use crate::dice::Dice;

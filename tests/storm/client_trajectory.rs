@@ -4,10 +4,9 @@
 use std::sync::Arc;
 
 use takt::VirtualRun;
+use takt::channels::{GivenTrajectory, GroupAxes};
 use takt::config::{Axis, Config};
-use takt::internals::RunInside;
-use takt::internals::channels::{GivenTrajectory, GroupAxes};
-use takt::internals::link::trace::TracedPort;
+use takt::link::trace::TracedPort;
 use takt::trajectory::{Trajectory, TrajectoryConditions, TrajectoryPoint};
 use takt_rt::plan::State;
 use takt_rt::{

@@ -3,8 +3,7 @@
 
 use takt::VirtualRun;
 use takt::config::Config;
-use takt::internals::RunInside;
-use takt::internals::link::trace::TracedPort;
+use takt::link::trace::TracedPort;
 
 use crate::concern::Concerns;
 use crate::dice::Dice;

@@ -1,7 +1,7 @@
 //! The journal of a storm, by the way that it takes in a recording.
 
-use takt::internals::journal::{Encoder, Journal, RunJournal};
-use takt::internals::link::trace::Trace;
+use takt::journal::{Encoder, Journal, RunJournal};
+use takt::link::trace::Trace;
 use takt_rt::CycleRecord;
 
 /// Keeps the journal and the records of a run.

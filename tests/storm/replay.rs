@@ -1,7 +1,7 @@
 //! Storms again: the engine on the journal of a storm does what it did, bit for bit.
 
-use takt::internals::journal::Journal;
-use takt::internals::replay::Replay;
+use takt::journal::Journal;
+use takt_tools::replay::Replay;
 
 use crate::case::Case;
 use crate::client_mode;

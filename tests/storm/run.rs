@@ -4,12 +4,12 @@ use std::cell::RefCell;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use takt::channels::LogSide;
 use takt::config::{Axis, Config};
+use takt::controller::{AfterBringUp, Supervisor};
 use takt::faults::{FaultInjector, Scenario, ScenarioFault};
-use takt::internals::RunInside;
-use takt::internals::channels::LogSide;
-use takt::internals::journal::Journal;
-use takt::internals::link::trace::{Trace, TracedPort, traced};
+use takt::journal::Journal;
+use takt::link::trace::{Trace, TracedPort, traced};
 use takt::sim::Observation;
 use takt::{Outcome, VirtualRun};
 use takt_rt::{
@@ -70,13 +70,11 @@ impl World {
             traces.borrow_mut().push(trace);
             port
         };
-        let (run, log) = <VirtualRun<TracedPort<Tap>> as RunInside<TracedPort<Tap>>>::faulty(
-            config,
-            &fault_injector,
-            is_serving,
-            tapped,
-        )
-        .unwrap();
+        let supervisor = match is_serving {
+            true => Supervisor::serving(config, AfterBringUp::Enable),
+            false => Supervisor::new(config, None),
+        };
+        let (run, log) = VirtualRun::faulty(config, &fault_injector, supervisor, tapped).unwrap();
         let traces = traces.into_inner();
         let snapshot = run.snapshot();
         let sent = vec![vec![]; config.buses.len()];

@@ -5,7 +5,7 @@
 
 use std::cell::{Cell, RefCell};
 
-use takt::browser::{SimulatedArm, replay};
+use takt_panel::browser::{SimulatedArm, replay};
 
 thread_local! {
     static ANSWER: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };

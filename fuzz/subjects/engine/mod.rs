@@ -12,7 +12,7 @@ use std::collections::{BTreeSet, VecDeque};
 use std::sync::OnceLock;
 
 use takt::config::{Config, Control, DriveFamily};
-use takt::internals::controller::assemble;
+use takt::controller::assemble;
 use takt_rt::{
     AxisSnapshot, AxisTarget, BitSet, BusHealth, BusState, CallbackCycle, CallbackId, CallbackReturn,
     Command, CycleInput, CycleRecord, CycleTiming, Deadline, DriveState, Engine, Event, Frame, HostInterface,

@@ -53,7 +53,7 @@ impl Controller {
     ///
     /// # Errors
     /// As [`Controller::start`].
-    pub(crate) fn start_watched(
+    pub fn start_watched(
         config: Config,
         options: SessionOptions,
         tell: impl FnMut(&Notice) + Send + 'static,
@@ -180,8 +180,7 @@ impl Controller {
     ///
     /// # Errors
     /// [`StartFailure::Died`] if the session thread has panicked.
-    #[cfg(feature = "cli")]
-    pub(crate) fn ended(mut self) -> Result<Session, StartFailure> {
+    pub fn ended(mut self) -> Result<Session, StartFailure> {
         let joined = self.thread.take().map(JoinHandle::join);
         joined.and_then(Result::ok).map_or(Err(StartFailure::Died), |session| Ok(session?))
     }

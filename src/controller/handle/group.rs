@@ -35,7 +35,7 @@ impl Handle {
     }
 
     /// The group with this number; all axes, where the configuration has no groups.
-    pub(crate) fn group_of_number(&self, number: u8) -> GroupHandle {
+    pub fn group_of_number(&self, number: u8) -> GroupHandle {
         let axes = match self.groups().get(usize::from(number)) {
             Some(group) => group.axes.clone(),
             None => (0..self.axes().len()).collect(),

@@ -77,7 +77,6 @@ impl VirtualPace {
     }
 
     /// Hands the ports out.
-    #[cfg(any(feature = "browser", feature = "internals"))]
     pub(super) fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> T {
         with(self.lock().run.ports())
     }

@@ -19,7 +19,6 @@ use crate::controller::outcome::Outcome;
 use crate::controller::port::Port;
 use crate::controller::supervisor::AfterBringUp;
 use crate::controller::virtual_time::VirtualRun;
-#[cfg(feature = "browser")]
 use crate::journal::RunJournal;
 use crate::link::trace::Trace;
 use crate::telemetry::{EachCycle, Logger, Machine, shown_timing};
@@ -67,8 +66,7 @@ impl VirtualController {
     }
 
     /// As [`VirtualController::start`], with a logger that gets the frames of the buses and the journal as well.
-    #[cfg(feature = "browser")]
-    pub(crate) fn start_logged(
+    pub fn start_logged(
         config: &Config,
         logger: impl FnOnce(LogSide, Vec<Trace>, RunJournal) -> Logger,
     ) -> Result<Self, StartFailure> {
@@ -131,8 +129,7 @@ impl VirtualController {
     }
 
     /// Hands the ports out, to break something.
-    #[cfg(any(feature = "browser", feature = "internals"))]
-    pub(crate) fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> Option<T> {
+    pub fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> Option<T> {
         self.handle.virtual_pace().map(|pace| pace.with_ports(with))
     }
 

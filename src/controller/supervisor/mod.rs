@@ -34,7 +34,7 @@ use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
 use phases::fault_stop;
 
-pub(crate) use phases::unreleased_stop;
+pub use phases::unreleased_stop;
 
 /// A stage must be completed within this time, where every drive can be enabled at once. The engine has its own, shorter time-outs.
 const STAGE_TIMEOUT_NS: u64 = 8_000_000_000;
@@ -215,7 +215,6 @@ impl Supervisor {
     }
 
     /// The data that the drives have reported about themselves; empty before they are configured.
-    #[cfg(feature = "internals")]
     pub fn facts(&self) -> &[AxisFacts] {
         &self.facts
     }

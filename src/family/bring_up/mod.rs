@@ -25,7 +25,8 @@ pub(crate) mod planner;
 mod process_data;
 mod reported_mapping;
 mod shared_commands;
-pub(crate) mod stages;
+#[doc(hidden)]
+pub mod stages;
 
 pub use crate::procedure::Access;
 pub use axis_session::{AxisSession, StepResult};

@@ -171,7 +171,6 @@ impl BringUp {
     }
 
     /// The current or last stage.
-    #[cfg(feature = "internals")]
     pub const fn stage(&self) -> Stage {
         self.stage
     }
@@ -231,7 +230,6 @@ impl Shutdown {
     }
 
     /// The progress.
-    #[cfg(feature = "internals")]
     pub fn progress(&self) -> BringUpProgress {
         self.group.progress()
     }

@@ -39,7 +39,7 @@ const FACTS: DriveFacts = DriveFacts::standard("cia402", "CiA 402 drive");
 const PROFILE: u32 = 402;
 
 /// A drive of which nothing is known but what the standard says.
-pub(crate) fn undescribed() -> DriveFamily {
+pub fn undescribed() -> DriveFamily {
     static STANDARD: DriveFacts = FACTS;
     DriveFamily::of_family(&STANDARD)
 }

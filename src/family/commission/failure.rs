@@ -6,7 +6,8 @@ use takt_wire::canopen::object::{Object, ObjectAddress};
 use takt_wire::canopen::sdo::{AbortCode, SdoError};
 
 use crate::config::Quantity;
-use crate::procedure::Access;
+#[doc(hidden)]
+pub use crate::procedure::Access;
 
 /// Why a procedure failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

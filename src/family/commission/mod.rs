@@ -14,12 +14,15 @@
 //!
 //! `meaning` describes the frames of a CANopen node.
 
-pub(crate) mod command_value;
+#[doc(hidden)]
+pub mod command_value;
 pub(super) mod contact;
-pub(crate) mod dictionary;
+#[doc(hidden)]
+pub mod dictionary;
 pub(super) mod failure;
 pub(super) mod guarded;
-pub(crate) mod meaning;
+#[doc(hidden)]
+pub mod meaning;
 pub(super) mod motion_profile;
 mod objects;
 pub(super) mod polling;

@@ -4,7 +4,8 @@ use takt_rt::{FieldMode, Nanoseconds};
 use takt_wire::canopen::object::DataType;
 
 use super::motion_profile::MotionProfile;
-use super::target::CommandValue;
+#[doc(hidden)]
+pub use super::target::CommandValue;
 
 /// A task with one drive.
 #[derive(Clone, Debug, PartialEq)]

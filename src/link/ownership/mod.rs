@@ -118,7 +118,7 @@ impl ClaimError {
     }
 
     /// Returns `true` if [`IfOwned::TakeOver`] may help.
-    pub(crate) const fn can_be_taken_over(&self) -> bool {
+    pub const fn can_be_taken_over(&self) -> bool {
         matches!(self, Self::Held { role: Role::Master, .. })
     }
 }

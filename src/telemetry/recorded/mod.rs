@@ -3,7 +3,6 @@
 mod cause;
 mod decoder;
 mod frames;
-#[cfg(feature = "browser")]
 mod journal;
 mod records;
 mod walk;
@@ -30,7 +29,6 @@ use takt_wire::printable::printable;
 
 pub use cause::Cause;
 pub use frames::{RecordedFrame, RecordedFrames, frames};
-#[cfg(feature = "browser")]
 pub use journal::{RecordedJournal, journal, journal_in_memory};
 pub use walk::WalkError;
 
@@ -176,8 +174,7 @@ impl Recorded {
     ///
     /// # Errors
     /// See [`RecordedError`].
-    #[cfg(feature = "browser")]
-    pub(crate) fn in_memory(name: &Path, bytes: Arc<[u8]>) -> Result<Self, RecordedError> {
+    pub fn in_memory(name: &Path, bytes: Arc<[u8]>) -> Result<Self, RecordedError> {
         Self::open_span(name, None, Source::Memory(bytes))
     }
 

@@ -13,7 +13,7 @@ fn is_sdo_request(id: Id) -> bool {
 }
 
 /// The cause of a stop, without phase and category: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
-pub(crate) fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
+pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
     let axis = stop.axis().map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
     let bus =
         stop.origin.bus().map_or_else(|| "a bus".to_owned(), |bus| format!("bus {}", machine.bus_name(bus)));
@@ -238,7 +238,7 @@ fn drive_error(stop: &StopReason, machine: &Machine, code: u16) -> String {
 }
 
 /// What to do about the fault of a stop: the cure of the drive's error where it is known. `None` for a stop that was asked for.
-pub(crate) fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
+pub fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
     let fault = stop.cause.fault()?;
     let of_drive = match fault {
         Fault::DriveFault { error_code: code } | Fault::EmergencyMessage { code } => {

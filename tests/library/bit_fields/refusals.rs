@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use takt::Config;
-use takt::internals::bit_fields;
+use takt::config::bit_fields;
 use takt_wire::bit_fields::{FieldDevice, Setting, Settings};
 
 use crate::bit_fields::machine::{HOLLOW, HOLLOW_FD, MIT, problems, text};

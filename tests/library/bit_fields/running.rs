@@ -3,7 +3,6 @@
 use std::time::Duration;
 
 use takt::config::Config;
-use takt::internals::RunInside;
 use takt::sim::DriveFault;
 use takt::{Outcome, VirtualController};
 use takt_rt::OperationMode::{

@@ -1,7 +1,7 @@
 //! Whether requests and replies find room in the cycle.
 
 use takt::Config;
-use takt::internals::controller::assemble;
+use takt::controller::assemble;
 use takt::schedule::{self, BusSchedule, MessageKind, Shortfall};
 
 use crate::bit_fields::machine::{HOLLOW, HOLLOW_FD, text};

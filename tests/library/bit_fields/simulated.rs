@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use takt::config::{Axis, FrictionShape};
-use takt::internals::sim::bit_fields::{FieldSimulation, FieldSimulationParameters};
+use takt::sim::bit_fields::{FieldSimulation, FieldSimulationParameters};
 use takt::sim::plant::JointParameters;
 use takt::sim::{Defect, DriveFault, Observation, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, DriveState, Frame, Id, ReceiveBatch, Received};

@@ -4,8 +4,8 @@
 use std::f64::consts::TAU;
 
 use takt::config::Axis;
-use takt::internals::bit_fields;
-use takt::internals::sim::bit_fields::{Command, Reply};
+use takt::config::bit_fields;
+use takt::sim::bit_fields::{Command, Reply};
 use takt_rt::{
     CommandValue, CommandValues, FieldDriveParameters, Frame, FrameFormat, Id, LifeCycle, OwnFrame,
     OwnFrames, ReplyValue, ReplyValues,

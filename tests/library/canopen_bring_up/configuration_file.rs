@@ -4,7 +4,7 @@ use std::path::Path;
 
 use takt::config::Config;
 use takt::family::bring_up::BringUpError;
-use takt::internals::family::bring_up::BringUp;
+use takt::family::bring_up::stages::BringUp;
 use takt_wire::canopen::dcf::{self, DeviceConfiguration, Download};
 use takt_wire::canopen::eds;
 use takt_wire::canopen::sdo::AbortCode;

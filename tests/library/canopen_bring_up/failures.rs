@@ -1,8 +1,8 @@
 //! The message of each kind of failure.
 
 use takt::config::Control;
+use takt::family::bring_up::stages::{BringUp, Shutdown};
 use takt::family::bring_up::{FailureCause, ProbeResult};
-use takt::internals::family::bring_up::{BringUp, Shutdown};
 use takt_rt::DriveState;
 use takt_wire::canopen::emcy::{Emergency, ErrorCode, ErrorRegister};
 use takt_wire::canopen::sdo::AbortCode;

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use scripted_drive::at;
 use takt::config::{Config, Control};
 use takt::family::bring_up::BringUpTiming;
-use takt::internals::family::bring_up::{BringUp, BringUpProgress, NotConfigured, Shutdown, Stage};
+use takt::family::bring_up::stages::{BringUp, BringUpProgress, NotConfigured, Shutdown, Stage};
 use takt_rt::{DriveState, Frame, Id};
 use takt_wire::canopen::emcy::ErrorCode;
 use takt_wire::canopen::nmt::{ErrorControl, NmtState};

@@ -1,7 +1,7 @@
 //! What bounds the motion of a drive by itself is raised or refused, and read back.
 
 use takt::config::{Config, Control};
-use takt::internals::family::bring_up::BringUp;
+use takt::family::bring_up::stages::BringUp;
 
 use super::world::{World, config};
 

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use takt::config::*;
+use takt::family::bring_up::stages::{BringUp, Shutdown};
 use takt::family::bring_up::{AxisFacts, BringUpError};
-use takt::internals::family::bring_up::{BringUp, Shutdown};
 use takt_rt::Frame;
 
 use super::scripted_drive::ScriptedDrive;

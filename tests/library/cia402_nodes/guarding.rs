@@ -5,9 +5,8 @@ use std::io::Write as _;
 use takt::Config;
 use takt::Outcome;
 use takt::config::{ErrorControl, Supervision};
+use takt::family::bring_up::stages as bring_up;
 use takt::family::{Unwatched, WarningKind, stops_by_itself_after};
-use takt::internals::RunInside;
-use takt::internals::family::bring_up;
 use takt::schedule::{self, MessageKind};
 use takt_rt::{BusPort, DriveState, Id, Origin, ReceiveBatch, Rule};
 

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use takt::Config;
-use takt::internals::RunInside;
 use takt::{Outcome, VirtualRun};
 use takt_rt::Phase;
 

@@ -7,11 +7,11 @@ use takt::Config;
 use takt::family::bring_up::ProcessData;
 use takt::family::cia402::{self, Device};
 use takt::family::commission::{CommandValue, MotionProfile, MoveKind, TargetDrive, Task, ValueText};
-use takt::internals::commission::bus_session::{self, SessionEvent};
 use takt::schedule::{self, MessageKind};
 use takt::sim::DriveFault;
 use takt::{Outcome, VirtualClock};
 use takt_rt::{Frame, Id, Origin, Phase, Rule};
+use takt_tools::commission::bus_session::{self, SessionEvent};
 
 use crate::cia402_nodes::machine::{finish, moving, run_of, sheet};
 

@@ -1,7 +1,6 @@
 //! Changes of the mode of operation at run time on a simulated eRob, which must be disabled for each.
 
 use takt::Outcome;
-use takt::internals::RunInside;
 use takt_rt::OperationMode::{
     CyclicSynchronousPosition as CSP, CyclicSynchronousTorque as CST, CyclicSynchronousVelocity as CSV,
 };

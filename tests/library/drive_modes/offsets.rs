@@ -1,6 +1,5 @@
 //! What is sent beside the target: the velocity offset (object 60B1) and the torque offset (object 60B2).
 
-use takt::internals::RunInside;
 use takt_rt::{AxisPoint, MAX_AXES, Phase, PointRole, PositionPoint, Request, StreamPoint};
 
 use crate::drive_modes::wire::{counts_per_unit, id};

@@ -2,7 +2,7 @@
 
 use takt::Outcome;
 use takt::config::Config;
-use takt::internals::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::{DriveState, Phase, ProfileMove, ProfileTarget, Request, RequestId, Rule, StopCategory};
 
@@ -12,7 +12,7 @@ use crate::drive_modes::world::{World, load};
 /// One eRob that differs from what the configuration says of it.
 fn erob_with(config: Config, change: impl Fn(&mut ErobParameters)) -> (Config, Vec<SimulatedBus>) {
     let mut parameters =
-        takt::internals::sim::erob::simulated_parameters(&config.axes[0], &config.simulation);
+        takt::family::erob_canopen::simulated_parameters(&config.axes[0], &config.simulation);
     change(&mut parameters);
     let drive: Box<dyn Drive> = Box::new(ErobJoint::new(parameters));
     let rates = WireBitRates { nominal: 1_000_000, data: None };

@@ -2,8 +2,7 @@
 
 use takt::Outcome;
 use takt::config::Config;
-use takt::internals::RunInside;
-use takt::internals::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
+use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::Phase;
 
@@ -13,8 +12,7 @@ use crate::drive_modes::world::{World, load};
 /// The gantry with drives that differ from the usual ones.
 fn gantry_with(config: Config, change: impl Fn(&mut YzAimParameters)) -> World {
     let drives = config.axes.iter().map(|axis| -> Box<dyn Drive> {
-        let mut parameters =
-            takt::internals::sim::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
+        let mut parameters = takt::family::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
         change(&mut parameters);
         Box::new(YzAimJoint::new(parameters))
     });

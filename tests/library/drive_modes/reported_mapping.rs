@@ -4,7 +4,7 @@ use std::path::Path;
 
 use takt::Outcome;
 use takt::config::Config;
-use takt::internals::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
+use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_wire::canopen::dcf::DeviceConfiguration;
 use takt_wire::canopen::eds;
@@ -161,8 +161,7 @@ fn the_mapping_of_a_yz_aim_cannot_be_written() {
 /// Drives whose firmware reports the statusword before the position, unlike the manual.
 fn state_first(config: Config) -> World {
     let drives = config.axes.iter().map(|axis| -> Box<dyn Drive> {
-        let parameters =
-            takt::internals::sim::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
+        let parameters = takt::family::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
         let quirks = Quirks { reports_state_first: true, ..parameters.quirks };
         Box::new(YzAimJoint::new(YzAimParameters { quirks, ..parameters }))
     });

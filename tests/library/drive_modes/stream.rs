@@ -1,6 +1,5 @@
 //! A stream of set-points that ends in a stop.
 
-use takt::internals::RunInside;
 use takt_rt::{AxisPoint, DriveState, MAX_AXES, Phase, PointRole, Request, StopCategory, StreamPoint};
 
 use crate::drive_modes::world::{World, load};

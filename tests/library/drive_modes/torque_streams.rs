@@ -1,6 +1,5 @@
 //! Streams of torques and impedances on a simulated eRob in cyclic synchronous torque.
 
-use takt::internals::RunInside;
 use takt_rt::{AxisPoint, MAX_AXES, Phase, PointRole, Request, Rule, StopCategory, StreamPoint, StreamState};
 
 use crate::drive_modes::world::{World, load};

@@ -86,7 +86,7 @@ fn a_joint_is_at_rest_within_the_time_and_the_travel_that_check_tells() {
             before.0,
             before.1.to_degrees()
         );
-        // As src/cli/check/unattended.rs has it; a cycle more until the drive looks.
+        // As crates/cli/src/check/unattended.rs has it; a cycle more until the drive looks.
         let (longest_ms, farthest) = match mode {
             "csp" => (1e3 * (timeout_s + braking_s), 0.1 + limits.velocity * 1e-3),
             _ => (

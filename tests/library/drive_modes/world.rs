@@ -2,9 +2,8 @@
 
 use std::path::Path;
 
+use takt::channels::LogSide;
 use takt::config::{Axis, Config, ProgramMove, ProgramTarget};
-use takt::internals::RunInside;
-use takt::internals::channels::LogSide;
 use takt::sim::{Observation, SimulatedBus};
 use takt::{Outcome, VirtualRun};
 use takt_rt::{

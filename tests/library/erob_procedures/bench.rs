@@ -3,12 +3,12 @@
 use std::fmt::Debug;
 
 use takt::family::commission::{Failure, TargetDrive};
+use takt::family::erob::module::CommandedModule;
+use takt::family::erob::motion::{Motion, Profile};
+use takt::family::erob::procedure::{self, Ended, MotionFailure, Run};
 use takt::family::{self, Client, Procedure, ProcedureEvent, ProcedureSession};
-use takt::internals::family::erob::module::CommandedModule;
-use takt::internals::family::erob::motion::{Motion, Profile};
-use takt::internals::family::erob::procedure::{self, Ended, MotionFailure, Run};
-use takt::internals::procedure::ProcedureError;
-use takt::internals::sim::commanded_module::ModuleParameters;
+use takt::procedure::ProcedureError;
+use takt::sim::commanded_module::ModuleParameters;
 use takt::sim::{Defect, DriveFault, Observation};
 use takt_rt::DriveState;
 

@@ -4,9 +4,9 @@ use std::num::NonZeroU32;
 
 use takt::config::Limits;
 use takt::family::commission::{Failure, TargetDrive};
-use takt::internals::family::erob::module::CommandedModule;
-use takt::internals::family::erob::motion::{Direction, Motion, Profile};
-use takt::internals::family::erob::procedure::{self, End, MotionFailure};
+use takt::family::erob::module::CommandedModule;
+use takt::family::erob::motion::{Direction, Motion, Profile};
+use takt::family::erob::procedure::{self, End, MotionFailure};
 use takt::sim::{Defect, DriveFault};
 use takt_rt::DriveState;
 

@@ -1,15 +1,15 @@
 //! What Modbus-RTU adds.
 
-use takt::internals::family::erob::motion::{Direction, Motion};
-use takt::internals::family::erob::procedure::{End, MotionFailure};
-use takt::internals::family::erob_modbus::commands::{self, CommandFailure};
-use takt::internals::family::erob_modbus::drive::{AccessError, AccessFailure, ErobDrive};
-use takt::internals::family::erob_modbus::fault_code::FaultCode;
-use takt::internals::family::erob_modbus::registers;
-use takt::internals::procedure::{ModbusClient, ModbusSession};
-use takt::internals::sim::commanded_module::ModuleParameters;
-use takt::internals::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
-use takt::internals::sim::serial_line::{DevicesOnLine, LineDisturbance};
+use takt::family::erob::motion::{Direction, Motion};
+use takt::family::erob::procedure::{End, MotionFailure};
+use takt::family::erob_modbus::commands::{self, CommandFailure};
+use takt::family::erob_modbus::drive::{AccessError, AccessFailure, ErobDrive};
+use takt::family::erob_modbus::fault_code::FaultCode;
+use takt::family::erob_modbus::registers;
+use takt::procedure::{ModbusClient, ModbusSession};
+use takt::sim::commanded_module::ModuleParameters;
+use takt::sim::erob_modbus::{ErobModbusDrive, ErobModbusParameters, SimulatedLine};
+use takt::sim::serial_line::{DevicesOnLine, LineDisturbance};
 use takt::sim::{Defect, Drive, DriveFault, Mailbox, Observation, QueueOrder};
 use takt_rt::DriveState;
 use takt_wire::modbus::exception::ExceptionCode;

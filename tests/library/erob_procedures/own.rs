@@ -1,11 +1,11 @@
 //! What the vendor's own CAN protocol adds.
 
-use takt::internals::family::erob::motion::Motion;
-use takt::internals::family::erob::procedure::End;
-use takt::internals::family::erob_can::module;
-use takt::internals::family::erob_can::session::ErobCanSession;
-use takt::internals::sim::commanded_module::ModuleParameters;
-use takt::internals::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
+use takt::family::erob::motion::Motion;
+use takt::family::erob::procedure::End;
+use takt::family::erob_can::module;
+use takt::family::erob_can::session::ErobCanSession;
+use takt::sim::commanded_module::ModuleParameters;
+use takt::sim::erob_can::{ErobCanDrive, ErobCanParameters, ErrorForm};
 use takt::sim::{Defect, DriveFault, Observation, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, ReceiveBatch};
 use takt_wire::erob_can::client::{RequestClient, RequestError, RequestFailure, RequestTiming};

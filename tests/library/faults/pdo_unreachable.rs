@@ -5,7 +5,6 @@ use std::sync::Arc;
 use takt::Port;
 use takt::config::Config;
 use takt::faults::FaultInjector;
-use takt::internals::RunInside;
 use takt::sim::NodeState;
 use takt::{Interrupt, VirtualRun};
 use takt_rt::Phase;

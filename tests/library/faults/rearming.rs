@@ -5,8 +5,8 @@ use std::sync::Arc;
 use takt::Port;
 use takt::VirtualRun;
 use takt::config::Config;
+use takt::controller::AfterBringUp;
 use takt::faults::FaultInjector;
-use takt::internals::RunInside;
 use takt_rt::{Fault, Phase, Request, Rule, StopCause, StopReason};
 
 use crate::faults::arm::{arm, folder, scenario};
@@ -21,7 +21,7 @@ fn faulted(config: &Config, kind: &str) -> VirtualRun<Port> {
     let fault_injector = Arc::new(FaultInjector::new(scenario(&fault, config)));
     let simulated = |bus| Port::Simulated(Box::new(takt::simulated_bus(config, bus)));
     let ports = (0..config.buses.len()).map(|bus| fault_injector.wrap(bus, simulated(bus))).collect();
-    let (mut run, _) = VirtualRun::serving(config, ports).unwrap();
+    let (mut run, _) = VirtualRun::serving(config, ports, AfterBringUp::Enable).unwrap();
     run_until(&mut run, |run| {
         fault_injector.observe(&run.snapshot());
         latched(run).is_some() && run.snapshot().groups[0].phase == Phase::Disabled

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use takt::Port;
 use takt::config::Config;
 use takt::faults::FaultInjector;
-use takt::internals::RunInside;
 use takt::{Outcome, VirtualRun};
 use takt_rt::{Phase, Rule};
 

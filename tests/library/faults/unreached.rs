@@ -6,7 +6,6 @@ use std::sync::Arc;
 use takt::config::Config;
 use takt::family::{SignOfLife, Unwatched, Watchdog, stops_by_itself_after, unreached_words};
 use takt::faults::FaultInjector;
-use takt::internals::RunInside;
 use takt::sim::SimulatedBus;
 use takt::{Interrupt, Outcome, Port, VirtualRun};
 use takt_rt::{BusHealth, BusPort, Frame, Id, Phase, ReceiveBatch, Rule};

@@ -1,7 +1,7 @@
 //! Response times of messages that are queued at any moment.
 
 use proptest::prelude::*;
-use takt::internals::schedule::{Message, response_time};
+use takt::schedule::response_time::{Message, response_time};
 use takt::sim;
 use takt_rt::{Frame, FrameKind, Id};
 use takt_wire::frame_time::BitRates;

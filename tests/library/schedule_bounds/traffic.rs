@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap, VecDeque};
 
-use takt::internals::sim::Medium;
+use takt::sim::medium::Medium;
 use takt::sim::{Mailbox, QueueOrder, WireBitRates};
 use takt_rt::{Frame, Id};
 

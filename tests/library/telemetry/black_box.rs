@@ -1,8 +1,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use takt::internals::channels::RtSide;
-use takt::internals::link::trace::{TracedPort, traced};
+use takt::channels::RtSide;
+use takt::link::trace::{TracedPort, traced};
 use takt::telemetry::{BlackBoxOptions, Incident, LogSummary, Logger, LoggerOptions, Notice};
 use takt_rt::{
     BusHealth, BusPort, BusState, CycleRecord, DriveState, EventKind, Frame, HostInterface, Id, Phase,

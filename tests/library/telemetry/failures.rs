@@ -1,6 +1,6 @@
 use std::fs::{self, OpenOptions};
 
-use takt::internals::link::trace::{TracedPort, traced};
+use takt::link::trace::{TracedPort, traced};
 use takt::telemetry::{Logger, Notice, RecordingDestination};
 use takt_rt::{BusHealth, BusPort, EventKind, Frame, HostInterface, Id, ReceiveBatch, RequestId};
 

@@ -1,7 +1,7 @@
 use std::fs;
 use std::path::Path;
 
-use takt::internals::link::trace::traced;
+use takt::link::trace::traced;
 use takt::telemetry::{Logger, LoggerOptions, RecordingDestination, RecordingOptions};
 use takt_rt::{
     BusHealth, BusPort, EventKind, Frame, HostInterface, Id, Phase, ReceiveBatch, Received, RejectReason,

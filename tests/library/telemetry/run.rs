@@ -3,7 +3,7 @@
 use std::io::{self, Write};
 use std::sync::{Arc, Mutex};
 
-use takt::internals::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
+use takt::channels::{ChannelSizes, GroupStream, HostSide, LogSide, RtSide, channels};
 use takt::telemetry::{
     AxisDescription, BusDescription, Logger, LoggerOptions, Machine, Notice, RecordingDestination,
     RecordingOptions, SetPointMagnitudes, Unit, WallClock,

@@ -1,6 +1,6 @@
 use std::fs;
 
-use takt::internals::telemetry::LoggerThread;
+use takt::telemetry::LoggerThread;
 use takt::telemetry::{Logger, Notice, RecordingDestination};
 use takt_rt::{EventKind, HostInterface, RequestId};
 

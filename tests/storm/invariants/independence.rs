@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use takt::config::Config;
-use takt::internals::controller::assemble::slot_plan;
+use takt::controller::assemble::slot_plan;
 use takt_rt::{Event, EventKind, GroupSnapshot, Origin, Phase, StopCategory, StopReason};
 
 use super::Seen;

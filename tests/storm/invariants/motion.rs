@@ -2,7 +2,7 @@
 //! reach any more has no torque in the time that is stated.
 
 use takt::config::Control;
-use takt::internals::controller::assemble::slot_plan;
+use takt::controller::assemble::slot_plan;
 use takt_rt::controlword;
 
 use super::Seen;

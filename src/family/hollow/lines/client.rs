@@ -8,10 +8,6 @@ use crate::procedure::{Client, ProcedureSession};
 
 /// The master's side of a serial line with one device.
 #[derive(Debug, Default)]
-#[cfg_attr(
-    not(feature = "internals"),
-    allow(unnameable_types, reason = "tasks on a line name it, and nobody outside names those tasks")
-)]
 pub struct LineClient {
     outgoing: VecDeque<Vec<u8>>,
     received: VecDeque<u8>,

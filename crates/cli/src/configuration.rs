@@ -1,0 +1,63 @@
+//! Reading a configuration for a subcommand, and the options that change it.
+
+use std::path::Path;
+use std::str::FromStr;
+use std::time::Duration;
+
+use takt::config::{Config, ConfigSources};
+
+use super::usage_error::UsageError;
+
+/// `--bus NAME=INTERFACE`
+#[derive(Clone, Debug)]
+pub struct BusOverride {
+    name: String,
+    interface: String,
+}
+
+impl FromStr for BusOverride {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text.split_once('=') {
+            Some((name, interface)) if !name.is_empty() && !interface.is_empty() => {
+                Ok(Self { name: name.to_owned(), interface: interface.to_owned() })
+            }
+            _ => Err("write it as NAME=INTERFACE, for example base=can0".to_owned()),
+        }
+    }
+}
+
+/// Reads a configuration and applies the overrides.
+pub fn load(path: &Path, buses: &[BusOverride]) -> Result<Config, UsageError> {
+    load_with_sources(path, buses).map(|(config, _)| config)
+}
+
+/// The same, with the files that it was made of.
+pub fn load_with_sources(path: &Path, buses: &[BusOverride]) -> Result<(Config, ConfigSources), UsageError> {
+    let (mut config, mut sources) = ConfigSources::load(path)?;
+    for (index, bus) in buses.iter().enumerate() {
+        if buses.iter().take(index).any(|earlier| earlier.name == bus.name) {
+            return Err(
+                format!("--bus {}={}: this bus has been connected already", bus.name, bus.interface).into()
+            );
+        }
+        config
+            .override_interface(&bus.name, &bus.interface)
+            .map_err(|error| format!("--bus {}={}: {error}", bus.name, bus.interface))?;
+        sources.interfaces.push((bus.name.clone(), bus.interface.clone()));
+    }
+    Ok((config, sources))
+}
+
+/// Longer than thirty years is a slip, and would not fit the clock in nanoseconds.
+const LONGEST_S: f64 = 1e9;
+
+/// A positive number of seconds.
+pub fn seconds(text: &str) -> Result<Duration, String> {
+    let number: f64 = text.parse().map_err(|_| format!("`{text}` is not a number of seconds"))?;
+    match Duration::try_from_secs_f64(number) {
+        Ok(duration) if !duration.is_zero() && number <= LONGEST_S => Ok(duration),
+        _ => Err(format!("a duration is a number of seconds above 0, {LONGEST_S} at most")),
+    }
+}
