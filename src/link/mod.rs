@@ -6,6 +6,7 @@ mod converter;
 #[cfg(target_os = "linux")]
 #[doc(hidden)]
 pub mod interface;
+#[cfg(target_os = "linux")]
 #[doc(hidden)]
 pub mod modbus_line;
 #[cfg(target_os = "linux")]

@@ -9,13 +9,14 @@
 //! ```
 //!
 //! All of them are ordinary threads beside the real-time one, and call the controller as the own program's threads do, by
-//! [`RunningController`]. A stop is taken on the first thread and waits for nobody.
+//! [`RunningController`](takt::RunningController). A stop is taken on the first thread and waits for nobody.
 //!
 //! In the order to read: `access` (who may ask), `pages` (who is there, who commands), `command`, `motions` and `motion` (what is asked and
 //! how it ends), `view` (what is shown), `gate` (what both kinds of panel share), `server` (the routes), `connections` (sockets and their bounds).
 //! Commissioning is `bench`: one thread more, `takt-bench`, which owns the buses.
 //! Without a server, `command`, `motions` and `view` serve a page of the simulated arm (the folder `browser`).
 #![deny(unsafe_code)]
+#![cfg_attr(not(feature = "server"), allow(dead_code, reason = "the pages of others need a server"))]
 #![allow(
     missing_docs,
     unnameable_types,

@@ -25,7 +25,7 @@ pub trait Stage {
     /// Lets some time pass. Returns whether the run goes on: it ends by itself, or because it is interrupted.
     fn pass(&mut self) -> bool;
 
-    /// Begins a move of a group to rest, within [`APPROACH_SCALE`]. The target has an entry for each axis of the controller.
+    /// Begins a move of a group to rest, within `APPROACH_SCALE`. The target has an entry for each axis of the controller.
     ///
     /// # Errors
     /// See [`PlayError`].
