@@ -3,6 +3,7 @@
 mod compile;
 mod read;
 mod read_scan;
+mod values;
 
 pub use compile::{check_command, check_reply, compile, most, position_range, step};
 pub use read::{load, parse};

@@ -7,20 +7,11 @@ use takt_rt::{BusState, MAX_BUSES, Nanoseconds, Received, TrajectoryId, Wake};
 
 use super::clock::ClockAnswer;
 use super::host_words::{put_entry, take_entry};
-use super::port::PortState;
+use super::port::{PortEntry, PortState};
 use crate::channels::{GivenTrajectory, GroupAxes, JournalEntry};
 use crate::link::trace::{PortAnswer, PortMark, Traced};
 use crate::packet::{Malformed, Put, Take};
 use crate::trajectory::Trajectory;
-
-/// What a port has answered.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum PortEntry {
-    /// A frame that it has handed over.
-    Received(Received),
-    /// What is out of the ordinary.
-    Mark(PortMark),
-}
 
 /// The state of a run between two cycles, so that its journal need not begin with the first one.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

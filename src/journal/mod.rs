@@ -21,9 +21,9 @@ mod port;
 mod rerun;
 
 pub use clock::{ClockAnswer, ClockJournal, JournaledClock, ReplayClock, clock_journal};
-pub use format::{Checkpoint, Encoder, Journal, JournalDefect, PortEntry};
+pub use format::{Checkpoint, Encoder, Journal, JournalDefect};
 pub use host::ReplayHost;
-pub use port::{PortState, ReplayPort};
+pub use port::{PortEntry, PortState, ReplayPort};
 pub use rerun::{Rerun, RerunParts};
 
 use std::collections::VecDeque;

@@ -4,9 +4,17 @@ use std::collections::VecDeque;
 
 use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Received};
 
-use super::format::PortEntry;
 use super::pop_front_if;
 use crate::link::trace::{PortAnswer, PortMark};
+
+/// What a port has answered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PortEntry {
+    /// A frame that it has handed over.
+    Received(Received),
+    /// What is out of the ordinary.
+    Mark(PortMark),
+}
 
 /// A port that answers as it did, found by the time for which it is asked.
 #[derive(Clone, Debug, Default)]

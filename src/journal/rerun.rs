@@ -2,8 +2,8 @@
 
 use takt_rt::{CheckpointError, Cycle, CycleRecord, Engine, Event, Flow, Grid, Nanoseconds, SlotPlan};
 
-use super::format::{Checkpoint, Encoder, Journal, PortEntry};
-use super::{ClockAnswer, ReplayClock, ReplayHost, ReplayPort};
+use super::format::{Checkpoint, Encoder, Journal};
+use super::{ClockAnswer, PortEntry, ReplayClock, ReplayHost, ReplayPort};
 use crate::channels::ChannelSizes;
 use crate::link::trace::{Traced, TracedFrame};
 

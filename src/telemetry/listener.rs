@@ -3,9 +3,20 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, OnceLock};
 
+use takt_rt::Event;
+
 use super::black_box::Incident;
-use super::logger::Notice;
 use crate::channels::panic_message;
+
+/// Something that people may want to know at once.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Notice {
+    /// An event; [`event_words`](super::event_words) gives its text.
+    Event(Event),
+    /// A file can no longer be written: which one, and why. Each failure is reported once. The motion goes on.
+    NotWritten(String),
+}
 
 /// A function that is notified of events and failures.
 pub type Notify = Box<dyn FnMut(&Notice) + Send>;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 
 use mcap::McapError;
-use takt_rt::{CycleRecord, Event, Nanoseconds};
+use takt_rt::{CycleRecord, Nanoseconds};
 use takt_wire::printable::printable_path;
 
 use super::announce;
@@ -17,7 +17,7 @@ use super::destination::RecordingDestination;
 use super::frame_feed::FrameFeed;
 use super::history::OnBus;
 use super::journal_keeper::JournalKeeper;
-use super::listener::{Listener, Notify};
+use super::listener::{Listener, Notice, Notify};
 use super::loop_timing::ShownTimingWriter;
 use super::machine::Machine;
 use super::missed_slots::MissedSlotsSoFar;
@@ -51,16 +51,6 @@ pub struct LoggerOptions {
     pub black_box: Option<BlackBoxOptions>,
     /// The frames of the buses, for the candump log and the black box.
     pub traces: Vec<Trace>,
-}
-
-/// Something that people may want to know at once.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Notice {
-    /// An event; [`event_words`](super::event_words) gives its text.
-    Event(Event),
-    /// A file can no longer be written: which one, and why. Each failure is reported once. The motion goes on.
-    NotWritten(String),
 }
 
 /// The result of a logger.

@@ -59,8 +59,8 @@ pub use files_in_memory::{FileInMemory, FilesInMemory};
 pub use frame_feed::{FrameFeed, FrameReader};
 #[doc(hidden)]
 pub use history::OnBus;
-pub use listener::Notify;
-pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions, Notice};
+pub use listener::{Notice, Notify};
+pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions};
 pub(crate) use loop_timing::{LOOP_TIMING_WORDS, ShownTiming, newest_timing, shown_timing};
 pub use loop_timing::{LoopTiming, TIME_BOUNDS_NS, TimeCounts};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};

@@ -8,16 +8,17 @@ use takt_rt::{
 };
 use takt_wire::bit_fields::{
     Amount, BesideTargetKind, DescribedFrames, DescribedHeartbeat, DescribedLifeCycle, DescribedScale,
-    Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, IdExpression,
-    PayloadByte, ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
+    Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, PayloadByte,
+    ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
 };
 use toml::de::DeTable;
 
 use super::compile::{check_command, check_reply};
 use super::read_scan;
+use super::values::{expression, two};
 use crate::config::ConfigError;
 use crate::config::bounds::Bounds;
-use crate::config::data_file::{self, each, each_of_some, optional};
+use crate::config::data_file::{self, each_of_some, optional};
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
@@ -221,21 +222,6 @@ fn states(mut section: Section<'_>) -> Option<StateCodes> {
     Some(StateCodes { stopped: stopped?, running: running? })
 }
 
-/// Two whole numbers, the lower one first.
-pub(super) fn two(entry: &Entry<'_>, allowed: std::ops::Range<i64>) -> Option<(i64, i64)> {
-    let numbers = each(entry, |entry| entry.integer(allowed.clone()))?;
-    match numbers.as_slice() {
-        [low, high] if low <= high => Some((*low, *high)),
-        _ => {
-            entry.report_range(
-                "a list of something else".to_owned(),
-                "two numbers, the lower one first".to_owned(),
-            );
-            None
-        }
-    }
-}
-
 fn reply_moment(root: &mut Section<'_>) -> Option<ReplyMoment> {
     let mut time = |key| root.get(key).map(|entry: Entry<'_>| entry.nanoseconds(0.0..=LONGEST_S));
     match (time("reply_delay"), time("reply_period")) {
@@ -281,16 +267,6 @@ fn frame<V: FieldValue>(
         order: order?,
         fields: fields.into_iter().collect::<Option<_>>()?,
     })
-}
-
-pub(super) fn expression(entry: &Entry<'_>, is_extended: bool) -> Option<IdExpression> {
-    let text = entry.text()?;
-    let read = IdExpression::parse(text, is_extended);
-    if read.is_none() {
-        let allowed = "a sum of \"motor\", \"master\" and numbers: \"motor\", \"master\", \"motor + 0x100\", \"32 * motor + 7\"";
-        entry.report_range(format!("{text:?}"), allowed.to_owned());
-    }
-    read
 }
 
 fn field<V: Copy>(mut section: Section<'_>, values: &[(&'static str, V)]) -> Option<FieldDescription<V>> {

@@ -6,7 +6,7 @@ use takt_wire::bit_fields::{
     RegisterScan, Setting,
 };
 
-use super::read::{expression, two};
+use super::values::{expression, two};
 use crate::config::data_file::each;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;

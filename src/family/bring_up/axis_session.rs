@@ -20,7 +20,7 @@ use super::axis_units::SiUnit;
 use super::check::Check;
 use super::facts::AxisFacts;
 use super::failure::{Content, FailureCause};
-use super::stages::BringUpTiming;
+use super::timing::BringUpTiming;
 use crate::config::{Axis, Config};
 use crate::procedure::{Access, CanopenSession, POLL_NS};
 

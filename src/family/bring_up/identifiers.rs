@@ -19,20 +19,23 @@ const PREDEFINED: u8 = 4;
 const PDO_IDS: std::ops::RangeInclusive<u32> = 0x181..=0x57F;
 const HIGHEST_NODE: u8 = 126;
 
-/// The process data of an axis among the others of its bus.
-pub fn process_data(axis: &Axis, config: &Config) -> ProcessData {
-    if axis.drive.node_axis == 1 {
-        return shared_commands::process_data(axis, config);
-    }
-    let mut taken = Taken::by_first_axes(axis.bus, config);
-    let further = config.axes.iter().filter(|other| other.bus == axis.bus && other.drive.node_axis > 1);
-    for other in further {
-        let data = taken.assign(other, family::of(&other.drive).process_data(other));
-        if (other.node, other.drive.node_axis) == (axis.node, axis.drive.node_axis) {
-            return data;
+impl ProcessData {
+    /// Returns the process data of an axis of a configuration. If the drive's own mapping is used, it is known only after the drive has
+    /// reported it ([`ProcessData::as_reported`]).
+    pub fn of(axis: &Axis, config: &Config) -> Self {
+        if axis.drive.node_axis == 1 {
+            return shared_commands::process_data(axis, config);
         }
+        let mut taken = Taken::by_first_axes(axis.bus, config);
+        let further = config.axes.iter().filter(|other| other.bus == axis.bus && other.drive.node_axis > 1);
+        for other in further {
+            let data = taken.assign(other, family::of(&other.drive).process_data(other));
+            if (other.node, other.drive.node_axis) == (axis.node, axis.drive.node_axis) {
+                return data;
+            }
+        }
+        family::of(&axis.drive).process_data(axis)
     }
-    family::of(&axis.drive).process_data(axis)
 }
 
 /// What is taken on a bus.

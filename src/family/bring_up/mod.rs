@@ -27,6 +27,7 @@ mod reported_mapping;
 mod shared_commands;
 #[doc(hidden)]
 pub mod stages;
+mod timing;
 
 pub use crate::procedure::Access;
 pub use axis_session::{AxisSession, StepResult};
@@ -37,6 +38,6 @@ pub use failure::{AxisFailure, BringUpError, Content, FailureCause, ProbeResult}
 pub use network_state::RESTART_STEP;
 pub use process_data::{PdoPlan, ProcessData, Reply, first_pdo};
 pub use reported_mapping::MappingProblem;
-pub use stages::BringUpTiming;
 pub(crate) use stages::{BringUp, Shutdown, overwritten, refused_values};
 pub use takt_wire::canopen::pdo_reader::PdoReadError;
+pub use timing::BringUpTiming;

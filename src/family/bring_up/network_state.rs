@@ -7,7 +7,7 @@ use takt_wire::canopen::sdo::{SdoError, Transfer};
 
 use super::axis_session::{AxisSession, StepResult, object_of};
 use super::failure::{FailureCause, ProbeResult};
-use super::stages::BringUpTiming;
+use super::timing::BringUpTiming;
 use crate::config::Supervision;
 use crate::family;
 use crate::procedure::Access;

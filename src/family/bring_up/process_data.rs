@@ -5,12 +5,11 @@ use takt_rt::{
 };
 use takt_wire::canopen::objects::PdoDirection;
 
-use super::identifiers;
 use super::mapped_objects::{
     CONTROLWORD, CURRENT, ERROR_CODE, OPERATION_MODE, OPERATION_MODE_DISPLAY, POSITION, STATUSWORD,
     TARGET_POSITION, TARGET_TORQUE, TARGET_VELOCITY, TORQUE, TORQUE_OFFSET, VELOCITY, VELOCITY_OFFSET,
 };
-use crate::config::{Axis, Config, Control, Feedback};
+use crate::config::{Axis, Control, Feedback};
 
 const PDO_BITS: u32 = 64;
 /// A placeholder for one byte of a PDO with unknown content.
@@ -86,12 +85,6 @@ pub struct ProcessData {
 }
 
 impl ProcessData {
-    /// The process data of an axis of a configuration. If the drive's own mapping is used, it is known only after the drive has
-    /// reported it ([`ProcessData::as_reported`]).
-    pub fn of(axis: &Axis, config: &Config) -> Self {
-        identifiers::process_data(axis, config)
-    }
-
     /// All of its PDOs.
     pub fn all(&self) -> impl Iterator<Item = &PdoPlan> {
         self.commands.iter().chain(&self.feedback).chain(&self.unused)

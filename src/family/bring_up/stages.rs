@@ -16,7 +16,6 @@ use std::task::{Context, Waker};
 
 use takt_rt::{Frame, Nanoseconds};
 use takt_wire::canopen::object::ObjectAddress;
-use takt_wire::canopen::sdo;
 use takt_wire::printable::printable_path;
 use tracing::{debug, error, info};
 
@@ -24,6 +23,7 @@ use super::axis_session::{AxisSession, DryRun, OnFailure, RefusedValue, StepFail
 use super::facts::AxisFacts;
 use super::failure::{AxisFailure, BringUpError, FailureCause};
 use super::network_state::RESTART_STEP;
+use super::timing::BringUpTiming;
 use crate::config::{Axis, Config, ProblemKind};
 use crate::family::{self, SettingUp};
 use crate::procedure::{CanopenClient, CanopenSession, Parallel, Procedure};
@@ -33,31 +33,6 @@ const BRING_UP: &str = "takt::bring_up";
 
 /// Number of restarts of a drive after which its configuration gives up.
 const MAX_RESTARTS: u8 = 3;
-
-/// The timeouts of bring-up and shutdown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BringUpTiming {
-    /// Timeout of a node's boot-up after a reset. It includes the boot time after power-up (8 s for some drives).
-    pub boot_up_timeout_ns: Nanoseconds,
-    /// Interval between two resets of a node that does not boot.
-    pub reset_repeat_ns: Nanoseconds,
-    /// Timeout of a mode change, a state change or standstill.
-    pub confirm_timeout_ns: Nanoseconds,
-    /// SDO reply timeout and retries.
-    pub sdo: sdo::SdoTiming,
-}
-
-impl Default for BringUpTiming {
-    fn default() -> Self {
-        Self {
-            boot_up_timeout_ns: 12_000_000_000,
-            // Not a divisor of 8 s: a drive with that boot time would be reset again just after it has booted.
-            reset_repeat_ns: 700_000_000,
-            confirm_timeout_ns: 2_000_000_000,
-            sdo: sdo::SdoTiming::default(),
-        }
-    }
-}
 
 /// The stage of a [`BringUp`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,7 +2,6 @@
 
 use crate::config::{Quantity, QuantityError};
 
-use super::dictionary::integer;
 use super::target::CommandValue;
 
 /// Why a text is not a valid value.
@@ -94,6 +93,18 @@ pub fn in_units_of_drive<U: Copy + PartialEq>(units: &[(&str, U, f64)], unit: U,
     Some((number * factor).round() as i64)
 }
 
+/// Parses a whole number, decimal or hexadecimal (`0x…`), with optional `_` between digits.
+pub fn integer(text: &str) -> Option<i64> {
+    let text = text.trim().replace('_', "").replace('−', "-");
+    let (is_negative, digits) = text.strip_prefix('-').map_or((false, text.as_str()), |rest| (true, rest));
+    let value = match digits.strip_prefix("0x").or(digits.strip_prefix("0X")) {
+        Some(hexadecimal) => i64::from_str_radix(hexadecimal, 16).ok()?,
+        None if digits.starts_with(|first: char| first.is_ascii_digit()) => digits.parse().ok()?,
+        None => return None,
+    };
+    Some(if is_negative { -value } else { value })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -114,5 +125,14 @@ mod tests {
         assert!(words("five", false).contains("`five` is no angle"));
         assert!(words("inf rad", false).contains("is no angle"));
         assert!(words("1.5", true).contains("is no whole number"));
+    }
+
+    #[test]
+    fn whole_numbers_are_decimal_or_hexadecimal() {
+        assert_eq!(integer("-0x10"), Some(-16));
+        assert_eq!(integer("1_000"), Some(1000));
+        assert_eq!(integer("--1"), None);
+        assert_eq!(integer("1.5"), None);
+        assert_eq!(integer(""), None);
     }
 }

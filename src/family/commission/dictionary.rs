@@ -5,6 +5,7 @@ use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
 use crate::config::{DriveFamily, Quantity};
 use crate::family;
 
+use super::command_value::{integer, parse};
 use super::failure::Failure;
 use super::target::TargetDrive;
 
@@ -139,8 +140,7 @@ impl ObjectEntry {
                 return Err(unsuitable(reason));
             }
         };
-        let value = super::command_value::parse(text, quantity, false)
-            .map_err(|error| unsuitable(error.to_string()))?;
+        let value = parse(text, quantity, false).map_err(|error| unsuitable(error.to_string()))?;
         Ok(match self.unit {
             ObjectUnit::Position => target.position_counts(value),
             ObjectUnit::Distance => target.distance_counts(value).abs(),
@@ -254,18 +254,6 @@ fn address(text: &str) -> Option<ObjectAddress> {
     Some(ObjectAddress::new(u16::try_from(index).ok()?, u8::try_from(hexadecimal(subindex)?).ok()?))
 }
 
-/// Parses a whole number, decimal or hexadecimal (`0x…`), with optional `_` between digits.
-pub fn integer(text: &str) -> Option<i64> {
-    let text = text.trim().replace('_', "").replace('−', "-");
-    let (is_negative, digits) = text.strip_prefix('-').map_or((false, text.as_str()), |rest| (true, rest));
-    let value = match digits.strip_prefix("0x").or(digits.strip_prefix("0X")) {
-        Some(hexadecimal) => i64::from_str_radix(hexadecimal, 16).ok()?,
-        None if digits.starts_with(|first: char| first.is_ascii_digit()) => digits.parse().ok()?,
-        None => return None,
-    };
-    Some(if is_negative { -value } else { value })
-}
-
 /// The data type with this name.
 pub fn data_type(name: &str) -> Option<DataType> {
     Some(match name.to_lowercase().as_str() {
@@ -308,14 +296,5 @@ mod tests {
         let ambiguous = find(&family::EROB_CANOPEN, "profile").unwrap_err().to_string();
         assert!(ambiguous.contains("6081:00 (profile velocity)"), "{ambiguous}");
         assert!(find(&family::EROB_CANOPEN, "no such thing").is_err());
-    }
-
-    #[test]
-    fn whole_numbers_are_decimal_or_hexadecimal() {
-        assert_eq!(integer("-0x10"), Some(-16));
-        assert_eq!(integer("1_000"), Some(1000));
-        assert_eq!(integer("--1"), None);
-        assert_eq!(integer("1.5"), None);
-        assert_eq!(integer(""), None);
     }
 }

@@ -4,6 +4,7 @@ use serde_json::json;
 use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
 use takt_wire::canopen::sdo::Uploaded;
 
+use super::command_value;
 use super::contact;
 use super::dictionary::{self, ObjectEntry, Permission, SelectedObject};
 use super::failure::Failure;
@@ -75,7 +76,7 @@ pub fn to_write(
     };
     let value = match entry {
         Some(entry) => entry.parse(target, &value.text, value.is_raw)?,
-        None => dictionary::integer(&value.text)
+        None => command_value::integer(&value.text)
             .ok_or_else(|| Failure::Unsuitable(format!("`{}` is no whole number", value.text)))?,
     };
     if entry.is_some_and(|entry| entry.permission == Permission::Read) {

@@ -6,7 +6,7 @@ use std::fmt;
 use takt_rt::Nanoseconds;
 use takt_wire::erob_can::parameter::Parameter;
 
-use super::motion::Motion;
+use super::motion::{Motion, Stop};
 use crate::family::commission::{Failure, TargetDrive};
 use crate::procedure::{AxisReading, Client, ProcedureSession};
 
@@ -72,19 +72,6 @@ pub trait CommandedModule {
 
     /// Tells the joint to come to rest.
     fn stop(&self, stop: Stop) -> impl Future<Output = Result<(), Self::Error>>;
-}
-
-/// What is to be stopped: it says how.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
-    /// A motion of position control, with the profile deceleration.
-    Move,
-    /// A motion to and fro.
-    Reciprocation,
-    /// Velocity control: its set-point.
-    Velocity,
-    /// Torque control: its set-point. Friction stops the joint.
-    Torque,
 }
 
 /// What a module does.

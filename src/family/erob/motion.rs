@@ -5,8 +5,6 @@ use std::num::NonZeroU32;
 
 use takt_rt::Nanoseconds;
 
-use super::module::Stop;
-
 /// The profile of position and velocity control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Profile {
@@ -68,6 +66,19 @@ pub enum Direction {
     Forward,
     /// Towards lower counts.
     Backward,
+}
+
+/// What is to be stopped: it says how.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// A motion of position control, with the profile deceleration.
+    Move,
+    /// A motion to and fro.
+    Reciprocation,
+    /// Velocity control: its set-point.
+    Velocity,
+    /// Torque control: its set-point. Friction stops the joint.
+    Torque,
 }
 
 /// What the set-point of a module means.

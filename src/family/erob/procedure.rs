@@ -7,8 +7,8 @@ use std::fmt;
 
 use takt_rt::Nanoseconds;
 
-use super::module::{CommandedModule, MotionStatus, ReachedStatus, Status, Stop};
-use super::motion::{Motion, OperatingMode, Profile};
+use super::module::{CommandedModule, MotionStatus, ReachedStatus, Status};
+use super::motion::{Motion, OperatingMode, Profile, Stop};
 use super::{AGAIN_NS, ENABLED_FROM_NS, ENABLING_NS};
 use crate::family::commission::{Failure, TargetDrive};
 use crate::procedure::AxisReading;

@@ -6,7 +6,7 @@ use takt_wire::erob_can::parameter::{Access, Parameter, Unit, Values};
 use super::module::CommandedModule;
 use crate::config::Quantity;
 use crate::family::commission::command_value;
-use crate::family::commission::dictionary::integer;
+use crate::family::commission::command_value::integer;
 use crate::family::commission::{Failure, NamedEntry, Report, TargetDrive, ValueText};
 
 /// Units that a number may have beside those of the joint, each with the unit on the wire and how many of it they are.

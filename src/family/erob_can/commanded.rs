@@ -6,8 +6,8 @@ use takt_wire::erob_can::entries::{self, Entry};
 
 use super::session::ErobCanSession;
 use crate::family::commission::{AnsweredProtocol, Failure, TargetDrive};
-use crate::family::erob::module::{CommandedModule, Status, Stop};
-use crate::family::erob::motion::{Motion, OperatingMode};
+use crate::family::erob::module::{CommandedModule, Status};
+use crate::family::erob::motion::{Motion, OperatingMode, Stop};
 use crate::procedure::ProcedureSession;
 
 /// How long to wait for an answer of CANopen firmware.

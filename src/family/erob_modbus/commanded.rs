@@ -7,8 +7,8 @@ use super::drive::{AccessError, ErobDrive};
 use super::register::Register;
 use super::registers;
 use crate::family::commission::{Failure, TargetDrive};
-use crate::family::erob::module::{CommandedModule, Status, Stop};
-use crate::family::erob::motion::Motion;
+use crate::family::erob::module::{CommandedModule, Status};
+use crate::family::erob::motion::{Motion, Stop};
 use crate::procedure::{ModbusClient, ModbusSession};
 
 /// 1 ms in the unit of the dwell time is 20.

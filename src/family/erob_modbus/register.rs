@@ -5,8 +5,6 @@ use std::fmt;
 use arrayvec::ArrayVec;
 use takt_wire::erob_can::parameter::{Access, Parameter, Unit, ValueError, Values};
 
-use super::registers;
-
 /// A register, or two that make one number of 32 bits: the high word has the lower address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Register {
@@ -84,55 +82,6 @@ impl Register {
             _ => None,
         }
     }
-
-    /// Returns `true` if it makes no difference how often a value is written: not for commands that act anew each time.
-    pub fn may_be_repeated(&self) -> bool {
-        use registers::{CLEAR_FAULT, RESET_ENCODER, SAVE, START_MOTION};
-        ![START_MOTION, CLEAR_FAULT, SAVE, RESET_ENCODER].contains(self)
-    }
-}
-
-impl Parameter for Register {
-    const KIND: &'static str = "register";
-    const EXAMPLE: &'static str = "0x0066";
-
-    fn all() -> &'static [Self] {
-        &registers::ALL
-    }
-
-    /// `0x0066`
-    fn at(address: &str) -> Option<Self> {
-        let digits = address.strip_prefix("0x").or(address.strip_prefix("0X"))?;
-        registers::find(u16::from_str_radix(digits, 16).ok()?).copied()
-    }
-
-    fn address(&self) -> String {
-        format!("0x{:04X}", self.address)
-    }
-
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn access(&self) -> Access {
-        self.access
-    }
-
-    fn unit(&self) -> Unit {
-        self.unit
-    }
-
-    fn values(&self) -> Values {
-        self.values
-    }
-
-    fn range(&self) -> (i64, i64) {
-        self.number.range()
-    }
-
-    fn note(&self) -> &'static str {
-        self.note
-    }
 }
 
 impl fmt::Display for Register {
@@ -149,6 +98,7 @@ const fn double(high: u16, low: u16) -> u32 {
 mod tests {
     use proptest::prelude::*;
 
+    use super::super::registers;
     use super::*;
 
     proptest! {

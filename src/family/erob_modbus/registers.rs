@@ -1,13 +1,63 @@
 //! The table of registers (eRob Modbus-RTU manual 1.5, tables 4-1 and 5-1 to 5-6). Where the manual says nothing of a sign, the reading
 //! is argued in its companion table (`tests/vectors/erob-modbus-registers.csv`).
 
-use takt_wire::erob_can::parameter::{Access, Unit, Values};
+use takt_wire::erob_can::parameter::{Access, Parameter, Unit, Values};
 
 use super::register::{Number, Register};
 
 /// The register at an address, if the table has it.
 pub fn find(address: u16) -> Option<&'static Register> {
     ALL.iter().find(|register| register.address == address)
+}
+
+impl Register {
+    /// Returns `true` if it makes no difference how often a value is written: not for commands that act anew each time.
+    pub fn may_be_repeated(&self) -> bool {
+        ![START_MOTION, CLEAR_FAULT, SAVE, RESET_ENCODER].contains(self)
+    }
+}
+
+impl Parameter for Register {
+    const KIND: &'static str = "register";
+    const EXAMPLE: &'static str = "0x0066";
+
+    fn all() -> &'static [Self] {
+        &ALL
+    }
+
+    /// `0x0066`
+    fn at(address: &str) -> Option<Self> {
+        let digits = address.strip_prefix("0x").or(address.strip_prefix("0X"))?;
+        find(u16::from_str_radix(digits, 16).ok()?).copied()
+    }
+
+    fn address(&self) -> String {
+        format!("0x{:04X}", self.address)
+    }
+
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn access(&self) -> Access {
+        self.access
+    }
+
+    fn unit(&self) -> Unit {
+        self.unit
+    }
+
+    fn values(&self) -> Values {
+        self.values
+    }
+
+    fn range(&self) -> (i64, i64) {
+        self.number.range()
+    }
+
+    fn note(&self) -> &'static str {
+        self.note
+    }
 }
 
 const fn read(address: u16, name: &'static str, unit: Unit) -> Register {
@@ -305,7 +355,6 @@ pub static ALL: [Register; 60] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt_wire::erob_can::parameter::Parameter as _;
 
     #[test]
     fn the_registers_stand_in_the_order_of_their_addresses_and_none_overlaps_another() {

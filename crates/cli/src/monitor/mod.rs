@@ -6,6 +6,7 @@ mod live;
 mod log_file;
 mod session;
 mod statistics;
+mod watched_bus;
 
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};

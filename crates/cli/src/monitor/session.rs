@@ -12,10 +12,11 @@ use takt_wire::bus_log::{Direction, LogWriter, LoggedFrame};
 use super::TimeStyle;
 use super::line::{Line, LineStyle};
 use super::statistics;
+use super::watched_bus::WatchedBus;
 use crate::exit::Exit;
 use crate::print::Collected;
 use takt::config::{Config, Interface};
-use takt_tools::monitor::{BusDecoder, BusStatistics, Decoded, FrameFilter, NamedDrive};
+use takt_tools::monitor::{BusDecoder, BusStatistics, FrameFilter, NamedDrive};
 
 /// Text that is collected before it is printed.
 const PRINTED_BYTES: usize = 1 << 14;
@@ -40,16 +41,6 @@ pub struct SessionOptions {
     pub log: Option<OpenLog>,
     pub bit_rate: u32,
     pub data_bit_rate: Option<u32>,
-}
-
-/// A bus that is watched.
-pub struct WatchedBus {
-    /// Its name in a configuration, or that of its interface, or that in the log.
-    pub name: String,
-    decoder: BusDecoder,
-    pub statistics: BusStatistics,
-    /// The frames that were of interest, by identifier: what the last one of each was.
-    pub shown: BTreeMap<u64, Decoded>,
 }
 
 /// Watches buses.

@@ -3,7 +3,7 @@
 use serde_json::json;
 use takt_rt::Nanoseconds;
 
-use super::session::WatchedBus;
+use super::watched_bus::WatchedBus;
 use crate::table::Table;
 use takt_tools::monitor::{BusStatistics, Decoded};
 

@@ -5,7 +5,7 @@ use std::fmt;
 
 use takt_rt::{Frame, NANOSECONDS_PER_SECOND, Nanoseconds};
 
-use super::reader::{LineItem, LineProblem};
+use super::line::{LineItem, LineProblem};
 use super::{Direction, LoggedFrame, frame_text, time};
 
 /// A line of a log, without its end. Log readers split it at spaces: a bus must not have one in its name.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use takt_rt::{Frame, FrameKind, NANOSECONDS_PER_SECOND};
 
-use super::reader::{LineItem, LineProblem};
+use super::line::{LineItem, LineProblem};
 use super::{Direction, LoggedFrame, candump, frame_text, time};
 
 /// Writes a line, with its end.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use takt_rt::{Frame, FrameKind, NANOSECONDS_PER_SECOND};
 
-use super::reader::{LineItem, LineProblem};
+use super::line::{LineItem, LineProblem};
 use super::{Direction, LoggedFrame, frame_text, time};
 
 /// The first line, with its end.

@@ -10,6 +10,7 @@ pub mod candump;
 mod candump_text;
 mod csv;
 pub mod frame_text;
+mod line;
 mod pcapng;
 mod reader;
 mod time;

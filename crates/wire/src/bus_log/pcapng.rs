@@ -5,7 +5,8 @@ use std::io::{self, Read};
 
 use takt_rt::{Frame, FrameKind, Id, NANOSECONDS_PER_SECOND, Nanoseconds};
 
-use super::reader::{LineItem, LogCondition, LogError};
+use super::line::LineItem;
+use super::reader::{LogCondition, LogError};
 use super::{Direction, LoggedFrame};
 
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;

@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, Read};
 
 use super::csv::Columns;
-use super::frame_text::FrameTextError;
+use super::line::{LineItem, LineProblem};
 use super::{LoggedFrame, candump, candump_text, pcapng};
 
 /// No line of a log is longer. What is longer is cut there.
@@ -61,29 +61,6 @@ impl LogCondition {
         self.malformed += 1;
         self.first_malformed.get_or_insert((at, problem));
     }
-}
-
-/// What a line has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum LineItem<'a> {
-    Frame(LoggedFrame<'a>),
-    /// A message of the CAN controller.
-    ErrorFrame,
-}
-
-/// Why a line has no frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub(super) enum LineProblem {
-    #[error("it has no time such as (1700000000.000123)")]
-    Time,
-    #[error("it ends too early")]
-    Cut,
-    #[error("its length is that of no frame")]
-    Length,
-    #[error("a byte is not two hexadecimal digits")]
-    Byte,
-    #[error("{0}")]
-    Frame(FrameTextError),
 }
 
 /// Passes each frame of a log to `visit`, in the order of the file, until that returns `false`.

@@ -5,8 +5,7 @@ use takt_rt::{FieldMode, Nanoseconds};
 
 use super::FieldTask;
 use super::reading::{self, mode_word};
-use super::set_points::{Pace, summary, with_torque};
-use crate::config::Limits;
+use super::set_points::{Pace, limits, summary, with_torque};
 use crate::family::commission::{CommandValue, Failure, MotionProfile, MoveKind, Report, Task};
 use crate::procedure::AxisReading;
 
@@ -46,14 +45,6 @@ pub fn check(task: &FieldTask, work: &Task) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
-}
-
-/// The limits of the axis, without which nothing moves.
-pub fn limits(task: &FieldTask) -> Result<Limits, Failure> {
-    task.s.limits.ok_or(Failure::Missing {
-        what: "the limits of the axis, in a configuration or by `--set limits.velocity=\"2 rad/s\"` and the like",
-        why: "takt plans the motion of such a motor, and sends its limits with each command",
-    })
 }
 
 fn lacks(task: &FieldTask, what: &str) -> Failure {

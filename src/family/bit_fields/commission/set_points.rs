@@ -6,9 +6,9 @@
 use takt_rt::plan::{self, Problem, Profile, State};
 use takt_rt::{FieldMode, FieldTargets, LifeState, LifeWish, Nanoseconds};
 
-use super::motion::limits;
 use super::reading;
 use super::{FieldTask, PERIODS_FOR_A_STEP};
+use crate::config::Limits;
 use crate::family::commission::{Failure, Report};
 use crate::procedure::AxisReading;
 
@@ -16,6 +16,14 @@ use crate::procedure::AxisReading;
 const SHOWN_NS: Nanoseconds = 20_000_000;
 /// How long the joint may take to arrive behind the last set-point, or to come to rest without torque.
 const SETTLING_NS: Nanoseconds = 2_000_000_000;
+
+/// The limits of the axis, without which nothing moves.
+pub fn limits(task: &FieldTask) -> Result<Limits, Failure> {
+    task.s.limits.ok_or(Failure::Missing {
+        what: "the limits of the axis, in a configuration or by `--set limits.velocity=\"2 rad/s\"` and the like",
+        why: "takt plans the motion of such a motor, and sends its limits with each command",
+    })
+}
 
 /// Velocity and accelerations of a motion, in SI units.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,6 @@ use takt_wire::canopen::emcy::ErrorRegister;
 use takt_wire::canopen::object::{DataType, Object};
 use takt_wire::canopen::objects::*;
 
-use super::upkeep::{LOAD_SIGNATURE, SAVE_SIGNATURE};
 use super::words::{controlword_words, modes_words, statusword_words};
 use crate::config::DriveFamily;
 use crate::family::commission::dictionary::{ObjectEntry, ObjectUnit};
@@ -24,6 +23,10 @@ pub const fn error_history(entry: u8) -> Object {
 pub const STORE: Object = Object::new(0x1010, 1, DataType::U32, "store parameters");
 /// 1011:1
 pub const RESTORE: Object = Object::new(0x1011, 1, DataType::U32, "restore default parameters");
+/// The signature for 1010:1: "save" in little-endian order.
+pub const SAVE_SIGNATURE: i64 = 0x6576_6173;
+/// The signature for 1011:1: "load" in little-endian order.
+pub const LOAD_SIGNATURE: i64 = 0x6461_6F6C;
 /// 6007: what the drive does when the controller is gone.
 pub const ABORT_CONNECTION_OPTION: Object =
     Object::new(0x6007, 0, DataType::I16, "abort connection option code");

@@ -4,17 +4,13 @@ use takt_rt::Nanoseconds;
 use takt_wire::canopen::object::Object;
 
 use super::enabling::state;
-use super::objects::{RESTORE, STORE};
+use super::objects::{LOAD_SIGNATURE, RESTORE, SAVE_SIGNATURE, STORE};
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
 
-/// The signature for 1010:1: "save" in little-endian order.
-pub const SAVE_SIGNATURE: i64 = 0x6576_6173;
-/// The signature for 1011:1: "load" in little-endian order.
-pub const LOAD_SIGNATURE: i64 = 0x6461_6F6C;
 /// Time for which the supply must stay on after the store command, where the drive's own is not known.
 const STORING_NS: Nanoseconds = 3_000_000_000;
 
