@@ -111,7 +111,8 @@ fn frames_of_all_kinds_cross_and_own_ones_only_confirm() {
 fn drives_are_stopped_beside_a_loop_that_stands_still() {
     let bus = VirtualCan::new("takt-resort");
     let mut listener = bus.port(&[]);
-    let mut config = Config::load("../../configs/arm6-erob.toml".as_ref()).unwrap();
+    let mut config =
+        Config::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/arm6-erob.toml").as_ref()).unwrap();
     config.buses[0].interface = Interface::SocketCan("takt-resort".to_owned());
     let told = takt::controller::stop_drives(&config);
     let of_bus = config.axes.iter().filter(|axis| axis.bus == 0);
