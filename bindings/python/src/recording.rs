@@ -70,15 +70,16 @@ impl Recorder {
     /// A recording of these axes, of at most so many cycles, from the next cycle on.
     pub fn begin(&self, py: Python<'_>, link: Link, axes: Vec<usize>, at_most: usize) -> PyResult<Recording> {
         let tape = Arc::new(Tape { axes, at_most, columns: Mutex::default() });
+        let after = link.controller(py)?.state().slot;
         lock(&self.0.tapes).push(Arc::downgrade(&tape));
         self.0.any.store(true, Ordering::Release);
         if !link.is_own() {
-            let (watched, after) = (link.shared(py)?, link.controller(py)?.state().slot);
+            let watched = link.shared(py)?;
             let (recorder, of) = (self.clone(), Arc::downgrade(&tape));
             let watch = move || recorder.watch(&*watched, &of, after);
             thread::Builder::new().name("takt-record".into()).spawn(watch)?;
         }
-        Ok(Recording { link, tape, recorder: self.clone() })
+        Ok(Recording { link, tape, after, recorder: self.clone() })
     }
 
     /// Writes each cycle of a controller that hands over no records, until the recording ends. A cycle that this thread sleeps through is
@@ -167,6 +168,8 @@ fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
 pub struct Recording {
     link: Link,
     tape: Arc<Tape>,
+    /// The slot behind which it begins.
+    after: u64,
     recorder: Recorder,
 }
 
@@ -184,7 +187,9 @@ impl Recording {
         let now = self.link.controller(py)?.state().slot;
         let late = "the logger is far behind: the recording lacks its last cycles";
         until(py, &self.link, Some(5.0), late, |controller, at_most| {
-            let is_written = self.tape.is_full()
+            // In virtual time no cycle may have passed at all.
+            let is_written = now <= self.after
+                || self.tape.is_full()
                 || controller.has_ended()
                 || lock(&self.tape.columns).slots.last().is_some_and(|slot| *slot >= now);
             if !is_written {

@@ -34,6 +34,13 @@ def test_time_passes_only_in_calls(sim):
     assert sim.time == pytest.approx(before + 1.0)
 
 
+@pytest.mark.parametrize("passes", [lambda sim: None, lambda sim: sim.move(HOME, wait=False)])
+def test_a_recording_in_which_no_time_passes_ends_and_is_empty(sim, passes):
+    with sim.record() as recording:
+        passes(sim)
+    assert len(recording.time) == 0
+
+
 def test_a_simulation_is_an_arm(sim):
     assert isinstance(sim, takt.Arm) and isinstance(sim, takt.Group)
 
