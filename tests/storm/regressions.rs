@@ -241,7 +241,7 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 34] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 35] = [
     (34_714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27_432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11_882, "The same in profile velocity"),
@@ -324,6 +324,10 @@ const FAILED_WITH_EVERYTHING: [(u64, &str); 34] = [
         "A corrupted command enabled a drive for less than a cycle, and the storm blamed a joint without torque that moved",
     ),
     (700_032_029, "A joint caught up after a pause, and the storm took its following error for unfounded"),
+    (
+        900_007_815,
+        "A drive followed again after it had missed the heartbeat for a moment, and the storm blamed the controller",
+    ),
 ];
 
 /// The same of those whose streams command every kind of point.

@@ -6,6 +6,7 @@ use takt::config::{Axis, Config, Control};
 use takt_rt::{DriveState, Event, EventKind, OperationMode, Phase, Scale};
 
 use super::Seen;
+use crate::heartbeat::MissedHeartbeat;
 
 /// A set-point that was sent.
 #[derive(Clone, Copy, Debug)]
@@ -274,7 +275,10 @@ impl SetPoints {
             // The drive is enabled on where it is. Whoever lies about that, or moves it, is a fault.
             let there = self.scale.position_from_counts(truth.position_counts);
             let reach = self.coasting.max(truth.velocity.abs()) * GAP_S + 4.0 * count;
-            let is_judged = !concern.is_present && !seen.config.axes[index].control.is_profile();
+            // A YZ-AIM whose alarm for a missed heartbeat has ended takes the command of before again.
+            let has_paused_itself = concern.missed_heartbeat != MissedHeartbeat::No;
+            let is_judged =
+                !concern.is_present && !has_paused_itself && !seen.config.axes[index].control.is_profile();
             return match is_judged && (position - there).abs() > reach {
                 true => Err(format!("enabled at {there}, and sent to {position}")),
                 false => Ok(()),
