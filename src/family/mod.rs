@@ -19,7 +19,7 @@ pub mod erob_canopen;
 #[doc(hidden)]
 pub mod erob_modbus;
 mod error_words;
-#[allow(unnameable_types, reason = "sessions name its types, and nobody outside names those sessions")]
+#[allow(unnameable_types, reason = "its sessions have no public name")]
 pub(crate) mod hollow;
 mod off_cycle;
 mod registry;

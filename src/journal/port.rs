@@ -7,12 +7,12 @@ use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Re
 use super::pop_front_if;
 use crate::link::trace::{PortAnswer, PortMark};
 
-/// What a port has answered.
+/// Answer of a port.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PortEntry {
     /// A frame that it has handed over.
     Received(Received),
-    /// What is out of the ordinary.
+    /// An answer other than the usual one.
     Mark(PortMark),
 }
 

@@ -8,7 +8,7 @@ use takt_rt::Event;
 use super::black_box::Incident;
 use crate::channels::panic_message;
 
-/// Something that people may want to know at once.
+/// Notification of an event, or of a file that cannot be written.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Notice {

@@ -1,4 +1,4 @@
-//! What stands around a controller: tools for one drive, for this machine, and for what runs leave behind.
+//! Tools around a controller: for one drive, for this machine, and for recordings.
 //!
 //! ```text
 //! doctor                  is the machine fit

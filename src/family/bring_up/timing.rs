@@ -1,4 +1,4 @@
-//! How long bring-up and shutdown wait.
+//! Timeouts and intervals of bring-up and shutdown.
 
 use takt_rt::Nanoseconds;
 use takt_wire::canopen::sdo;

@@ -68,7 +68,7 @@ pub enum Direction {
     Backward,
 }
 
-/// What is to be stopped: it says how.
+/// Kind of motion that is stopped, which determines how.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// A motion of position control, with the profile deceleration.

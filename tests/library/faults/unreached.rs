@@ -98,7 +98,9 @@ fn config(text: &str) -> Config {
 struct Ended {
     outcome: Option<Outcome>,
     unreached: Vec<usize>,
-    /// From the first cycle in which the group was disabled to the end.
+    /// From the first motion to the first cycle in which the group was disabled.
+    until_disabled_ns: u64,
+    /// From there to the end.
     after_disabled_ns: u64,
 }
 
@@ -108,8 +110,12 @@ fn ended(config: &Config, silent: Option<&str>, interrupt: Option<Interrupt>) ->
     let (axis, when) = silent.map_or((config.axes[0].name.as_str(), "at = \"3600 s\""), |axis| {
         (axis, "when = \"moving\"\nat = \"300 ms\"")
     });
-    let fault = format!("[[fault]]\nkind = \"silent-node\"\naxis = {axis:?}\n{when}\n");
-    let injector = Arc::new(FaultInjector::new(scenario(&fault, config)));
+    ended_by(config, &format!("[[fault]]\nkind = \"silent-node\"\naxis = {axis:?}\n{when}\n"), interrupt)
+}
+
+/// Runs to the end with these faults, and with an interrupt 400 ms after the first motion.
+fn ended_by(config: &Config, faults: &str, interrupt: Option<Interrupt>) -> Ended {
+    let injector = Arc::new(FaultInjector::new(scenario(faults, config)));
     let (mut run, _) = VirtualRun::<Port>::with_faults(config, injector).unwrap();
     let (mut moving_ns, mut disabled_ns) = (None, None);
     let outcome = run.run(120_000, |run| {
@@ -124,8 +130,13 @@ fn ended(config: &Config, silent: Option<&str>, interrupt: Option<Interrupt>) ->
             disabled_ns = disabled_ns.or(Some(snapshot.at_ns));
         }
     });
-    let after_disabled_ns = run.snapshot().at_ns - disabled_ns.unwrap();
-    Ended { outcome, unreached: run.supervisor().unreached().to_vec(), after_disabled_ns }
+    let disabled_ns = disabled_ns.unwrap();
+    Ended {
+        outcome,
+        unreached: run.supervisor().unreached().to_vec(),
+        until_disabled_ns: disabled_ns - moving_ns.unwrap(),
+        after_disabled_ns: run.snapshot().at_ns - disabled_ns,
+    }
 }
 
 #[test]
@@ -285,22 +296,6 @@ fn a_drive_that_has_not_shown_that_it_has_no_torque_keeps_its_watchdog() {
     }
 }
 
-/// Runs to the end with a fault of the joint, and returns the outcome and the time from the first motion until the group was disabled.
-fn disabled_after(config: &Config, fault: &str) -> (Option<Outcome>, u64) {
-    let injector = Arc::new(FaultInjector::new(scenario(fault, config)));
-    let (mut run, _) = VirtualRun::<Port>::with_faults(config, injector).unwrap();
-    let (mut moving_ns, mut disabled_ns) = (None, None);
-    let outcome = run.run(120_000, |run| {
-        let snapshot = run.snapshot();
-        match snapshot.groups[0].phase {
-            Phase::Moving => moving_ns = moving_ns.or(Some(snapshot.at_ns)),
-            Phase::Disabled if moving_ns.is_some() => disabled_ns = disabled_ns.or(Some(snapshot.at_ns)),
-            _ => {}
-        }
-    });
-    (outcome, disabled_ns.unwrap() - moving_ns.unwrap())
-}
-
 #[test]
 fn a_drive_that_shows_torque_while_it_is_shut_down_is_the_outcome_of_the_run() {
     let config = config(ONE_EROB);
@@ -312,9 +307,10 @@ fn a_drive_that_shows_torque_while_it_is_shut_down_is_the_outcome_of_the_run() {
              [[fault]]\nkind = \"drop\"\nfunction = \"nmt\"\n{time}"
         )
     };
-    let (outcome, disabled_ns) = disabled_after(&config, &shows_torque(3_600_000_000));
-    assert_eq!(outcome, Some(Outcome::Finished));
-    let (outcome, _) = disabled_after(&config, &shows_torque(disabled_ns / 1000 + 1));
+    let untroubled = ended_by(&config, &shows_torque(3_600_000_000), None);
+    assert_eq!(untroubled.outcome, Some(Outcome::Finished));
+    let Ended { outcome, .. } =
+        ended_by(&config, &shows_torque(untroubled.until_disabled_ns / 1000 + 1), None);
     assert!(
         matches!(outcome, Some(Outcome::Stopped(stop)) if stop.rule() == Rule::DriveEnabled),
         "{outcome:?}"

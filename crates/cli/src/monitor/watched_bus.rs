@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use takt_tools::monitor::{BusDecoder, BusStatistics, Decoded};
 
-/// What is known of it.
+/// Name, decoder and statistics of a watched bus.
 pub struct WatchedBus {
     /// Its name in a configuration, or that of its interface, or that in the log.
     pub name: String,

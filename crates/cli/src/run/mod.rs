@@ -236,7 +236,7 @@ fn permissions(text: &str) -> Result<u32, String> {
 fn fault_injector(path: &Path, config: &Config) -> Result<Arc<FaultInjector>, UsageError> {
     let scenario = Scenario::load(path, config).map_err(|error| match error {
         ScenarioError::Wrong(error) => UsageError::from(error),
-        unreadable => unreadable.to_string().into(),
+        error => error.to_string().into(),
     })?;
     let is_real = |fault: &ScenarioFault| {
         config.buses.get(fault.bus).is_some_and(|bus| bus.interface != Interface::Simulated)

@@ -3,7 +3,7 @@
 use super::LoggedFrame;
 use super::frame_text::FrameTextError;
 
-/// What a line has.
+/// Content of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum LineItem<'a> {
     Frame(LoggedFrame<'a>),
@@ -11,7 +11,7 @@ pub(super) enum LineItem<'a> {
     ErrorFrame,
 }
 
-/// Why a line has no frame.
+/// Reason for which a line has no frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum LineProblem {
     #[error("it has no time such as (1700000000.000123)")]
