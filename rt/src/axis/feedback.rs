@@ -139,6 +139,7 @@ impl Axis {
         self.report.note_state(self.parameters.codec.state(statusword));
         self.report.note_remote(statusword);
         self.note_power_report();
+        self.note_service_report();
         self.note_measured();
         let behind = self.set_points.due().position - self.joint.position();
         self.following.set_error(if self.is_profile() { 0.0 } else { behind });

@@ -11,6 +11,8 @@ use crate::watch::{NmtState, nmt_command, node_state};
 /// Download of two bytes in one frame, and its confirmation (CiA 301, 7.2.4.3.3).
 const DOWNLOAD: u8 = 0x2B;
 const DOWNLOADED: u8 = 0x60;
+/// Slots in which the reports of a drive that has confirmed its controlword may show that it does not obey it.
+const SHOWING_SLOTS: u32 = 20;
 
 /// A request to the controlword of one axis of a node, or the confirmation: command, index and sub-index.
 fn controlword_of(node_axis: u8, command: u8) -> [u8; 4] {
@@ -46,6 +48,8 @@ pub(super) enum SdoFallback {
     Confirmed {
         /// Which.
         word: u16,
+        /// Slots until a drive that goes on to report would have shown that it does not obey.
+        wait_slots: u32,
     },
 }
 
@@ -53,7 +57,7 @@ impl SdoFallback {
     fn word(self) -> Option<u16> {
         match self {
             Self::Unused => None,
-            Self::Writing { word, .. } | Self::Confirmed { word } => Some(word),
+            Self::Writing { word, .. } | Self::Confirmed { word, .. } => Some(word),
         }
     }
 
@@ -63,7 +67,7 @@ impl SdoFallback {
         if self.word() != wanted {
             *self =
                 wanted.map_or(Self::Unused, |word| Self::Writing { word, wait_slots: 0, is_woken: false });
-        } else if let Self::Writing { wait_slots, .. } = self {
+        } else if let Self::Writing { wait_slots, .. } | Self::Confirmed { wait_slots, .. } = self {
             *wait_slots = wait_slots.saturating_sub(1);
         }
     }
@@ -100,8 +104,16 @@ impl SdoFallback {
         if !is_confirmed {
             return None;
         }
-        *self = Self::Confirmed { word };
+        *self = Self::Confirmed { word, wait_slots: SHOWING_SLOTS };
         Some(word)
+    }
+
+    /// Takes a report that shows torque. A drive that has confirmed that its power is to be off is told again: the confirmation
+    /// of a controlword is no statusword.
+    fn note_torque(&mut self) {
+        if let Self::Confirmed { word: word @ controlword::DISABLE_VOLTAGE, .. } = *self {
+            *self = Self::Writing { word, wait_slots: SHOWING_SLOTS, is_woken: false };
+        }
     }
 
     /// Returns `true` if the node may still be about to answer: so many slots are left until the controlword is written again.
@@ -109,9 +121,9 @@ impl SdoFallback {
         matches!(self, Self::Writing { wait_slots, .. } if wait_slots > left_slots)
     }
 
-    /// Returns `true` if the drive has confirmed that its power is to be off.
+    /// Returns `true` if the drive has confirmed that its power is to be off, and has shown no torque since.
     fn is_switched_off(self) -> bool {
-        self == Self::Confirmed { word: controlword::DISABLE_VOLTAGE }
+        self == Self::Confirmed { word: controlword::DISABLE_VOLTAGE, wait_slots: 0 }
     }
 }
 
@@ -188,12 +200,20 @@ impl Axis {
         Address { node: self.parameters.node, node_axis: self.parameters.node_axis }
     }
 
+    /// Takes a report of a drive that may have confirmed by SDO that its power is to be off.
+    #[inline]
+    pub(super) fn note_service_report(&mut self) {
+        if self.drive_state().has_torque() {
+            self.sdo_fallback.note_torque();
+        }
+    }
+
     /// Returns `true` if the drive has torque, as far as it can be known: an SDO confirmation is newer than the last statusword.
     pub fn has_torque(&self) -> bool {
         self.may_have_torque() && !self.has_confirmed_by_service()
     }
 
-    /// Returns `true` if the drive has confirmed by SDO that its power is to be off.
+    /// Returns `true` if the drive has confirmed by SDO that its power is to be off, and has reported no torque since.
     pub(super) fn has_confirmed_by_service(&self) -> bool {
         self.sdo_fallback.is_switched_off()
     }
@@ -229,6 +249,12 @@ mod tests {
         Frame::of(Id::canopen(function_code::SDO_RESPONSE, NODE.node), [0x60, 0x40, 0x60, 0, 0, 0, 0, 0])
     }
 
+    /// Lets the time pass in which reports would show torque.
+    fn show(fallback: &mut SdoFallback) {
+        let word = fallback.word();
+        (0..SHOWING_SLOTS).for_each(|_| fallback.pass(word));
+    }
+
     #[test]
     fn a_controlword_is_written_again_until_it_is_confirmed() {
         let mut fallback = SdoFallback::default();
@@ -245,9 +271,26 @@ mod tests {
         fallback.pass(Some(controlword::DISABLE_VOLTAGE));
         assert!(fallback.frame(NODE, NmtState::PreOperational, 3).is_some());
         fallback.receive(NODE, &confirmation());
+        show(&mut fallback);
         assert!(fallback.is_switched_off());
         fallback.pass(None);
         assert_eq!(fallback, SdoFallback::Unused);
+    }
+
+    #[test]
+    fn a_controlword_that_is_confirmed_and_not_obeyed_is_written_again_after_some_slots() {
+        let mut fallback = SdoFallback::default();
+        let written = |fallback: &mut SdoFallback| {
+            fallback.pass(Some(controlword::DISABLE_VOLTAGE));
+            fallback.frame(NODE, NmtState::Operational, 3).is_some()
+        };
+        for _ in 0..3 {
+            assert!(written(&mut fallback));
+            fallback.receive(NODE, &confirmation());
+            assert!(!written(&mut fallback) && !fallback.is_switched_off());
+            fallback.note_torque();
+            assert!((1..SHOWING_SLOTS).all(|_| !written(&mut fallback)));
+        }
     }
 
     #[test]
@@ -258,10 +301,12 @@ mod tests {
         let frame = fallback.frame(second, NmtState::PreOperational, 2).unwrap();
         assert_eq!(frame.payload()[..4], [0x2B, 0x40, 0x68, 0]);
         fallback.receive(second, &confirmation());
+        show(&mut fallback);
         assert!(!fallback.is_switched_off(), "that was the first axis");
         let confirmation =
             Frame::of(Id::canopen(function_code::SDO_RESPONSE, NODE.node), [0x60, 0x40, 0x68, 0, 0, 0, 0, 0]);
         fallback.receive(second, &confirmation);
+        show(&mut fallback);
         assert!(fallback.is_switched_off());
     }
 

@@ -2,7 +2,7 @@
 
 use core::f64::consts::PI;
 
-use crate::fixture::{IdealDrive, Rig, parameters, scale};
+use crate::fixture::{IdealDrive, PERIOD_NS, Rig, parameters, scale};
 use takt_rt::{DriveState, EngineParameters, Fault, Frame, Id, Phase, Request, Rule, StopCause, StopReason};
 
 /// The stop that a group shows.
@@ -54,6 +54,18 @@ fn a_drive_that_has_not_given_up_its_torque_is_told_to_have_no_voltage_until_it_
     rig.run(10);
     assert_eq!(last_word(&rig, 2), 0x06);
     assert!(!rig.drive(1).state.has_torque());
+}
+
+/// A thread that is always late takes the power by SDO.
+#[test]
+fn a_drive_that_confirms_its_controlword_by_sdo_and_goes_on_to_report_torque_is_not_disabled() {
+    let mut rig = Rig::enabled(3);
+    let lie = (DriveState::OperationEnabled, rig.drive(1).position);
+    rig.drive(1).lies.extend([lie; 2_000]);
+    rig.clock.compute_ns = PERIOD_NS / 2;
+    rig.run_until(Phase::Disabled, 1_000);
+    assert!(!rig.drive(1).state.has_torque());
+    assert_eq!(rules(&rig), [(Rule::TimingUnfit, None), (Rule::NotDisabled, Some(1))]);
 }
 
 #[test]
