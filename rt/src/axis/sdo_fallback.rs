@@ -62,11 +62,13 @@ impl SdoFallback {
     }
 
     /// Lets a slot pass in which the drive is to have this controlword, or needs none.
-    #[inline]
     fn pass(&mut self, wanted: Option<u16>) {
+        let Some(word) = wanted else {
+            *self = Self::Unused;
+            return;
+        };
         if self.word() != wanted {
-            *self =
-                wanted.map_or(Self::Unused, |word| Self::Writing { word, wait_slots: 0, is_woken: false });
+            *self = Self::Writing { word, wait_slots: 0, is_woken: false };
         } else if let Self::Writing { wait_slots, .. } | Self::Confirmed { wait_slots, .. } = self {
             *wait_slots = wait_slots.saturating_sub(1);
         }
@@ -157,7 +159,9 @@ impl Axis {
     /// Lets a slot pass in which the drive is to have this controlword by SDO, or needs none.
     #[inline]
     pub fn command_by_service(&mut self, word: Option<u16>) {
-        self.sdo_fallback.pass(word);
+        if word.is_some() || self.sdo_fallback != SdoFallback::Unused {
+            self.sdo_fallback.pass(word);
+        }
     }
 
     /// The frame that is due to write that controlword, if one is. It is due again after so many slots, unless the drive
@@ -203,7 +207,7 @@ impl Axis {
     /// Takes a report of a drive that may have confirmed by SDO that its power is to be off.
     #[inline]
     pub(super) fn note_service_report(&mut self) {
-        if self.drive_state().has_torque() {
+        if matches!(self.sdo_fallback, SdoFallback::Confirmed { .. }) && self.drive_state().has_torque() {
             self.sdo_fallback.note_torque();
         }
     }
