@@ -365,6 +365,11 @@ fn a_drive_on_a_serial_line_that_is_enabled_after_a_stop_is_not_taken_for_disabl
 }
 
 #[test]
+fn a_drive_on_a_serial_line_is_stopped_by_who_speaks_to_it_when_the_loop_was_away() {
+    play(&Case::on_a_line(1_100_000_092)).unwrap();
+}
+
+#[test]
 fn storms_that_have_failed_with_off_cycle_drives_pass() {
     for (seed, what) in FAILED_OFF_CYCLE {
         let played = play(&Case::of_off_cycle(seed));

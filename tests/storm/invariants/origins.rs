@@ -4,6 +4,7 @@ use takt_rt::{ControlLaw, EventKind, Fault, Origin, Rule, StopCause, StopReason}
 
 use super::Seen;
 use crate::heartbeat::MissedHeartbeat;
+use crate::off_cycle::is_beside_the_cycle;
 
 /// What a drive that has missed the heartbeat says in its own: of its node the eRob, of its alarm the YZ-AIM.
 const STOPPED: u8 = 4;
@@ -106,6 +107,13 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             | Rule::DriveDisabled,
             Origin::Axis(axis),
         ) if has_missed_heartbeat(axis) => true,
+        // Who speaks to a drive outside of the cycle stops it when the set-points are old.
+        (Rule::DriveDisabled, Origin::Axis(axis))
+            if has_paused(axis)
+                && seen.config.axes.get(usize::from(axis)).is_some_and(is_beside_the_cycle) =>
+        {
+            true
+        }
         // A group that has been enabled since stops with one whose joint coasts to rest without power, long after the alarm.
         (Rule::DriveDisabled, Origin::Axis(axis)) if has_cut_itself(axis) => true,
         (Rule::NodeNotOperational, Origin::Axis(axis)) if has_missed_heartbeat(axis) => {
