@@ -24,7 +24,8 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
     pub(super) fn update_sdo_fallback(&mut self) {
         let Self { group, axes, shared, .. } = self;
         let has_power = group.state.has_power();
-        let is_disabling = matches!(group.state, GroupState::Disabling(_));
+        let is_disabled = matches!(group.state, GroupState::Disabled);
+        let is_disabling = is_disabled || matches!(group.state, GroupState::Disabling(_));
         let is_stopping = matches!(group.state, GroupState::Stopping);
         let is_overdue = Nanoseconds::from(group.state_cycles).saturating_mul(shared.period_ns) > OBEYING_NS;
         let is_always_late = shared.slots.late_cycles > shared.not_transmitted_cycles;
@@ -49,10 +50,12 @@ impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
                 || is_stopping && is_on_stuck_bus(axis) && axis.may_have_torque() && has_sdo(axis)
         };
         for axis in axes.iter_mut() {
-            if has_power {
+            // A drive that a disabled group has not waited for may be reached again, and not by its PDOs.
+            let may_have_power = has_power || is_disabled && !axis.is_power_off();
+            if may_have_power {
                 axis.note_pdo_reachability();
             }
-            let word = if !has_power {
+            let word = if !may_have_power {
                 None
             } else if is_disabling && must_be_switched_off(axis) {
                 Some(controlword::DISABLE_VOLTAGE)

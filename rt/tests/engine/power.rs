@@ -56,6 +56,22 @@ fn a_drive_that_has_not_given_up_its_torque_is_told_to_have_no_voltage_until_it_
     assert!(!rig.drive(1).state.has_torque());
 }
 
+#[test]
+fn a_drive_that_its_disabled_group_has_not_waited_for_is_switched_off_by_sdo_when_it_is_reached_again() {
+    let mut rig = Rig::enabled(3);
+    // Its node was reset meanwhile: it takes no process data, and sends none.
+    (rig.drive(1).is_silent, rig.drive(1).is_cut_off) = (true, true);
+    rig.run_until(Phase::Disabled, 1_000);
+    assert!(rig.drive(1).state.has_torque());
+    rig.drive(1).is_cut_off = false;
+    rig.drive(1).is_pre_operational = true;
+    rig.drive(1).is_silent = false;
+    rig.run(100);
+    assert!(!rig.drive(1).state.has_torque());
+    rig.request(Request::ResetFaults);
+    assert_eq!(latched(&rig), None);
+}
+
 /// A thread that is always late takes the power by SDO.
 #[test]
 fn a_drive_that_confirms_its_controlword_by_sdo_and_goes_on_to_report_torque_is_not_disabled() {
