@@ -26,12 +26,16 @@ pub struct Concern {
     pub is_misled: bool,
     /// The same, or nothing that stops its drive gets there, and that has no end. Where its drive has no watchdog, nothing stops it.
     pub is_beyond_reach: bool,
+    /// Nothing, or no SDO request, gets to its drive while the fault lasts.
+    pub is_cut_off: bool,
     /// Its drive waits for no heartbeat: another master has reset its communication, or it has heard none yet.
     pub is_unwatched: bool,
     /// Somebody else sends on its bus, and what its drive reports may have to wait for that.
     pub is_crowded: bool,
     /// The loop was away for some time.
     pub has_paused: bool,
+    /// The loop has missed slots in the last cycles.
+    pub is_late: bool,
     /// Its drive is spoken to outside of the cycle, by a thread that is late every time.
     pub is_neglected: bool,
     /// Something pushes the joint for as long as it lasts, also in the end.
@@ -52,9 +56,11 @@ impl Concern {
             is_driven_by_others: self.is_driven_by_others || other.is_driven_by_others,
             is_misled: self.is_misled || other.is_misled,
             is_beyond_reach: self.is_beyond_reach || other.is_beyond_reach,
+            is_cut_off: self.is_cut_off || other.is_cut_off,
             is_unwatched: self.is_unwatched || other.is_unwatched,
             is_crowded: self.is_crowded || other.is_crowded,
             has_paused: self.has_paused || other.has_paused,
+            is_late: self.is_late || other.is_late,
             is_neglected: self.is_neglected || other.is_neglected,
             is_loaded: self.is_loaded || other.is_loaded,
             missed_heartbeat: self.missed_heartbeat.max(other.missed_heartbeat),
@@ -77,7 +83,11 @@ pub struct Concerns {
     /// True if a bus cannot carry in time what is asked of it, an entry a bus: `takt run` refuses such a machine.
     pub is_overloaded: Vec<bool>,
     bus_of_axis: Vec<usize>,
+    cycles_since_late: u64,
 }
+
+/// A joint whose loop is closed here swings for so many cycles after slots were missed.
+const LATE_CYCLES: u64 = 50;
 
 impl Concerns {
     pub fn new(config: &Config, fault_injector: &FaultInjector) -> Self {
@@ -94,6 +104,7 @@ impl Concerns {
             by_bus: vec![false; config.buses.len()],
             is_overloaded: analyse(config).iter().map(|bus| !bus.fits()).collect(),
             bus_of_axis: config.axes.iter().map(|axis| axis.bus).collect(),
+            cycles_since_late: u64::MAX,
         }
     }
 
@@ -150,11 +161,32 @@ impl Concerns {
 
     /// Returns `true` if the last frames to an axis may have been corrupted: such a fault has not ended yet.
     pub fn is_misled_now(&self, fault_injector: &FaultInjector, axis: usize) -> bool {
+        self.is_any_active(fault_injector, axis, |concern| concern.is_misled)
+    }
+
+    /// Returns `true` if a fault is active that keeps what is sent to a drive from it.
+    pub fn is_cut_off_now(&self, fault_injector: &FaultInjector, axis: usize) -> bool {
+        self.is_any_active(fault_injector, axis, |concern| concern.is_cut_off)
+    }
+
+    fn is_any_active(
+        &self,
+        fault_injector: &FaultInjector,
+        axis: usize,
+        is_such: impl Fn(&Concern) -> bool,
+    ) -> bool {
         let mut faults = fault_injector.progress().zip(&self.by_fault);
         faults.any(|((_, progress), concerns)| {
             let is_active = progress.began_ns().is_some() && progress.ended_ns().is_none();
-            is_active && concerns[axis].is_misled
+            is_active && is_such(&concerns[axis])
         })
+    }
+
+    /// Takes whether the loop has missed slots in a cycle.
+    pub fn note_missed_slots(&mut self, has_missed: bool) {
+        self.cycles_since_late = if has_missed { 0 } else { self.cycles_since_late.saturating_add(1) };
+        let is_late = self.cycles_since_late < LATE_CYCLES;
+        self.by_axis.iter_mut().for_each(|concern| concern.is_late = is_late);
     }
 
     /// Looks which faults have begun since the last look, and calls `begun` with the number of each.
@@ -248,9 +280,11 @@ fn concern(axis: &Axis, fault: &takt::faults::ScenarioFault) -> Concern {
         is_misled,
         // A flood leaves no room for anything else.
         is_beyond_reach: has_no_end && (is_misled || is_cut_off || is_flooded_by_commands),
+        is_cut_off,
         is_unwatched,
         is_crowded: matches!(fault.effect, Effect::Foreign(_)),
         has_paused: false,
+        is_late: false,
         is_neglected: false,
         is_driven_by_others: is_own
             && (matches!(fault.kind, "load" | "foreign-set-points" | "disobedience") || is_led_astray)

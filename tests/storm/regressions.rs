@@ -241,7 +241,13 @@ const FAILED_IN_OVERLOAD: [(u64, &str); 13] = [
 ];
 
 /// The same of those with everything: several groups, trajectories, callbacks, and points of every kind.
-const FAILED_WITH_EVERYTHING: [(u64, &str); 35] = [
+const FAILED_WITH_EVERYTHING: [(u64, &str); 38] = [
+    (
+        1_300_010_978,
+        "A drive without a heartbeat consumer, on an interface that was down while its group was disabled, kept its torque",
+    ),
+    (1_300_010_262, "The same, on an interface that was down beyond the end of the run, and was not reached"),
+    (1_300_021_478, "A joint whose loop is closed here swung after nine missed slots"),
     (34_714, "A stream that ran dry came to rest by the acceleration limit, too late for the position limit"),
     (27_432, "A bring-up took the heartbeat consumer from a drive that had kept its torque"),
     (11_882, "The same in profile velocity"),

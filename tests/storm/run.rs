@@ -244,6 +244,8 @@ fn play_in(world: &mut World, case: &Case) -> Result<Done, String> {
                 is_overtaken: false,
             });
         });
+        let has_missed = |event: &Event| matches!(event.kind, EventKind::MissedSlots { .. });
+        concerns.note_missed_slots(world.events.iter().any(has_missed));
         note_stop(&world.events, &mut outcomes);
         let is_callback = |event: &&Event| event.kind == EventKind::Stream { state: StreamState::Callback };
         callbacks += world.events.iter().filter(is_callback).count() as u64;
@@ -449,18 +451,26 @@ fn at_rest(
     let is_restarted: Vec<bool> = (0..case.config.axes.len())
         .map(|axis| was_stopped[axis] && concerns.is_misled_now(&world.fault_injector, axis))
         .collect();
+    // Of such a drive it is said that it was not reached.
+    let is_cut_off: Vec<bool> = (0..case.config.axes.len())
+        .map(|axis| {
+            world.run.supervisor().unreached().contains(&axis)
+                && concerns.is_cut_off_now(&world.fault_injector, axis)
+        })
+        .collect();
     let rest_ns = end_ns + WATCHDOG_MS * 1_000_000;
     for passed_ms in 1..=WATCHDOG_MS {
         world.leave_alone_until(end_ns + passed_ms * 1_000_000);
     }
     // A fault may have begun in that time.
     concerns.observe(&world.fault_injector, |_| ());
-    for ((axis, concern), is_restarted) in case.config.axes.iter().zip(&concerns.by_axis).zip(is_restarted) {
+    let axes = case.config.axes.iter().zip(&concerns.by_axis);
+    for (((axis, concern), is_restarted), is_cut_off) in axes.zip(is_restarted).zip(is_cut_off) {
         let truth = world.observe(axis, rest_ns);
         // Set-points of another master enable a drive again whose node somebody has started.
         let is_driven = truth.state == DriveState::OperationEnabled && !concern.is_driven_by_others;
         // Nothing stops a drive that has no watchdog any more and that no frame ever reaches again as it was sent.
-        let is_beyond_reach = concern.is_unwatched && (concern.is_beyond_reach || is_restarted);
+        let is_beyond_reach = concern.is_unwatched && (concern.is_beyond_reach || is_restarted || is_cut_off);
         if (truth.velocity.abs() > REST || is_driven) && !concern.is_loaded && !is_beyond_reach {
             return Err(format!("{} is not at rest in the end: {truth:?}", axis.name));
         }

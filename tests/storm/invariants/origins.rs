@@ -32,6 +32,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
             seen.config.axes.get(usize::from(axis)).is_some_and(|axis| seen.overloaded_buses[axis.bus]);
         is_overloaded || seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_crowded)
     };
+    let is_late = |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.is_late);
     let has_paused =
         |axis: u8| seen.concerns.get(usize::from(axis)).is_some_and(|concern| concern.has_paused);
     let is_neglected =
@@ -70,7 +71,7 @@ fn check_reason(seen: &Seen<'_>, reason: &StopReason) -> Result<(), String> {
         }
         // A joint swings where the machine is too late to close its loop, and one that is led anew after a pause has to catch up.
         (Rule::FollowingError, Origin::Axis(axis))
-            if is_crowded(axis) && is_loop_closed_here(axis) || has_paused(axis) =>
+            if (is_crowded(axis) || is_late(axis)) && is_loop_closed_here(axis) || has_paused(axis) =>
         {
             true
         }
