@@ -70,6 +70,9 @@ impl Concern {
     }
 }
 
+/// Cycles after a missed slot in which a joint whose loop is closed here may still swing.
+const LATE_CYCLES: u64 = 50;
+
 /// The concerns of every axis, as far as the faults have begun.
 pub struct Concerns {
     /// For each fault, an entry an axis.
@@ -85,9 +88,6 @@ pub struct Concerns {
     bus_of_axis: Vec<usize>,
     cycles_since_late: u64,
 }
-
-/// A joint whose loop is closed here swings for so many cycles after slots were missed.
-const LATE_CYCLES: u64 = 50;
 
 impl Concerns {
     pub fn new(config: &Config, fault_injector: &FaultInjector) -> Self {
