@@ -1,12 +1,12 @@
 // Calls of write() of TaktSystem, with CLOCK_REALTIME before it: a controller manager of 200 Hz, whose controller has a position elsewhere a hundred times.
 //
 //     front_calls_ros2 CONFIG        whose interfaces are those of the laboratory
-#include "../../bindings/ros2_control/test/manager.hpp"
+#include "../../extras/ros2_control/test/manager.hpp"
 #include "front_calls.hpp"
 
 int main(int count, char **arguments) {
     CHECK(count == 2);
-    const auto tag = parsed("bindings/ros2_control/urdf/arm.ros2_control.urdf");
+    const auto tag = parsed("extras/ros2_control/urdf/arm.ros2_control.urdf");
     Manager manager;
     auto &system = *manager.system;
     CHECK(manager.init(with(tag, "configuration", arguments[1])) == CallbackReturn::SUCCESS);

@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "../../bindings/ros2_control/test/manager.hpp"
+#include "../../extras/ros2_control/test/manager.hpp"
 
 namespace {
 
@@ -89,7 +89,7 @@ int main(int count, char **arguments) {
     const std::string folder = recording + ".folder";
     std::filesystem::create_directory(folder);
 
-    auto tag = parsed("bindings/ros2_control/urdf/arm.ros2_control.urdf");
+    auto tag = parsed("extras/ros2_control/urdf/arm.ros2_control.urdf");
     tag = with(with(with(tag, "configuration", arguments[1]), "realtime", "required"), "recording", folder);
     Manager manager;
     auto &system = *manager.system;

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import zenoh
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "bindings/zenoh/tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "extras/zenoh/tests"))
 from node import JOINTS, STATES, STORE, TRAJECTORIES, listening, trajectory  # noqa: E402
 
 ENDPOINT = "tcp/127.0.0.1:7447"

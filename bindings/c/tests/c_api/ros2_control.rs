@@ -17,7 +17,7 @@ fn a_controller_manager_of_humble_or_of_rolling_leads_the_system_of_ros2_control
 }
 
 fn led_through_its_life(takt: &Installed, of: &str) {
-    let package = crate_folder().join("../ros2_control");
+    let package = crate_folder().join("../../extras/ros2_control");
     let include = |folder: &str| format!("-I{}", package.join(folder).display());
     let stand_ins = [include("test/stand_in/ros"), include(&format!("test/stand_in/{of}"))];
     let more = [MEMORY[0], MEMORY[1], &include("include"), &stand_ins[0], &stand_ins[1]];
@@ -35,7 +35,7 @@ fn led_through_its_life(takt: &Installed, of: &str) {
 #[ignore = "the part ros2_control runs it"]
 fn the_ament_package_of_ros2_control_is_built_and_installed_by_cmake_and_found_by_others() {
     let takt = Installed::new();
-    let package = crate_folder().join("../ros2_control").canonicalize().unwrap();
+    let package = crate_folder().join("../../extras/ros2_control").canonicalize().unwrap();
     let folder = takt.programs.path();
     let prefix = folder.join("install");
     let stand_ins = package.join("test/stand_in/cmake");
@@ -70,7 +70,8 @@ fn the_ament_package_of_ros2_control_is_built_and_installed_by_cmake_and_found_b
 
 #[test]
 fn what_is_launched_in_ros2_control_has_its_controllers_and_these_their_joints_and_interfaces() {
-    let read = |file: &str| fs::read_to_string(crate_folder().join("../ros2_control").join(file)).unwrap();
+    let read =
+        |file: &str| fs::read_to_string(crate_folder().join("../../extras/ros2_control").join(file)).unwrap();
     let (launch, urdf) = (read("bringup/launch/arm.launch.xml"), read("urdf/arm.ros2_control.urdf"));
     let controllers = read("bringup/config/arm.yaml");
     let tag = urdf.split("<ros2_control").nth(1).unwrap();
@@ -119,11 +120,11 @@ fn the_commands_of_the_page_of_ros2_control_lead_the_system_through_its_life() {
     }
     let takt = Installed::new();
     let folder = takt.programs.path();
-    for name in ["bindings", "configs"] {
+    for name in ["configs", "extras"] {
         std::os::unix::fs::symlink(repository().join(name), folder.join(name)).unwrap();
     }
     // The first of them needs ROS.
-    let commands = blocks_of("bindings/ros2_control/README.md", "sh");
+    let commands = blocks_of("extras/ros2_control/README.md", "sh");
     assert_eq!(commands.len(), 2, "{commands:?}");
     let said = succeeds(&mut takt.shell(&commands[1]));
     assert!(said.contains("the system has lived its life"), "{said}");

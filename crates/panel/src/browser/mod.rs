@@ -1,4 +1,4 @@
-//! takt in a page without a machine: for `bindings/wasm` alone. It may change in any release.
+//! takt in a page without a machine: for `extras/wasm` alone. It may change in any release.
 //!
 //! - [`replay()`]: the engine again on a recording.
 //! - [`SimulatedArm`]: a controller of simulated drives in virtual time, with the words of the panel.

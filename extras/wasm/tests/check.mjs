@@ -1,6 +1,6 @@
 // What WebAssembly does is what this machine does, bit for bit; and the simulated arm moves, breaks and tells why.
 //
-//   node check.mjs FOLDER-OF-THE-MODULE FOLDER-OF-RECORDINGS TAKT      (bindings/wasm/tests/run calls it)
+//   node check.mjs FOLDER-OF-THE-MODULE FOLDER-OF-RECORDINGS TAKT      (extras/wasm/tests/run calls it)
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";

@@ -199,7 +199,7 @@ def test_the_tokens_go_with_the_bridge(arm, peer, bridge):
 
 def test_the_commands_of_the_page_move_the_arm(peer, tmp_path):
     session, endpoint = peer
-    page = (ROOT / "bindings/zenoh/README.md").read_text()
+    page = (ROOT / "extras/zenoh/README.md").read_text()
     robot, other = (rest.split("```")[0].replace("\\\n", " ") for rest in page.split("```sh\n")[1:])
     here = {"arm": tmp_path / "arm", "tcp/ROUTER:7447": endpoint}
 

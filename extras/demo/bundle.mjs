@@ -1,6 +1,6 @@
 // One page of the panel's files, the demonstration's, the module and the configuration. It needs nothing beside itself.
 //
-//   node bundle.mjs FOLDER-OF-THE-MODULE PAGE.html      (docs/demo/build calls it)
+//   node bundle.mjs FOLDER-OF-THE-MODULE PAGE.html      (extras/demo/build calls it)
 
 import { readFileSync, writeFileSync } from "node:fs";
 import path from "node:path";
