@@ -1,28 +1,33 @@
 //! The limits of joints from a robot description (URDF).
 //!
-//! Units are those of the format: rad and N·m for joints that turn, m and N for those that slide. `urdf-rs` reads the file, and cannot tell
-//! an attribute that is absent from one that is 0. No joint can be moved within a limit of 0, so that 0 is taken as not said.
+//! Units are those of the format: rad and N·m for joints that turn, m and N for those that slide. No joint can be moved within a limit of
+//! 0, as programs for drawing write where they know none: it counts as missing.
 
 use std::path::{Path, PathBuf};
 
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::{Decoder, Reader};
 use serde::Serialize;
 use takt_wire::printable::{excerpt, printable_path};
 use thiserror::Error;
-use urdf_rs::{Joint, JointType, Robot};
 
 use super::model::{Axis, Config, Travel};
 use super::quantities::Quantities;
 use super::quantity::Quantity;
 use super::spelling;
 
-/// Deepest nesting of elements. A URDF needs five levels, extensions of simulators some more. `urdf-rs` needs time that grows with the
-/// square of the depth.
-const DEEPEST: usize = 100;
-
 /// A robot description.
 pub struct Urdf {
     path: PathBuf,
-    robot: Robot,
+    joints: Vec<Joint>,
+}
+
+/// A joint as it is written.
+struct Joint {
+    name: String,
+    kind: String,
+    /// Elements of the joint, their attributes and values.
+    values: Vec<(String, String, String)>,
 }
 
 /// The joint that an axis moves, by a robot description.
@@ -196,6 +201,12 @@ impl UrdfError {
 }
 
 const SLIDES: &str = "prismatic";
+/// The types of joints that an axis can move.
+const MOVED: [&str; 3] = ["revolute", "continuous", SLIDES];
+/// All types of joints.
+const KINDS: [&str; 7] = ["revolute", "continuous", SLIDES, "fixed", "floating", "planar", "spherical"];
+/// The elements of a joint that have its limits.
+const READ: [&str; 3] = ["limit", "safety_controller", "mimic"];
 
 impl Urdf {
     /// Reads a file.
@@ -215,18 +226,13 @@ impl Urdf {
     /// # Errors
     /// It is no URDF.
     pub fn parse(path: &Path, text: &str) -> Result<Self, UrdfError> {
-        let not_urdf =
-            |reason: &str| UrdfError::NotUrdf { file: printable_path(path), reason: excerpt(reason) };
-        if is_too_deep(text) {
-            return Err(not_urdf(&format!("its elements are nested more than {DEEPEST} deep")));
-        }
-        let robot = urdf_rs::read_from_string(text).map_err(|error| not_urdf(&error.to_string()))?;
-        Ok(Self { path: path.to_owned(), robot })
+        let joints = Joints::read(text).map_err(|reason| not_urdf(path, &reason))?;
+        Ok(Self { path: path.to_owned(), joints })
     }
 
     /// Returns `true` if there is a joint of this name.
     pub fn has_joint(&self, name: &str) -> bool {
-        self.robot.joints.iter().any(|joint| joint.name == name)
+        self.joints.iter().any(|joint| joint.name == name)
     }
 
     /// Returns the description of the joint of an axis.
@@ -235,33 +241,44 @@ impl Urdf {
     /// There is no such joint, or no axis of this travel can move it, or its limits leave no room.
     pub fn joint(&self, name: &str, travel: Travel) -> Result<UrdfJoint, UrdfError> {
         let file = printable_path(&self.path);
-        let Some(joint) = self.robot.joints.iter().find(|joint| joint.name == name) else {
+        let Some(joint) = self.joints.iter().find(|joint| joint.name == name) else {
             return Err(self.unknown(file, name));
         };
         let name = excerpt(name);
-        let kind = match joint.joint_type {
-            JointType::Revolute => "revolute",
-            JointType::Continuous => "continuous",
-            JointType::Prismatic => SLIDES,
-            JointType::Fixed => return Err(UrdfError::NotMoved { file, joint: name, kind: "fixed" }),
-            JointType::Floating => return Err(UrdfError::NotMoved { file, joint: name, kind: "floating" }),
-            JointType::Planar => return Err(UrdfError::NotMoved { file, joint: name, kind: "planar" }),
-            JointType::Spherical => return Err(UrdfError::NotMoved { file, joint: name, kind: "spherical" }),
+        let Some(kind) = KINDS.into_iter().find(|kind| *kind == joint.kind) else {
+            let reason = format!("the joint {name:?} has the type {:?}", excerpt(&joint.kind));
+            return Err(not_urdf(&self.path, &reason));
         };
-        if let Some(mimic) = &joint.mimic {
-            return Err(UrdfError::Mimics { file, joint: name, mimicked: excerpt(&mimic.joint) });
+        if !MOVED.contains(&kind) {
+            return Err(UrdfError::NotMoved { file, joint: name, kind });
+        }
+        if let Some(mimicked) = joint.value("mimic", "joint") {
+            return Err(UrdfError::Mimics { file, joint: name, mimicked: excerpt(mimicked) });
         }
         let is_linear = kind == SLIDES;
         if is_linear != (travel != Travel::Rotary) {
             let travel = if is_linear { "rotary" } else { "linear" };
             return Err(UrdfError::OtherTravel { file, joint: name, kind, travel });
         }
-        let said = |value: f64| Some(value).filter(|value| *value != 0.0 && *value != f64::INFINITY);
-        let position = match joint.joint_type {
-            JointType::Continuous => None,
-            _ => Some(position(joint, file, name.clone())?),
+        let number = |element, attribute| {
+            joint.number(element, attribute).map_err(|reason| not_urdf(&self.path, &reason))
         };
-        let (velocity, effort) = (said(joint.limit.velocity), said(joint.limit.effort));
+        let limit = |attribute| {
+            number("limit", attribute)
+                .map(|value| value.filter(|value| *value != 0.0 && *value != f64::INFINITY))
+        };
+        let position = match kind {
+            "continuous" => None,
+            _ => {
+                let bounds = |element, low, high| {
+                    Ok([number(element, low)?.unwrap_or(0.0), number(element, high)?.unwrap_or(0.0)])
+                };
+                let hard = bounds("limit", "lower", "upper")?;
+                let soft = bounds("safety_controller", "soft_lower_limit", "soft_upper_limit")?;
+                Some(position(hard, soft, file, name.clone())?)
+            }
+        };
+        let (velocity, effort) = (limit("velocity")?, limit("effort")?);
         Ok(UrdfJoint { name, file: self.path.clone(), is_linear, position, velocity, effort })
     }
 
@@ -304,52 +321,106 @@ impl Urdf {
     }
 
     fn unknown(&self, file: String, name: &str) -> UrdfError {
-        let moves = |joint: &&Joint| {
-            let kind = &joint.joint_type;
-            matches!(kind, JointType::Revolute | JointType::Continuous | JointType::Prismatic)
-        };
-        let known: Vec<&str> =
-            self.robot.joints.iter().filter(moves).map(|joint| joint.name.as_str()).collect();
+        let moves = |joint: &&Joint| MOVED.contains(&joint.kind.as_str());
+        let known: Vec<&str> = self.joints.iter().filter(moves).map(|joint| joint.name.as_str()).collect();
         let nearest = spelling::nearest(name, known.iter().copied()).map(excerpt);
         let known = known.into_iter().map(excerpt).collect();
         UrdfError::UnknownJoint { file, joint: excerpt(name), nearest, known }
     }
 }
 
-/// Returns `true` if elements are nested more than [`DEEPEST`] deep.
-fn is_too_deep(text: &str) -> bool {
-    let (mut rest, mut depth) = (text, 0_usize);
-    while let Some((_, markup)) = rest.split_once('<') {
-        let end = match markup {
-            _ if markup.starts_with("!--") => markup.find("-->"),
-            _ if markup.starts_with("![CDATA[") => markup.find("]]>"),
-            _ => tag_end(markup),
-        };
-        let (inner, behind) = markup.split_at(end.unwrap_or(markup.len()));
-        if inner.starts_with('/') {
-            depth = depth.saturating_sub(1);
-        } else if !inner.starts_with(['!', '?']) && !inner.ends_with('/') {
-            depth += 1;
-        }
-        if depth > DEEPEST {
-            return true;
-        }
-        rest = behind;
+impl Joint {
+    fn value(&self, element: &str, attribute: &str) -> Option<&str> {
+        let mut values = self.values.iter();
+        values.find(|(of, name, _)| of == element && name == attribute).map(|(.., value)| value.as_str())
     }
-    false
+
+    fn number(&self, element: &str, attribute: &str) -> Result<Option<f64>, String> {
+        let Some(value) = self.value(element, attribute) else { return Ok(None) };
+        let number = value.trim().parse().map_err(|_| {
+            let (joint, value) = (excerpt(&self.name), excerpt(value));
+            format!("{attribute} in <{element}> of the joint {joint:?} is {value:?}, not a number")
+        });
+        number.map(Some)
+    }
 }
 
-/// Returns the end of a tag: the first `>` that is not within quotes.
-fn tag_end(markup: &str) -> Option<usize> {
-    let mut quote = None;
-    markup.find(|letter| {
-        match quote {
-            None if matches!(letter, '"' | '\'') => quote = Some(letter),
-            Some(open) if open == letter => quote = None,
-            _ => {}
+/// The joints of a robot description while it is read.
+#[derive(Default)]
+struct Joints {
+    read: Vec<Joint>,
+    depth: usize,
+    is_in_joint: bool,
+    has_begun: bool,
+}
+
+impl Joints {
+    /// Reads the joints of a robot description. The rest may be any XML: simulators and programs for drawing write textures without
+    /// files, shapes without sizes, and elements of their own.
+    fn read(text: &str) -> Result<Vec<Joint>, String> {
+        let (mut reader, mut joints) = (Reader::from_str(text), Self::default());
+        reader.config_mut().expand_empty_elements = true;
+        loop {
+            let step = match reader.read_event() {
+                Ok(Event::Start(element)) => joints.begin(&element, reader.decoder()),
+                Ok(Event::End(_)) => Ok(joints.depth -= 1),
+                Ok(Event::Eof) if joints.depth > 0 => Err("it ends within an element".to_owned()),
+                Ok(Event::Eof) if !joints.has_begun => Err("it has no element \"robot\"".to_owned()),
+                Ok(Event::Eof) => return Ok(joints.read),
+                Ok(_) => Ok(()),
+                Err(error) => Err(error.to_string()),
+            };
+            step.map_err(|reason| {
+                let position = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
+                let lines = text.bytes().take(position).filter(|byte| *byte == b'\n').count();
+                format!("line {}: {reason}", lines + 1)
+            })?;
         }
-        quote.is_none() && letter == '>'
-    })
+    }
+
+    fn begin(&mut self, element: &BytesStart<'_>, decoder: Decoder) -> Result<(), String> {
+        self.depth += 1;
+        self.has_begun = true;
+        let name = String::from_utf8_lossy(element.name().as_ref()).into_owned();
+        match self.depth {
+            1 if name != "robot" => Err(format!("its first element is {:?}, not \"robot\"", excerpt(&name))),
+            2 => {
+                self.is_in_joint = name == "joint";
+                if self.is_in_joint {
+                    let mut joint = Joint { name: String::new(), kind: String::new(), values: vec![] };
+                    for (key, value) in attributes(element, decoder)? {
+                        match key.as_str() {
+                            "name" => joint.name = value,
+                            "type" => joint.kind = value,
+                            _ => {}
+                        }
+                    }
+                    self.read.push(joint);
+                }
+                Ok(())
+            }
+            3 if self.is_in_joint && READ.contains(&name.as_str()) => {
+                let Some(joint) = self.read.last_mut() else { return Ok(()) };
+                let attributes = attributes(element, decoder)?;
+                joint.values.extend(attributes.into_iter().map(|(key, value)| (name.clone(), key, value)));
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn attributes(element: &BytesStart<'_>, decoder: Decoder) -> Result<Vec<(String, String)>, String> {
+    let read = element.attributes().map(|attribute| {
+        let attribute = attribute.map_err(|error| error.to_string())?;
+        let value = attribute.decode_and_unescape_value(decoder).map_err(|error| error.to_string())?;
+        Ok((String::from_utf8_lossy(attribute.key.as_ref()).into_owned(), value.into_owned()))
+    });
+    read.collect()
+}
+
+fn not_urdf(path: &Path, reason: &str) -> UrdfError {
+    UrdfError::NotUrdf { file: printable_path(path), reason: excerpt(reason) }
 }
 
 /// Returns `true` if a value is above another one, by more than the rounding of a unit.
@@ -357,24 +428,26 @@ pub fn exceeds(value: f64, most: f64, scale: f64) -> bool {
     value - most > 1e-9 * scale.abs()
 }
 
-/// The limits of the position: the narrower ones of `<limit>` and `<safety_controller>`.
-fn position(joint: &Joint, file: String, name: String) -> Result<([f64; 2], LimitOrigin), UrdfError> {
-    let (low, high) = (joint.limit.lower, joint.limit.upper);
+/// Returns the limits of the position: the narrower ones of `<limit>` and `<safety_controller>`.
+fn position(
+    [low, high]: [f64; 2],
+    soft: [f64; 2],
+    file: String,
+    joint: String,
+) -> Result<([f64; 2], LimitOrigin), UrdfError> {
     // A comparison with NaN is false.
     if !(low.is_finite() && high.is_finite() && low < high) {
-        return Err(UrdfError::NoRoom { file, joint: name, low, high, are_soft: false });
+        return Err(UrdfError::NoRoom { file, joint, low, high, are_soft: false });
     }
-    // Both are 0 where the file does not say them.
-    let soft = joint.safety_controller.as_ref().filter(|soft| {
-        (soft.soft_lower_limit, soft.soft_upper_limit) != (0.0, 0.0)
-            && (soft.soft_lower_limit > low || soft.soft_upper_limit < high)
-    });
-    let Some(soft) = soft else { return Ok(([low, high], LimitOrigin::Limit)) };
-    let (low, high) = (low.max(soft.soft_lower_limit), high.min(soft.soft_upper_limit));
+    // Both are 0 where the file does not have them.
+    if soft == [0.0, 0.0] || !(soft[0] > low || soft[1] < high) {
+        return Ok(([low, high], LimitOrigin::Limit));
+    }
+    let (low, high) = (low.max(soft[0]), high.min(soft[1]));
     if low < high {
         Ok(([low, high], LimitOrigin::SafetyController))
     } else {
-        Err(UrdfError::NoRoom { file, joint: name, low, high, are_soft: true })
+        Err(UrdfError::NoRoom { file, joint, low, high, are_soft: true })
     }
 }
 
@@ -386,21 +459,41 @@ mod tests {
         Urdf::parse(Path::new("arm.urdf"), text).err().map(|error| error.to_string())
     }
 
-    /// The parser needs time that grows with the square of the depth: hours for this one.
     #[test]
-    fn elements_that_are_nested_deeper_than_any_robot_description_are_refused_before_they_are_parsed() {
-        let reason = reason(&format!("<robot name='r'>{}", "<a>".repeat(1_000_000))).unwrap();
-        assert_eq!(reason, "arm.urdf is no URDF: its elements are nested more than 100 deep");
+    fn a_file_that_is_no_robot_description_is_refused_with_its_line() {
+        let deep = format!("<robot name='r'>{}", "<a>".repeat(1_000_000));
+        for (text, reason_of) in [
+            ("", "it has no element \"robot\""),
+            ("plain text", "it has no element \"robot\""),
+            ("<sdf/>", "line 1: its first element is \"sdf\", not \"robot\""),
+            (
+                "<robot>\n<link></robot>",
+                "line 2: ill-formed document: expected `</link>`, but `</robot>` was found",
+            ),
+            (deep.as_str(), "line 1: it ends within an element"),
+        ] {
+            assert_eq!(reason(text), Some(format!("arm.urdf is no URDF: {reason_of}")));
+        }
     }
 
     #[test]
-    fn what_is_no_nested_element_counts_as_none() {
-        let flat =
-            "<!-- <a> --><link name='a > b'/><link name=\"c > '\"></link><x><![CDATA[<a>]]></x>".repeat(200);
-        assert!(!is_too_deep(&format!("<?xml version='1.0'?><robot name='r'>{flat}</robot>")));
+    fn nothing_but_its_joints_can_refuse_a_robot_description() {
+        let text = "<?xml version='1.0'?><!DOCTYPE robot><robot name='r'><link name='a &gt; b'><visual><material><texture/></material>\
+                    <geometry><box size=''/></geometry></visual></link><sensor:camera name='c' name='c' size/>\
+                    <joint name='other' type='screw'><limit lower='a'/></joint><transmission><joint name='t'/></transmission>\
+                    <joint name='j' type='revolute'><limit lower='-1' upper='2' effort='3' velocity='4'/></joint></robot>";
+        let urdf = Urdf::parse(Path::new("arm.urdf"), text).unwrap();
+        let joint = urdf.joint("j", Travel::Rotary).unwrap();
+        assert_eq!(joint.position, Some(([-1.0, 2.0], LimitOrigin::Limit)));
+        assert_eq!((joint.effort, joint.velocity), (Some(3.0), Some(4.0)));
+        assert!(!urdf.has_joint("t"));
+        let refused = urdf.joint("other", Travel::Rotary).unwrap_err().to_string();
+        assert_eq!(refused, "arm.urdf is no URDF: the joint \"other\" has the type \"screw\"");
+        let urdf = Urdf::parse(Path::new("arm.urdf"), &text.replace("upper='2'", "upper='2 rad'")).unwrap();
+        let refused = urdf.joint("j", Travel::Rotary).unwrap_err().to_string();
         assert_eq!(
-            reason("<?xml version='1.0'?><!-- <a> --><robot name='r'><link name='a > b'/></robot>"),
-            None
+            refused,
+            "arm.urdf is no URDF: upper in <limit> of the joint \"j\" is \"2 rad\", not a number"
         );
     }
 }
