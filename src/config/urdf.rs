@@ -463,8 +463,8 @@ mod tests {
     fn a_file_that_is_no_robot_description_is_refused_with_its_line() {
         let deep = format!("<robot name='r'>{}", "<a>".repeat(1_000_000));
         for (text, reason_of) in [
-            ("", "it has no element \"robot\""),
-            ("plain text", "it has no element \"robot\""),
+            ("", "line 1: it has no element \"robot\""),
+            ("plain text", "line 1: it has no element \"robot\""),
             ("<sdf/>", "line 1: its first element is \"sdf\", not \"robot\""),
             (
                 "<robot>\n<link></robot>",
