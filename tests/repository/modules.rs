@@ -57,12 +57,13 @@ impl Crate {
     pub fn arrows(&self) -> Vec<Arrow> {
         let mut all = vec![];
         for (from, source) in &self.0 {
-            let is_reexport = |import: &&Import| import.is_public && import.path.starts_with(&in_crate(from));
-            let imports = source.imports.iter().filter(|import| !is_reexport(import));
-            let imports = imports.map(|import| (&import.path, import.line));
+            let used = source.paths.iter().map(|(path, line)| (path, *line, false));
+            let imported = source.imports.iter().map(|import| (&import.path, import.line, import.is_public));
             let mut seen = BTreeSet::from([from]);
-            for (path, line) in source.paths.iter().map(|(path, line)| (path, *line)).chain(imports) {
-                if let Some(to) = self.definer(from, path, 8).filter(|to| seen.insert(to)) {
+            for (path, line, is_public) in used.chain(imported) {
+                let Some(to) = self.definer(from, path, 8) else { continue };
+                let is_reexport = is_public && to.starts_with(from);
+                if !is_reexport && seen.insert(to) {
                     all.push(Arrow { from: from.clone(), to: to.clone(), line });
                 }
             }
