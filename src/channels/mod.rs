@@ -19,6 +19,7 @@ mod callback_panic;
 mod callback_record;
 mod callbacks;
 mod client_requests;
+mod error;
 mod event_words;
 mod group_axes;
 mod host_side;
@@ -35,6 +36,7 @@ mod records;
 mod request_numbers;
 mod ring;
 mod rt_side;
+mod stop_words;
 mod stream;
 mod trajectories;
 mod words;
@@ -53,6 +55,7 @@ pub use callbacks::{
     CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
 };
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
+pub use error::ChannelError;
 pub(crate) use event_words::EVENT_WORDS;
 pub use group_axes::GroupAxes;
 pub use host_side::HostSide;
@@ -91,26 +94,6 @@ pub struct ChannelSizes {
     pub service_out: usize,
     /// Received service frames that wait for the host, of all buses together.
     pub service_in: usize,
-}
-
-/// Why a request or frame was not accepted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ChannelError {
-    /// The channel is full: the real-time thread does not run, or gets too much.
-    #[error("the channel to the real-time thread is full")]
-    Full,
-    /// No stream takes points.
-    #[error("no stream is running")]
-    NotStreaming,
-    /// No bus has this number.
-    #[error("there is no bus {bus}: the controller has {buses} buses")]
-    NoSuchBus {
-        /// The number of the bus.
-        bus: usize,
-        /// The number of buses.
-        buses: usize,
-    },
 }
 
 /// Reports of each drive that can wait, of those that are spoken to outside of the cycle.

@@ -7,15 +7,19 @@
 #[doc(hidden)]
 pub mod bit_fields;
 pub(crate) mod bounds;
+mod configured_family;
 mod data_file;
 pub(crate) mod defaults;
 #[cfg(feature = "miette")]
 mod diagnostic;
 mod drive_family;
 mod error;
+mod error_control;
 pub(crate) mod identifiers;
+mod identity;
 mod in_code;
 mod interface;
+mod interface_error;
 mod mode_words;
 mod model;
 mod position_unit;
@@ -31,17 +35,21 @@ mod sources;
 mod spelling;
 pub(crate) mod spot;
 mod supervision;
+mod travel;
 pub(crate) mod urdf;
+mod urdf_error;
+mod urdf_limits;
 
 use std::fmt;
 use std::path::Path;
 
+pub use configured_family::{ConfiguredFamily, FamilyKeys};
 pub use drive_family::{
-    ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, ModeChangeRule, ModeSet, OwnIdentifiers,
-    Plausible, Protocol, VelocityUnit,
+    DriveFacts, DriveFamily, ModeChangeRule, ModeSet, OwnIdentifiers, Plausible, Protocol, VelocityUnit,
 };
 pub use error::{ConfigError, Location, Problem};
-pub use interface::InterfaceError;
+pub use error_control::ErrorControl;
+pub use interface_error::InterfaceError;
 pub use mode_words::{MODES, mode_word};
 pub use model::*;
 pub use position_unit::PositionUnit;
@@ -49,8 +57,10 @@ pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
 pub(crate) use read::{Knowledge, PhaseChoice, parse};
 pub use sources::{ConfigSources, SourcesError};
-pub use supervision::{ErrorControl, Supervision};
-pub use urdf::{LimitOrigin, Urdf, UrdfError, UrdfJoint, UrdfLimits};
+pub use supervision::Supervision;
+pub use urdf::{Urdf, UrdfJoint};
+pub use urdf_error::UrdfError;
+pub use urdf_limits::{LimitOrigin, UrdfLimits};
 
 use takt_wire::printable::printable_path;
 use thiserror::Error;

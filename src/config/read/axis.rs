@@ -13,8 +13,9 @@ use super::machine::{boolean, heartbeat, node};
 use super::section::Section;
 use super::travel::{counting, travel};
 use super::urdf::{DescribedJoint, Description};
+use crate::config::configured_family::{ConfiguredFamily, FamilyKeys};
 use crate::config::defaults;
-use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, Protocol};
+use crate::config::drive_family::{DriveFacts, DriveFamily, Protocol};
 use crate::config::model::{
     Axis, FeedForward, Feedback, Follow, FrictionShape, Identity, Interface, Joint, Limits, PdoMapping,
     PowerUpState, SimulatedJoint, Travel,

@@ -14,7 +14,8 @@ use crate::config::quantity::Quantity;
 use crate::config::ranges;
 use crate::config::rules;
 use crate::config::spot::Spot;
-use crate::config::urdf::{LimitOrigin, UrdfJoint, UrdfLimits, exceeds};
+use crate::config::urdf::{UrdfJoint, exceeds};
+use crate::config::urdf_limits::{LimitOrigin, UrdfLimits};
 
 /// What was read of the limits of an axis.
 pub struct ReadLimits {
