@@ -20,7 +20,7 @@ use clap::Args;
 
 use super::exit::Exit;
 use super::usage_error::UsageError;
-use takt::remote::{Client, ConnectError, Listener, connect};
+use takt::remote::{ConnectError, Listener, connect};
 
 /// Show a running controller in the terminal: axes, timing, buses, events; jog and stop by keys
 ///
@@ -91,16 +91,4 @@ fn refusal(error: &ConnectError) -> String {
         }
         _ => error.to_string(),
     }
-}
-
-/// The model of a controller that was connected.
-fn model_of(name: &str, client: &Client) -> model::Model {
-    use takt::command::RunningController;
-    use takt_rt::RequestTarget;
-    let machine = client.machine().clone();
-    let limits = (0..machine.axes.len()).map(|axis| client.limits(axis)).collect();
-    let groups = (0u8..).zip(&machine.groups).map(|(group, _)| client.axes_of(RequestTarget::Group(group)));
-    let groups = groups.collect();
-    let seen = (terminal::look(client), takt::remote::now_ns());
-    model::Model::new(name, machine, (limits, groups), std::process::id(), seen)
 }
