@@ -4,7 +4,8 @@
 //! and to switch it off does not need a punctual set-point.
 
 use super::Engine;
-use super::group::GroupContext;
+use super::group::{Group, GroupContext};
+use super::shared::Shared;
 use super::state::GroupState;
 use crate::axis::Axis;
 use crate::cia402::controlword;
@@ -18,56 +19,93 @@ const ANSWER_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 100;
 /// spaced are told again after 20 ms.
 const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
 
+/// What a group needs by SDO in a slot.
+#[derive(Clone, Copy)]
+struct Need {
+    is_disabling: bool,
+    is_stopping: bool,
+    is_overdue: bool,
+}
+
+impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
+    #[inline]
+    fn need_of(&self, group: &Group<AXES, BUSES>) -> Need {
+        Need {
+            is_disabling: matches!(group.state, GroupState::Disabled | GroupState::Disabling(_)),
+            is_stopping: matches!(group.state, GroupState::Stopping),
+            is_overdue: Nanoseconds::from(group.state_cycles).saturating_mul(self.period_ns) > OBEYING_NS,
+        }
+    }
+
+    /// Returns the controlword that a drive which may have power gets by SDO.
+    #[inline]
+    fn word_by_sdo(&self, need: Need, axis: &Axis) -> Option<u16> {
+        if need.is_disabling {
+            self.must_be_switched_off(axis, need.is_overdue).then_some(controlword::DISABLE_VOLTAGE)
+        } else {
+            self.must_stop(axis, need.is_stopping).then(|| axis.sdo_stop_word())
+        }
+    }
+
+    fn must_be_switched_off(&self, axis: &Axis, is_overdue: bool) -> bool {
+        let is_always_late = self.slots.late_cycles > self.not_transmitted_cycles;
+        let is_cut_off = is_always_late || self.is_on_stuck_bus(axis);
+        // Whether such a drive receives its PDOs is not known. A drive outside of the cycle is asked again by its own requests.
+        let is_silent =
+            !axis.is_off_cycle() && axis.feedback_age() > axis.parameters().missed_feedback_cycles;
+        axis.is_pdo_unreachable() || axis.may_have_torque() && (is_cut_off || is_silent && is_overdue)
+    }
+
+    #[inline]
+    fn must_stop(&self, axis: &Axis, is_stopping: bool) -> bool {
+        // A drive without SDO has no controlword that stops it and leaves it its power.
+        let has_sdo = || axis.has_pdos() && self.is_canopen(axis.parameters().bus.into());
+        axis.is_pdo_unreachable()
+            || is_stopping && self.is_on_stuck_bus(axis) && axis.may_have_torque() && has_sdo()
+    }
+
+    fn is_on_stuck_bus(&self, axis: &Axis) -> bool {
+        self.backlog.behind_cycles(axis.parameters().bus.into()) > self.not_transmitted_cycles
+    }
+
+    /// Lets a drive have this controlword by SDO, and its bus the time for it.
+    #[inline]
+    fn command_by_service(&mut self, axis: &mut Axis, word: Option<u16>) {
+        axis.command_by_service(word);
+        if word.is_some() {
+            self.stopped_by_sdo.insert(axis.parameters().bus.into());
+        }
+    }
+}
+
 impl<const AXES: usize, const BUSES: usize> GroupContext<'_, AXES, BUSES> {
-    /// Decides which drives are to be stopped by SDO.
+    /// Decides which drives get their controlword by SDO.
     #[inline]
     pub(super) fn update_sdo_fallback(&mut self) {
-        let Self { group, axes, shared, .. } = self;
-        let has_power = group.state.has_power();
-        let is_disabled = matches!(group.state, GroupState::Disabled);
-        let is_disabling = is_disabled || matches!(group.state, GroupState::Disabling(_));
-        let is_stopping = matches!(group.state, GroupState::Stopping);
-        let is_overdue = Nanoseconds::from(group.state_cycles).saturating_mul(shared.period_ns) > OBEYING_NS;
-        let is_always_late = shared.slots.late_cycles > shared.not_transmitted_cycles;
-        let is_on_stuck_bus = |axis: &Axis| {
-            let behind_cycles = shared.backlog.behind_cycles(axis.parameters().bus.into());
-            behind_cycles > shared.not_transmitted_cycles
-        };
-        let must_be_switched_off = |axis: &Axis| {
-            let is_cut_off = is_always_late || is_on_stuck_bus(axis);
-            // Whether such a drive receives its PDOs is not known. Whoever speaks to a drive outside of the cycle goes on asking it.
-            let is_silent =
-                !axis.is_off_cycle() && axis.feedback_age() > axis.parameters().missed_feedback_cycles;
-            axis.is_pdo_unreachable() || axis.may_have_torque() && (is_cut_off || is_silent && is_overdue)
-        };
-        // A drive without SDO has no controlword that stops it and leaves it its power.
-        let has_sdo = |axis: &Axis| {
-            let bus = shared.buses.get(usize::from(axis.parameters().bus));
-            axis.has_pdos() && bus.is_some_and(|bus| bus.canopen.is_some())
-        };
-        let must_stop_by_sdo = |axis: &Axis| {
-            axis.is_pdo_unreachable()
-                || is_stopping && is_on_stuck_bus(axis) && axis.may_have_torque() && has_sdo(axis)
-        };
-        for axis in axes.iter_mut() {
-            // A drive that a disabled group has not waited for may be reached again, and not by its PDOs.
-            let may_have_power = has_power || is_disabled && !axis.is_power_off();
-            if may_have_power {
+        if !self.group.state.has_power() {
+            self.switch_off_unreleased();
+            return;
+        }
+        let need = self.shared.need_of(self.group);
+        for axis in self.axes.iter_mut() {
+            axis.note_pdo_reachability();
+            let word = self.shared.word_by_sdo(need, axis);
+            self.shared.command_by_service(axis, word);
+        }
+    }
+
+    /// Keeps switching off the drives that a disabled group has not waited for: they may be reached again, and not by their PDOs.
+    #[cold]
+    fn switch_off_unreleased(&mut self) {
+        let need = self.shared.need_of(self.group);
+        let is_disabled = matches!(self.group.state, GroupState::Disabled);
+        for axis in self.axes.iter_mut() {
+            let mut word = None;
+            if is_disabled && !axis.is_power_off() {
                 axis.note_pdo_reachability();
+                word = self.shared.word_by_sdo(need, axis);
             }
-            let word = if !may_have_power {
-                None
-            } else if is_disabling && must_be_switched_off(axis) {
-                Some(controlword::DISABLE_VOLTAGE)
-            } else if must_stop_by_sdo(axis) {
-                Some(axis.sdo_stop_word())
-            } else {
-                None
-            };
-            axis.command_by_service(word);
-            if word.is_some() {
-                shared.stopped_by_sdo.insert(axis.parameters().bus.into());
-            }
+            self.shared.command_by_service(axis, word);
         }
     }
 }
