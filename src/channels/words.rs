@@ -344,7 +344,7 @@ pub(super) mod tests {
 
     pub fn rejections() -> impl Strategy<Value = RequestError> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
-        let reasons = prop::sample::select(&RejectReason::ALL[..]);
+        let reasons = prop::sample::select(RejectReason::all().collect::<Vec<_>>());
         let phases = prop::sample::select(&Phase::ALL[..]);
         (requests, reasons, any::<Option<u8>>(), phases)
             .prop_map(|(request, reason, axis, phase)| RequestError { request, reason, axis, phase })
