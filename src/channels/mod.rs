@@ -56,7 +56,7 @@ pub use callbacks::{
 };
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
 pub use error::ChannelError;
-pub(crate) use event_words::EVENT_WORDS;
+pub use event_words::EVENT_WORDS;
 pub use group_axes::GroupAxes;
 pub use host_side::HostSide;
 pub use journal::{HostInput, JournalEntry, JournalReader};

@@ -99,6 +99,7 @@ fn sources(folder: &Path, text: &mut String) {
 fn every_word_that_is_said_to_be_ours_is_a_name_of_its_language() {
     let mut rust = String::new();
     sources(&root().join("src"), &mut rust);
+    sources(&root().join("crates/remote/src"), &mut rust);
     sources(&root().join("crates/wire/src"), &mut rust);
     sources(&root().join("crates/sim/src"), &mut rust);
     sources(&root().join("rt/src"), &mut rust);

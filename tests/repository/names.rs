@@ -9,7 +9,7 @@ use crate::rust_files::{rust_files, shown};
 const FRONTS: [&str; 2] = ["crates/panel/src", "crates/cli/src"];
 
 /// The modules of takt that only the other crates of this project may use.
-const HIDDEN: [&str; 7] = ["channels", "command", "controller", "journal", "procedure", "remote", "serve"];
+const HIDDEN: [&str; 5] = ["channels", "command", "controller", "journal", "procedure"];
 
 #[test]
 fn the_examples_and_the_documentation_use_the_public_face_alone() {
@@ -57,7 +57,8 @@ fn only_what_runs_beside_the_real_time_thread_tells_tracing() {
         assert!(!fs::read_to_string(manifest).unwrap().contains("tracing"), "{name}");
     }
     let uses_it = |path: &PathBuf| fs::read_to_string(path).unwrap().contains("tracing::");
-    let beside = FRONTS.into_iter().chain(["crates/tools/src", "src"]).flat_map(rust_files);
+    let beside =
+        FRONTS.into_iter().chain(["crates/remote/src", "crates/tools/src", "src"]).flat_map(rust_files);
     let found: Vec<String> = beside.filter(uses_it).map(|path| shown(&path)).collect();
     assert_eq!(found, TELL);
 }
@@ -98,7 +99,7 @@ const MAY_NAME: [(&str, &str); 4] = [
 
 #[test]
 fn only_its_own_folder_and_the_simulation_name_a_family() {
-    let crates = ["src", "rt/src", "crates/wire/src", "crates/tools/src"];
+    let crates = ["src", "rt/src", "crates/wire/src", "crates/remote/src", "crates/tools/src"];
     let files = crates.into_iter().chain(FRONTS).flat_map(rust_files);
     let is_of_family = |name: &str| {
         let folders = ["erob", "erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402", "hollow"]

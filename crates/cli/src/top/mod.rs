@@ -20,7 +20,7 @@ use clap::Args;
 
 use super::exit::Exit;
 use super::usage_error::UsageError;
-use takt::remote::{ConnectError, Listener, connect};
+use takt_remote::{ConnectError, Listener, connect};
 
 /// Show a running controller in the terminal: axes, timing, buses, events; jog and stop by keys
 ///

@@ -23,7 +23,7 @@ use super::view::{self, Palette};
 use crate::exit::Exit;
 use crate::interruption;
 use takt::command::RunningController;
-use takt::remote::{Client, ClientEvents, connect, now_ns};
+use takt_remote::{Client, ClientEvents, connect, now_ns};
 
 /// From one picture to the next one, if no key comes.
 const FRAME: Duration = Duration::from_millis(50);
