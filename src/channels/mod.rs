@@ -60,12 +60,10 @@ pub use event_words::EVENT_WORDS;
 pub use group_axes::GroupAxes;
 pub use host_side::HostSide;
 pub use journal::{HostInput, JournalEntry, JournalReader};
-pub(crate) use latest::{
-    Allocated, Attempt, Cells, Reader as LatestReader, Words, Writer as LatestWriter, latest,
-};
+pub use latest::{Allocated, Attempt, Cells, Reader as LatestReader, Words, Writer as LatestWriter, latest};
 pub use log_side::LogSide;
 pub use observed_events::EventReader;
-pub(crate) use observed_events::EventWriter;
+pub use observed_events::EventWriter;
 pub use observer::Observer;
 pub use questions::{QUESTIONS_AT_MOST, Questions};
 pub use request_numbers::RequestNumbers;
@@ -73,7 +71,7 @@ pub use ring::{Consumer, Producer, ring};
 pub use rt_side::RtSide;
 pub use stream::{GroupStream, SentPoint, Streamer, chunk};
 pub use trajectories::{GivenTrajectory, NumberedTrajectory, TrajectoryGiver};
-pub(crate) use words::{put_snapshot, snapshot_words, take_snapshot};
+pub use words::{put_snapshot, snapshot_words, take_snapshot};
 
 /// The capacity of each channel.
 #[derive(Clone, Debug)]

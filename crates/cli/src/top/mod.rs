@@ -20,7 +20,7 @@ use clap::Args;
 
 use super::exit::Exit;
 use super::usage_error::UsageError;
-use takt_remote::{ConnectError, Listener, connect};
+use takt_remote::{ConnectError, connect, names_in_use};
 
 /// Show a running controller in the terminal: axes, timing, buses, events; jog and stop by keys
 ///
@@ -41,7 +41,7 @@ const NONE_SERVED: &str =
 /// Shows it until `q` is pressed. The exit code is 2 without a terminal, or without a controller.
 pub fn run(arguments: &Arguments) -> Exit {
     if arguments.list {
-        let names = Listener::names_in_use();
+        let names = names_in_use();
         if names.is_empty() {
             say!("takt: {NONE_SERVED}");
         }
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Exit {
 fn named(name: Option<&str>) -> Result<String, String> {
     match name {
         Some(name) => Ok(name.to_owned()),
-        None => only(Listener::names_in_use()),
+        None => only(names_in_use()),
     }
 }
 
@@ -84,7 +84,7 @@ fn only(mut names: Vec<String>) -> Result<String, String> {
 }
 
 fn refusal(error: &ConnectError) -> String {
-    let names = Listener::names_in_use();
+    let names = names_in_use();
     match error {
         ConnectError::NotServed { .. } if !names.is_empty() => {
             format!("{error}; served are: {}", names.join(", "))
