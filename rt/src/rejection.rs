@@ -26,8 +26,8 @@ macro_rules! reasons {
         impl RejectReason {
             /// One of each, in the order of their numbers, with numbers of no meaning.
             pub fn all() -> impl Iterator<Item = Self> {
-                // 8 is also a mode of operation, a rule and an identifier.
-                (0..).map_while(|number| Self::from_numbers(number, 8.0, 2.0))
+                // 1 is also a mode of operation, a rule, an identifier, and a group of most machines.
+                (0..).map_while(|number| Self::from_numbers(number, 1.0, 2.0))
             }
 
             /// The number that stands for it in recordings.
