@@ -209,7 +209,10 @@ impl Joints {
         loop {
             let step = match reader.read_event() {
                 Ok(Event::Start(element)) => joints.begin(&element, reader.decoder()),
-                Ok(Event::End(_)) => Ok(joints.depth -= 1),
+                Ok(Event::End(_)) => {
+                    joints.depth -= 1;
+                    Ok(())
+                }
                 Ok(Event::Eof) if joints.depth > 0 => Err("it ends within an element".to_owned()),
                 Ok(Event::Eof) if !joints.has_begun => Err("it has no element \"robot\"".to_owned()),
                 Ok(Event::Eof) => return Ok(joints.read),
