@@ -123,7 +123,8 @@ fn a_circle_is_found_through_re_exports_and_inner_modules_and_not_in_tests_or_co
 /// The root files of all crates.
 fn roots() -> Vec<PathBuf> {
     let repository = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let members = ["crates", "bindings", "extras"].map(|folder| fs::read_dir(repository.join(folder)).unwrap());
+    let members =
+        ["crates", "bindings", "extras"].map(|folder| fs::read_dir(repository.join(folder)).unwrap());
     let members = members.into_iter().flatten().map(|entry| entry.unwrap().path());
     let folders = members.chain([repository.to_owned(), repository.join("rt")]);
     let candidates = folders.map(|folder| ["lib.rs", "main.rs"].map(|name| folder.join("src").join(name)));
