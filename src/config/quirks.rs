@@ -11,14 +11,16 @@ use toml::de::DeTable;
 
 use crate::config::ConfigError;
 use crate::config::MODES;
-use crate::config::data_file::{self, each, each_of_some, optional};
+use crate::config::data_file::{self, each, each_of_some, keyed, optional};
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
 use crate::config::spot::Problems;
 
 pub use takt_wire::described_drive::Confirmation;
-pub use takt_wire::quirks::{Delays, MotionUnit, ObjectPattern, PowerUpState, Quirks, QuirkyDrive};
+pub use takt_wire::quirks::{
+    Delays, MotionUnit, ObjectPattern, PowerUpState, Quirks, QuirkyDrive, TurnCount,
+};
 
 /// The longest delay; a longer one is a mistake in the unit.
 const LONGEST_S: f64 = 600.0;
@@ -53,13 +55,17 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
     let mut root = Section::new("", 0..0, table, problems);
     let drive = drive(root.section("drive"));
     let known: Vec<_> = MODES.into_iter().chain([("homing", OperationMode::Homing)]).collect();
-    let modes =
-        optional(root.get("modes"), |entry| each_of_some(&entry, "mode", |entry| entry.choice(&known)));
+    let some_modes = |entry: Entry<'_>| each_of_some(&entry, "mode", |entry| entry.choice(&known));
+    let modes = optional(root.get("modes"), some_modes);
+    let undeclared_modes = optional(root.get("undeclared_modes"), some_modes);
+    let keeps_mode = optional(root.get("keeps_mode_with_torque"), |entry| entry.boolean());
+    let interpolation_target = optional(root.get("interpolation_target"), |entry| address(&entry));
     let counts_per_turn = optional(root.get("counts_per_turn"), |entry| {
         let counts = entry.integer(1..1 << 32)?;
         Some(counts as f64)
     });
-    let objects = objects(root.section("objects"));
+    let objects = objects(root.section("objects"), problems);
+    let turn_count = turn_count(root.section("turn_count"));
     let statusword = statusword(root.section("statusword"));
     let units = units(root.section("units"));
     let power_ups =
@@ -67,18 +73,25 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
     let power_up = optional(root.get("power_up"), |entry| entry.choice(&power_ups));
     let sdo_blocks = optional(root.get("sdo_blocks"), |entry| entry.boolean());
     let delays = delays(root.section("delays"));
-    let errors = data_file::errors(root.get("errors"), problems, error_code, ERROR_CODES);
+    let errors = data_file::errors(root.get("errors"), problems, hexadecimal, ERROR_CODES);
     root.finish();
-    let (missing, constant) = objects?;
-    let (statusword_set, statusword_clear) = statusword?;
+    let Objects { missing, constant, values } = objects?;
+    let [statusword_set, statusword_clear, statusword_set_disabled, statusword_set_in_some] = statusword?;
     Some(Quirks {
         drive: drive?,
         modes: modes?,
+        undeclared_modes: undeclared_modes?.unwrap_or_default(),
+        keeps_mode_with_torque: keeps_mode?.unwrap_or(false),
+        interpolation_target: interpolation_target?,
         counts_per_turn: counts_per_turn?,
         missing,
         constant,
+        values,
+        turn_count: turn_count?,
         statusword_set,
         statusword_clear,
+        statusword_set_disabled,
+        statusword_set_in_some,
         units: units?,
         power_up: power_up?.unwrap_or_default(),
         refuses_blocks: !sdo_blocks?.unwrap_or(true),
@@ -98,41 +111,82 @@ fn drive(mut section: Section<'_>) -> Option<QuirkyDrive> {
     Some(QuirkyDrive { vendor, product, vendor_number, product_numbers, confirmation, sources })
 }
 
-fn objects(mut section: Section<'_>) -> Option<(Vec<ObjectPattern>, Vec<ObjectPattern>)> {
+/// What a file says of single objects.
+struct Objects {
+    missing: Vec<ObjectPattern>,
+    constant: Vec<ObjectPattern>,
+    values: Vec<(ObjectAddress, i64)>,
+}
+
+fn objects<'a>(mut section: Section<'a>, problems: &'a Problems) -> Option<Objects> {
     let missing = optional(section.get("missing"), |entry| each(&entry, pattern));
     let constant = optional(section.get("constant"), |entry| each(&entry, pattern));
+    let keys = |text: &str| Some(pattern_of(text)?.first());
+    let values = ("objects.values", section.get("values"));
+    let values = keyed(values, problems, (keys, ADDRESSES), |entry| entry.integer(-(1 << 31)..1 << 32));
     section.finish();
-    Some((missing?.unwrap_or_default(), constant?.unwrap_or_default()))
+    Some(Objects {
+        missing: missing?.unwrap_or_default(),
+        constant: constant?.unwrap_or_default(),
+        values: values?,
+    })
+}
+
+const ADDRESSES: &str = "an index of four hexadecimal digits, or index and sub-index: \"1006\", \"1029:1\"";
+
+fn pattern(entry: &Entry<'_>) -> Option<ObjectPattern> {
+    let text = entry.text()?;
+    let pattern = pattern_of(text);
+    if pattern.is_none() {
+        entry.report_range(format!("{text:?}"), ADDRESSES.to_owned());
+    }
+    pattern
+}
+
+/// Reads an object; an index alone is sub-index 0.
+fn address(entry: &Entry<'_>) -> Option<ObjectAddress> {
+    pattern(entry).map(ObjectPattern::first)
 }
 
 /// Reads `"1006"` or `"1029:1"`, in hexadecimal.
-fn pattern(entry: &Entry<'_>) -> Option<ObjectPattern> {
-    let text = entry.text()?;
+fn pattern_of(text: &str) -> Option<ObjectPattern> {
     let (index, subindex) = match text.split_once(':') {
         Some((index, subindex)) => (index, Some(subindex)),
         None => (text, None),
     };
-    let index = (index.len() == 4).then(|| u16::from_str_radix(index, 16).ok()).flatten();
-    let subindex = subindex.map(|subindex| u8::from_str_radix(subindex, 16).ok());
-    match (index, subindex) {
-        (Some(index), None) => Some(ObjectPattern::Index(index)),
-        (Some(index), Some(Some(subindex))) => {
-            Some(ObjectPattern::Address(ObjectAddress::new(index, subindex)))
+    let index = hexadecimal(index)?;
+    Some(match subindex {
+        None => ObjectPattern::Index(index),
+        Some(subindex) => {
+            ObjectPattern::Address(ObjectAddress::new(index, u8::from_str_radix(subindex, 16).ok()?))
         }
-        _ => {
-            let allowed = "an index of four hexadecimal digits, or index and sub-index: \"1006\", \"1029:1\"";
-            entry.report_range(format!("{text:?}"), allowed.to_owned());
-            None
-        }
-    }
+    })
 }
 
-fn statusword(mut section: Section<'_>) -> Option<(u16, u16)> {
-    let bits = |entry: Entry<'_>| u16::try_from(entry.integer(0..1 << 16)?).ok();
-    let set = optional(section.get("set"), bits);
-    let clear = optional(section.get("clear"), bits);
+fn turn_count(mut section: Section<'_>) -> Option<Option<TurnCount>> {
+    let lost = optional(section.get("lost"), |entry| {
+        let text = entry.text()?;
+        let code = hexadecimal(text);
+        if code.is_none() {
+            entry.report_range(format!("{text:?}"), "an error code of four hexadecimal digits".to_owned());
+        }
+        code
+    });
+    if lost.flatten().is_some() {
+        section.require("clear", "the object that clears the turn count when 1 is written to it");
+    }
+    let clear = optional(section.get("clear"), |entry| address(&entry));
     section.finish();
-    Some((set?.unwrap_or(0), clear?.unwrap_or(0)))
+    let (clear, lost) = (clear?, lost?);
+    Some(clear.map(|clear| TurnCount { clear, lost }))
+}
+
+fn statusword(mut section: Section<'_>) -> Option<[u16; 4]> {
+    let bits = |entry: Entry<'_>| u16::try_from(entry.integer(0..1 << 16)?).ok();
+    let read = ["set", "clear", "set_disabled", "set_in_some"].map(|key| optional(section.get(key), bits));
+    section.finish();
+    let [set, clear, set_disabled, set_in_some] = read;
+    Some([set?, clear?, set_disabled?, set_in_some?].map(Option::unwrap_or_default))
 }
 
 fn units(mut section: Section<'_>) -> Option<Vec<(u16, MotionUnit)>> {
@@ -182,6 +236,7 @@ fn delays(mut section: Section<'_>) -> Option<Delays> {
     let sdo_reply_ns = optional(section.get("sdo_reply"), delay);
     let mode_change_ns = optional(section.get("mode_change"), delay);
     let save_ns = optional(section.get("save"), delay);
+    let fault_reset_ns = optional(section.get("fault_reset"), delay);
     section.finish();
     Some(Delays {
         boot_up_ns: boot_up_ns?,
@@ -189,12 +244,13 @@ fn delays(mut section: Section<'_>) -> Option<Delays> {
         sdo_reply_ns: sdo_reply_ns?,
         mode_change_ns: mode_change_ns?,
         save_ns: save_ns?,
+        fault_reset_ns: fault_reset_ns?,
     })
 }
 
 const ERROR_CODES: &str =
     "an error code (object 603F) of four hexadecimal digits: 8611 = \"following error\"";
 
-fn error_code(key: &str) -> Option<u16> {
-    (key.len() == 4).then(|| u16::from_str_radix(key, 16).ok()).flatten()
+fn hexadecimal(text: &str) -> Option<u16> {
+    (text.len() == 4).then(|| u16::from_str_radix(text, 16).ok()).flatten()
 }

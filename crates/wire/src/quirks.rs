@@ -34,6 +34,14 @@ pub enum ObjectPattern {
 }
 
 impl ObjectPattern {
+    /// The first object that is meant.
+    pub fn first(self) -> ObjectAddress {
+        match self {
+            Self::Index(index) => ObjectAddress::new(index, 0),
+            Self::Address(exact) => exact,
+        }
+    }
+
     /// Returns `true` if an object is meant.
     pub fn matches(self, address: ObjectAddress) -> bool {
         match self {
@@ -75,6 +83,17 @@ pub struct Delays {
     pub mode_change_ns: Option<Nanoseconds>,
     /// From "save" in 1010 until it has taken effect.
     pub save_ns: Option<Nanoseconds>,
+    /// How long bit 7 of the controlword must stay set to reset a fault.
+    pub fault_reset_ns: Option<Nanoseconds>,
+}
+
+/// How the turn count of a multi-turn encoder is cleared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TurnCount {
+    /// Writing 1 to this object clears it.
+    pub clear: ObjectAddress,
+    /// The error code (603F) of a fault that needs this before it can be reset: the encoder has lost its count.
+    pub lost: Option<u16>,
 }
 
 /// In what a drive deviates from its data sheet and from CiA 402. The default deviates in nothing.
@@ -84,6 +103,12 @@ pub struct Quirks {
     pub drive: QuirkyDrive,
     /// The modes that it has, where object 6502 does not tell.
     pub modes: Option<Vec<OperationMode>>,
+    /// The modes that some units have beyond those that object 6502 tells; 6061 shows whether a unit has one.
+    pub undeclared_modes: Vec<OperationMode>,
+    /// True if it takes another mode only while it has no torque.
+    pub keeps_mode_with_torque: bool,
+    /// The object that has the target of interpolated position mode, where it is not 60C1:1.
+    pub interpolation_target: Option<ObjectAddress>,
     /// Counts of one turn of the position that it reports (6064) as it leaves the factory, where objects 608F and 6092 do not
     /// tell.
     pub counts_per_turn: Option<f64>,
@@ -91,10 +116,18 @@ pub struct Quirks {
     pub missing: Vec<ObjectPattern>,
     /// Objects that it refuses to write although its data sheet says otherwise.
     pub constant: Vec<ObjectPattern>,
+    /// Values of objects as it leaves the factory, where its data sheet leaves them open.
+    pub values: Vec<(ObjectAddress, i64)>,
+    /// How its turn count is cleared, if it has one that can be.
+    pub turn_count: Option<TurnCount>,
     /// Bits of the statusword (6041) that are always 1.
     pub statusword_set: u16,
     /// Bits of the statusword (6041) that are always 0.
     pub statusword_clear: u16,
+    /// Bits of the statusword (6041) that are 1 unless it is enabled.
+    pub statusword_set_disabled: u16,
+    /// Bits of the statusword (6041) that are always 1 in some units.
+    pub statusword_set_in_some: u16,
     /// The unit of a velocity or acceleration object, where objects 60A9 and 6096 do not tell.
     pub units: Vec<(u16, MotionUnit)>,
     /// The NMT state after the boot-up message.

@@ -19,7 +19,7 @@ use crate::family::bring_up::{
     AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat, identity,
     pdo_mapping, planner,
 };
-use crate::family::stops_by_itself_after;
+use crate::family::{DataSheet, stops_by_itself_after};
 
 const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::U32, "following error window");
 const ABORT_CONNECTION_OPTION: Object = Object::new(0x6007, 0, DataType::I16, "abort connection option code");
@@ -201,11 +201,16 @@ impl Sheet<'_> {
 
     async fn mode(&self) -> StepResult {
         let c = self.c;
-        c.step(
-            "mode of operation",
-            "choose another control mode for this axis; clear the drive's fault if it has one",
-        );
-        let mode = c.axis.control.operation_mode() as i64;
+        let mode = c.axis.control.operation_mode();
+        let advice = match self.device.quirks.undeclared_modes.contains(&mode) {
+            true => {
+                "not every firmware of this drive has this mode (object 6502 need not declare it; 6061 shows it): choose \
+                 another mode for this axis, such as mode = \"csp\""
+            }
+            false => "choose another control mode for this axis; clear the drive's fault if it has one",
+        };
+        c.step("mode of operation", advice);
+        let mode = mode as i64;
         c.write(MODES_OF_OPERATION, mode).await?;
         if !self.device.has(&MODES_OF_OPERATION_DISPLAY) {
             return Ok(());
@@ -243,7 +248,13 @@ impl Sheet<'_> {
             // In profile position mode the drive follows its own profile, so its following error is not limited here.
             let error =
                 if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
-            self.limit(FOLLOWING_ERROR_WINDOW, counts(axis, error)).await?;
+            let window = counts(axis, error);
+            // All ones, which is no window, would be -1 in an object with a sign.
+            let window = match DataSheet::data_type(self.device, FOLLOWING_ERROR_WINDOW.address) {
+                Some(DataType::I32) => window.min(i32::MAX.into()),
+                _ => window,
+            };
+            self.limit(FOLLOWING_ERROR_WINDOW, window).await?;
             self.limit(PROFILE_VELOCITY, profile_velocity_units(axis, limits.velocity)).await?;
         }
         for (object, acceleration) in [

@@ -1,6 +1,8 @@
 //! Commissioning of a drive by its data sheet: the tasks of the drive profile. What only a vendor's own objects can do is
 //! refused with what to do instead.
 
+use super::device::Device;
+use super::turns;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::profile;
 use crate::family::commission::report::Report;
@@ -13,12 +15,18 @@ pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Re
     if let Some(done) = profile::carry_out(c, s, &task).await {
         return done;
     }
-    match task {
-        Task::Home { method, within_ns, is_forced } => {
+    let turn_count = s.drive.description().and_then(|device: &Device| device.quirks.turn_count);
+    match (task, turn_count) {
+        (Task::Zero { is_confirmed }, Some(turns)) => turns::zero(c, s, turns, is_confirmed).await,
+        (Task::ClearFault { is_confirmed }, Some(turns)) => {
+            let before = async |code| turns::before_fault_reset(c, s, turns, code, is_confirmed).await;
+            profile::fault::clear(c, s, before).await
+        }
+        (Task::Home { method, within_ns, is_forced }, _) => {
             profile::homing::home(c, s, method, within_ns, is_forced).await
         }
-        Task::ClearFault { .. } => profile::fault::clear(c, s, async |_| Ok(())).await,
-        task => Err(unsupported(&task)),
+        (Task::ClearFault { .. }, None) => profile::fault::clear(c, s, async |_| Ok(())).await,
+        (task, _) => Err(unsupported(&task)),
     }
 }
 

@@ -217,10 +217,15 @@ impl Device {
             (None, Some(bits)) => ModeSet(bits),
             (None, None) => having(&MARKS),
         };
-        let can_interpolate = self.entry(INTERPOLATION_DATA).is_none_or(|data| data.is_mappable);
-        let not_by_process_data =
-            if can_interpolate { 0 } else { ModeSet::of(&[OperationMode::InterpolatedPosition]).0 };
-        ModeSet(told.0 & having(&TARGETS).0 & !not_by_process_data)
+        let told = told.0 | ModeSet::of(&self.quirks.undeclared_modes).0;
+        let interpolated = ModeSet::of(&[OperationMode::InterpolatedPosition]).0;
+        let targets = having(&TARGETS).0;
+        let targets = match self.quirks.interpolation_target {
+            Some(target) if self.is_mappable(target) => targets | interpolated,
+            None if self.entry(INTERPOLATION_DATA).is_none_or(|data| data.is_mappable) => targets,
+            _ => targets & !interpolated,
+        };
+        ModeSet(told & targets)
     }
 
     /// The unit of a velocity or an acceleration object by the quirks, if they tell.
@@ -311,10 +316,13 @@ impl Device {
                 .into_iter()
                 .find(|control| modes.contains(control.operation_mode()))
                 .unwrap_or(Control::Position),
-            interpolation_target: match self.is_mappable(INTERPOLATION_DATA) {
-                true => MappedObject::new(INTERPOLATION_DATA.index, INTERPOLATION_DATA.subindex, 32),
-                false => standard.interpolation_target,
-            },
+            interpolation_target: self
+                .quirks
+                .interpolation_target
+                .or(self.is_mappable(INTERPOLATION_DATA).then_some(INTERPOLATION_DATA))
+                .map_or(standard.interpolation_target, |target| {
+                    MappedObject::new(target.index, target.subindex, 32)
+                }),
             has_fixed_process_data: !self.is_mapped_freely(),
             reports_mode: self.is_mappable(ObjectAddress::new(0x6061, 0)),
             node_axis: self.node_axis,
@@ -353,6 +361,7 @@ impl DataSheet for Device {
     fn adds_mode(&self, mode: OperationMode) -> bool {
         let tells = self.number(SUPPORTED_MODES).is_some_and(|bits| bits != 0);
         match (&self.quirks.modes, mode) {
+            _ if self.quirks.undeclared_modes.contains(&mode) => true,
             (Some(modes), _) => modes.contains(&mode),
             (None, OperationMode::Homing) => !tells && self.has(&HOMING_METHOD),
             (None, mode) => !tells && self.modes().contains(mode),

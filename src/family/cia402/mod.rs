@@ -9,6 +9,7 @@ mod device;
 mod remarks;
 mod simulated;
 mod starting;
+mod turns;
 
 pub use device::Device;
 use remarks::remarks;

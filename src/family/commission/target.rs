@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{Nanoseconds, OperationMode, Scale, ScaleError, ScaleParameters};
-use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::object::{DataType, ObjectAddress};
 
 use super::failure::Failure;
 use crate::config::{Axis, DriveFamily, Limits, Quantity, Travel};
@@ -112,6 +112,11 @@ impl TargetDrive {
     /// Returns `true` if the drive has an object, as far as its data sheet tells.
     pub fn has(&self, address: ObjectAddress) -> bool {
         self.data_sheet().is_none_or(|sheet| sheet.has(address))
+    }
+
+    /// The type that the data sheet of the drive gives an object.
+    pub(in crate::family) fn data_type(&self, address: ObjectAddress) -> Option<DataType> {
+        self.data_sheet()?.data_type(address)
     }
 
     /// The name that the data sheet of the drive gives an object.

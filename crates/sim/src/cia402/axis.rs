@@ -15,7 +15,7 @@ use super::Cia402AxisParameters;
 use super::device::{Change, Device, FaultReaction};
 use super::homing::HomingStep;
 use super::motion::Motion;
-use super::places::Places;
+use super::places::{self, Places};
 use super::profile::Profile;
 use super::units::{CommissionedScale, Units, units_per_turn};
 
@@ -48,6 +48,11 @@ pub struct Axis {
     units: Units,
     modes: u32,
     mode_change_ns: Nanoseconds,
+    keeps_mode_with_torque: bool,
+    /// True after a fault that has cost it its turn count, until that is cleared.
+    has_lost_turns: bool,
+    /// Bits of the statusword that are always 1, always 0, and 1 unless it is enabled.
+    status_bits: [u16; 3],
     device: Device,
     motion: Motion,
     servo: Servo,
@@ -72,7 +77,11 @@ impl Axis {
         dictionary: &mut SimulatedDictionary,
         quirks: &Quirks,
     ) -> Self {
-        let places = Places::of(dictionary, number);
+        let mut places = Places::of(dictionary, number);
+        if let Some(target) = quirks.interpolation_target {
+            places.interpolation_data =
+                dictionary.place(target.index + number * places::AXIS_OFFSET, target.subindex);
+        }
         let Cia402AxisParameters { rated_torque, peak_torque, .. } = parameters;
         commission(dictionary, places.rated_torque, (1000.0 * rated_torque).round());
         for limit in [places.max_torque, places.positive_torque_limit, places.negative_torque_limit] {
@@ -94,7 +103,10 @@ impl Axis {
             // The velocity mode of frequency converters is not simulated.
             modes: modes_of(dictionary, &places, quirks) & !OperationMode::Velocity.supported_bit(),
             mode_change_ns: quirks.delays.mode_change_ns.unwrap_or(super::MODE_CHANGE_NS),
-            device: Device::starting(),
+            keeps_mode_with_torque: quirks.keeps_mode_with_torque,
+            has_lost_turns: false,
+            status_bits: [quirks.statusword_set, quirks.statusword_clear, quirks.statusword_set_disabled],
+            device: Device::starting(quirks.delays.fault_reset_ns.unwrap_or(0)),
             motion: Motion::new(),
             servo,
             joint,
@@ -138,8 +150,33 @@ impl Axis {
 
     /// Its statusword.
     pub fn statusword(&self) -> u16 {
-        let bits = if self.state() == DriveState::OperationEnabled { self.mode_bits } else { 0 };
-        self.device.statusword(bits)
+        let [set, clear, set_disabled] = self.status_bits;
+        let bits = if self.state() == DriveState::OperationEnabled { self.mode_bits } else { set_disabled };
+        self.device.statusword(bits) & !clear | set
+    }
+
+    /// Returns `true` if it now refuses to take another mode.
+    pub fn keeps_mode(&self) -> bool {
+        self.keeps_mode_with_torque && self.device.state().has_torque()
+    }
+
+    /// From now on its turn count is lost.
+    pub fn lose_turns(&mut self) {
+        self.has_lost_turns = true;
+    }
+
+    /// Returns `true` if its turn count is lost.
+    pub fn has_lost_turns(&self) -> bool {
+        self.has_lost_turns
+    }
+
+    /// Sets its turn count to 0. The position within a turn stays.
+    pub fn clear_turns(&mut self) {
+        self.has_lost_turns = false;
+        let position = self.position();
+        let within_turn = position.rem_euclid(self.parameters.counts_per_turn.abs().max(1.0));
+        self.offset += within_turn - position;
+        self.motion.shift(within_turn - position);
     }
 
     /// Its mode of operation, as in 6061; 0 for none.
@@ -207,6 +244,9 @@ impl Axis {
 
     /// 6061 follows 6060 after a moment, if the axis has the mode.
     pub fn follow_mode(&mut self, dictionary: &SimulatedDictionary, now_ns: Nanoseconds) {
+        if self.keeps_mode() {
+            return self.coming_mode = None;
+        }
         let number = dictionary.number_at(self.places.mode).unwrap_or(0) as i8;
         let wanted = OperationMode::from_number(number).filter(|mode| self.modes & mode.supported_bit() != 0);
         self.coming_mode = match (wanted, self.coming_mode) {
@@ -220,6 +260,9 @@ impl Axis {
     fn take_coming_mode(&mut self, dictionary: &SimulatedDictionary, now_ns: Nanoseconds) {
         let Some(coming) = self.coming_mode.filter(|coming| coming.due_ns <= now_ns) else { return };
         self.coming_mode = None;
+        if self.keeps_mode() {
+            return;
+        }
         self.mode = Some(coming.mode);
         if self.device.state().has_torque() && self.device.stop().is_none() {
             self.engage(dictionary);
@@ -233,11 +276,11 @@ impl Axis {
     }
 
     /// Evaluates the controlword in the state machine and in the mode. Returns whether a fault was reset.
-    pub fn evaluate(&mut self, dictionary: &SimulatedDictionary) -> bool {
+    pub fn evaluate(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) -> bool {
         let word = dictionary.number_at(self.places.controlword).unwrap_or(0) as u16;
         let previous = self.device.controlword();
         let had_stop = self.device.stop().is_some();
-        let change = self.device.evaluate(word, &self.places, dictionary, true);
+        let change = self.device.evaluate(now_ns, word, &self.places, dictionary, !self.has_lost_turns);
         if change == Change::Enabled {
             self.servo.reset();
             self.engage(dictionary);
@@ -305,7 +348,7 @@ impl Axis {
     ) -> Option<AxisEvent> {
         let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
         self.take_coming_mode(dictionary, now_ns);
-        let mut event = self.evaluate(dictionary).then_some(AxisEvent::FaultReset);
+        let mut event = self.evaluate(now_ns, dictionary).then_some(AxisEvent::FaultReset);
         let is_driven = self.device.state().has_torque();
         if is_driven {
             self.drive(dictionary, duration_s);
@@ -386,13 +429,12 @@ impl Axis {
     }
 
     /// Writes the measured values to the dictionary.
-    pub fn measure(&self, quirks: &Quirks, dictionary: &mut SimulatedDictionary) {
+    pub fn measure(&self, dictionary: &mut SimulatedDictionary) {
         let Self { places, units, parameters, .. } = self;
         let position = self.position();
         let per_mille = 1000.0 * self.torque / parameters.rated_torque;
         let velocity = self.joint.velocity() * units.position;
-        let statusword = self.statusword() & !quirks.statusword_clear | quirks.statusword_set;
-        dictionary.set_at(places.statusword, statusword.into());
+        dictionary.set_at(places.statusword, self.statusword().into());
         dictionary.set_at(places.mode_display, self.mode_number().into());
         dictionary.set_at(places.position, position.round_ties_even() as i64);
         dictionary.set_at(places.position_increments, position.round_ties_even() as i64);
@@ -430,15 +472,20 @@ fn commission_open(dictionary: &mut SimulatedDictionary, place: Option<usize>, v
     }
 }
 
-/// The modes of an axis, as bits of object 6502: by the quirks, by that object, or by the objects that only one mode has. No
-/// object tells of a cyclic mode.
+/// The modes of an axis, as bits of object 6502: by the quirks, by that object, or by the objects that only one mode has, and those
+/// that the quirks add. No object tells of a cyclic mode.
 fn modes_of(dictionary: &SimulatedDictionary, places: &Places, quirks: &Quirks) -> u32 {
-    if let Some(modes) = &quirks.modes {
-        return modes.iter().fold(0, |bits, mode| bits | mode.supported_bit());
-    }
-    if let Some(supported) = dictionary.number_at(places.supported_modes).filter(|modes| *modes != 0) {
-        return supported as u32;
-    }
+    let bits = |modes: &[OperationMode]| modes.iter().fold(0, |bits, mode| bits | mode.supported_bit());
+    let stated = dictionary.number_at(places.supported_modes).filter(|modes| *modes != 0);
+    let own = match (&quirks.modes, stated) {
+        (Some(modes), _) => bits(modes),
+        (None, Some(stated)) => stated as u32,
+        (None, None) => modes_by_objects(places),
+    };
+    own | bits(&quirks.undeclared_modes)
+}
+
+fn modes_by_objects(places: &Places) -> u32 {
     let of = |mode: OperationMode, demanded: &[Option<usize>]| {
         if demanded.iter().all(Option::is_some) { mode.supported_bit() } else { 0 }
     };

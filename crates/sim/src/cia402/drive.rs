@@ -46,7 +46,12 @@ impl Cia402Drive {
     /// The data sheet describes no CiA 402 drive with so many axes.
     pub fn new(parameters: Cia402Parameters) -> Result<Self, NotADrive> {
         let mut dictionary = dictionary_of(&parameters)?;
-        let Cia402Parameters { node, quirks, axes, power_up_ns, feedback_delay_ns, seed, .. } = parameters;
+        let Cia402Parameters { node, mut quirks, axes, power_up_ns, feedback_delay_ns, seed, .. } =
+            parameters;
+        let mut random = Random::new(seed, node);
+        if quirks.statusword_set_in_some != 0 && random.next_u64() & 1 == 1 {
+            quirks.statusword_set |= quirks.statusword_set_in_some;
+        }
         let delays = NodeDelays {
             power_up_ns: quirks.delays.boot_up_ns.unwrap_or(power_up_ns),
             feedback_ns: feedback_delay_ns,
@@ -62,7 +67,7 @@ impl Cia402Drive {
             SdoFeatures::Blocks
         };
         let latency_ns = SHORTEST_REPLY_NS.min(longest_ns)..longest_ns + 1;
-        let sdo = SdoServer::new(Random::new(seed, node), latency_ns, features);
+        let sdo = SdoServer::new(random, latency_ns, features);
         let pdo_features = PdoFeatures { is_measured, watches_rpdos: true };
         Ok(Self {
             canopen: CanopenNode::new(node, dictionary, quirks.power_up, sdo, pdo_features, delays),
@@ -119,9 +124,9 @@ impl Cia402Drive {
     }
 
     /// Evaluates the controlwords.
-    fn evaluate(&mut self) {
+    fn evaluate(&mut self, now_ns: Nanoseconds) {
         for index in 0..self.axes.len() {
-            if self.axes[index].evaluate(&self.canopen.dictionary) {
+            if self.axes[index].evaluate(now_ns, &self.canopen.dictionary) {
                 self.fault_reset(index);
             }
         }
@@ -166,7 +171,7 @@ impl CanopenDevice for Cia402Drive {
 
     fn take_values(&mut self, now_ns: Nanoseconds, _: ValueSource) {
         self.follow_modes(now_ns);
-        self.evaluate();
+        self.evaluate(now_ns);
         self.latch();
     }
 
@@ -175,7 +180,7 @@ impl CanopenDevice for Cia402Drive {
     }
 
     fn measure(&mut self) {
-        self.axes.iter().for_each(|axis| axis.measure(&self.quirks, &mut self.canopen.dictionary));
+        self.axes.iter().for_each(|axis| axis.measure(&mut self.canopen.dictionary));
     }
 
     /// The torque takes the place of the position.
@@ -190,7 +195,12 @@ impl CanopenDevice for Cia402Drive {
     }
 
     fn started(&mut self, now_ns: Nanoseconds) {
-        self.axes.iter_mut().for_each(|axis| axis.started(&self.canopen.dictionary, now_ns));
+        for index in 0..self.axes.len() {
+            self.axes[index].started(&self.canopen.dictionary, now_ns);
+            if self.axes[index].has_lost_turns() {
+                self.fail(index, DeviceError::Fault(DriveFault::MultiTurnBattery));
+            }
+        }
     }
 
     fn restart(&mut self, now_ns: Nanoseconds) {
@@ -217,8 +227,9 @@ impl CanopenDevice for Cia402Drive {
         }
     }
 
-    fn check_write(&self, _: usize) -> Result<(), AbortCode> {
-        Ok(())
+    fn check_write(&self, place: usize) -> Result<(), AbortCode> {
+        let is_kept = self.axes.iter().any(|axis| axis.places.mode == Some(place) && axis.keeps_mode());
+        if is_kept { Err(AbortCode::DeviceState) } else { Ok(()) }
     }
 
     fn check_value(&self, _: ObjectAddress, _: usize, _: i64) -> Result<(), AbortCode> {
@@ -226,12 +237,18 @@ impl CanopenDevice for Cia402Drive {
     }
 
     fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+        if self.quirks.turn_count.is_some_and(|turns| turns.clear == address) {
+            let place = self.canopen.dictionary.place(address.index, address.subindex);
+            if self.canopen.dictionary.number_at(place) == Some(1) {
+                self.axes[0].clear_turns();
+            }
+        }
         let object = match address.index {
             0x6000..=0x9FFF => 0x6000 + (address.index - 0x6000) % AXIS_OFFSET,
             _ => return,
         };
         match object {
-            0x6040 => self.evaluate(),
+            0x6040 => self.evaluate(now_ns),
             0x6060 => self.follow_modes(now_ns),
             0x607A | 0x60C1 => self.latch(),
             0x607E | 0x608F | 0x6091 | 0x6092 | 0x6096 | 0x60A9 => {
@@ -263,6 +280,9 @@ impl Drive for Cia402Drive {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
+            if fault == DriveFault::MultiTurnBattery && self.quirks.turn_count.is_some() {
+                self.axes[0].lose_turns();
+            }
             self.fail(0, DeviceError::Fault(fault));
         }
         self.advance_node(now_ns, mailbox);

@@ -117,7 +117,12 @@ fn dictionary_of(parameters: &Cia402Parameters) -> Result<SimulatedDictionary, N
     }
     let is_missing = |address| quirks.is_missing(address);
     let is_constant = |address| quirks.is_constant(address);
-    let dictionary = SimulatedDictionary::of(sheet, *node, is_missing, is_constant);
+    let mut dictionary = SimulatedDictionary::of(sheet, *node, is_missing, is_constant);
+    for (address, value) in &quirks.values {
+        if let Ok(place) = dictionary.find(*address) {
+            dictionary.set_factory(place, *value);
+        }
+    }
     for axis in 0..axes.len() {
         for index in [0x6040, 0x6041] {
             let address = ObjectAddress::new(index + axis as u16 * places::AXIS_OFFSET, 0);
