@@ -23,9 +23,11 @@ pub struct Urdf {
 }
 
 /// A joint as it is written.
+#[derive(Default)]
 struct Joint {
     name: String,
     kind: String,
+    elements: Vec<String>,
     /// Elements of the joint, their attributes and values.
     values: Vec<(String, String, String)>,
 }
@@ -98,7 +100,8 @@ impl Urdf {
         if !MOVED.contains(&kind) {
             return Err(UrdfError::NotMoved { file, joint: name, kind });
         }
-        if let Some(mimicked) = joint.value("mimic", "joint") {
+        if joint.has("mimic") {
+            let mimicked = joint.value("mimic", "joint").unwrap_or_default();
             return Err(UrdfError::Mimics { file, joint: name, mimicked: excerpt(mimicked) });
         }
         let is_linear = kind == SLIDES;
@@ -176,6 +179,10 @@ impl Urdf {
 }
 
 impl Joint {
+    fn has(&self, element: &str) -> bool {
+        self.elements.iter().any(|name| name == element)
+    }
+
     fn value(&self, element: &str, attribute: &str) -> Option<&str> {
         let mut values = self.values.iter();
         values.find(|(of, name, _)| of == element && name == attribute).map(|(.., value)| value.as_str())
@@ -236,7 +243,7 @@ impl Joints {
             2 => {
                 self.is_in_joint = name == "joint";
                 if self.is_in_joint {
-                    let mut joint = Joint { name: String::new(), kind: String::new(), values: vec![] };
+                    let mut joint = Joint::default();
                     for (key, value) in attributes(element, decoder)? {
                         match key.as_str() {
                             "name" => joint.name = value,
@@ -250,6 +257,7 @@ impl Joints {
             }
             3 if self.is_in_joint && READ.contains(&name.as_str()) => {
                 let Some(joint) = self.read.last_mut() else { return Ok(()) };
+                joint.elements.push(name.clone());
                 let attributes = attributes(element, decoder)?;
                 joint.values.extend(attributes.into_iter().map(|(key, value)| (name.clone(), key, value)));
                 Ok(())
@@ -336,6 +344,9 @@ mod tests {
         assert_eq!(joint.position, Some(([-1.0, 2.0], LimitOrigin::Limit)));
         assert_eq!((joint.effort, joint.velocity), (Some(3.0), Some(4.0)));
         assert!(!urdf.has_joint("t"));
+        let mimics = text.replace("<limit lower='-1'", "<mimic/><limit lower='-1'");
+        let refused = Urdf::parse(Path::new("arm.urdf"), &mimics).unwrap().joint("j", Travel::Rotary);
+        assert!(matches!(refused, Err(UrdfError::Mimics { .. })), "{refused:?}");
         let refused = urdf.joint("other", Travel::Rotary).unwrap_err().to_string();
         assert_eq!(refused, "arm.urdf is no URDF: the joint \"other\" has the type \"screw\"");
         let urdf = Urdf::parse(Path::new("arm.urdf"), &text.replace("upper='2'", "upper='2 rad'")).unwrap();
