@@ -6,13 +6,13 @@ use crate::recorded_numbers::{Fixed, RecordedNumber, RecordedNumbers, stated_or}
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
 
-/// A rule is `NUMBER: NAME, KEY, CATEGORY;`. A fault is `NAME { FIELDS } => RULE, CURE;`: a recording keeps its fields,
+/// A rule is `NUMBER: NAME, KEY, CATEGORY, SENTENCE;`. A fault is `NAME { FIELDS } => RULE, CURE;`: a recording keeps its fields,
 /// in their order, or what stands behind `as`. Of several faults that break one rule, the first one whose condition
 /// behind `if` the two numbers meet is read. The order of the faults and the numbers of the rules are those of
 /// recordings: new ones come last.
 macro_rules! faults {
     (
-        rules { $($(#[$rule_doc:meta])* $number:literal: $rule:ident, $key:literal, $category:ident;)* }
+        rules { $($number:literal: $rule:ident, $key:literal, $category:ident, $says:literal;)* }
         faults {
             $($(#[$doc:meta])*
             $fault:ident $({ $($(#[$field_doc:meta])* $field:ident: $type:ty,)* })?
@@ -25,8 +25,7 @@ macro_rules! faults {
         #[repr(u8)]
         pub enum Rule {
             $(
-                $(#[$rule_doc])*
-                #[doc = concat!("Key: `", $key, "`.")]
+                #[doc = concat!("`", $key, "`: ", $says, ".")]
                 $rule = $number,
             )*
         }
@@ -39,6 +38,13 @@ macro_rules! faults {
             pub const fn key(self) -> &'static str {
                 match self {
                     $(Self::$rule => $key,)*
+                }
+            }
+
+            /// What breaks it, for people.
+            pub const fn sentence(self) -> &'static str {
+                match self {
+                    $(Self::$rule => $says,)*
                 }
             }
 
@@ -101,47 +107,46 @@ macro_rules! faults {
 
 faults! {
     rules {
-        /// The stop was asked for.
-        0: Requested, "requested", Two;
-        1: NotFinite, "not_finite", Two;
-        2: PositionLimit, "position_limit", Two;
-        3: VelocityLimit, "velocity_limit", Two;
-        4: AccelerationLimit, "acceleration_limit", Two;
-        5: FollowingError, "following_error", One;
-        6: StaleCommand, "stale_command", Two;
-        7: MissedFeedback, "missed_feedback", One;
-        8: DriveFault, "drive_fault", One;
-        9: DriveDisabled, "drive_disabled", One;
-        10: ModeChanged, "mode_changed", One;
-        11: EnableTimeout, "enable_timeout", One;
-        12: NoTrajectory, "no_trajectory", Two;
-        13: BusLost, "bus_lost", One;
-        14: NotTransmitted, "not_transmitted", One;
-        15: NotAcknowledged, "not_acknowledged", One;
-        16: NodeLost, "node_lost", One;
-        17: NodeNotOperational, "node_not_operational", One;
-        18: UnexpectedBootUp, "unexpected_boot_up", One;
-        19: EmergencyMessage, "emergency_message", One;
-        20: DuplicateNode, "duplicate_node", One;
-        21: ForeignMaster, "foreign_master", One;
-        22: TimingUnfit, "timing_unfit", One;
-        23: StartPose, "start_pose", Two;
-        24: JerkLimit, "jerk_limit", Two;
-        25: BusErrorPassive, "bus_error_passive", Two;
-        26: ImplausibleFeedback, "implausible_feedback", One;
-        27: CallbackOverrun, "callback_overrun", Two;
-        28: CallbackPanicked, "callback_panicked", Two;
-        29: NoTorqueInMode, "no_torque_in_mode", Two;
-        30: StiffnessLimit, "stiffness_limit", Two;
-        31: DampingLimit, "damping_limit", Two;
-        32: ModeNotShown, "mode_not_shown", One;
-        33: NotDisabled, "not_disabled", One;
-        34: DriveEnabled, "drive_enabled", One;
-        35: DriveLocal, "drive_local", One;
-        36: MeasuredPosition, "measured_position", One;
-        37: MeasuredVelocity, "measured_velocity", One;
-        38: MeasuredTorque, "measured_torque", One;
-        39: NotAtRest, "not_at_rest", One;
+        0: Requested, "requested", Two, "the stop was asked for";
+        1: NotFinite, "not_finite", Two, "a set-point is no number";
+        2: PositionLimit, "position_limit", Two, "a set-point is outside the limits, or could not stop before one";
+        3: VelocityLimit, "velocity_limit", Two, "a set-point is faster than the limit";
+        4: AccelerationLimit, "acceleration_limit", Two, "a set-point accelerates more than the limit";
+        5: FollowingError, "following_error", One, "a joint is farther off its set-point than its following error limit, for longer than its time";
+        6: StaleCommand, "stale_command", Two, "a stream or a velocity has expired";
+        7: MissedFeedback, "missed_feedback", One, "a drive did not report for too many cycles";
+        8: DriveFault, "drive_fault", One, "a drive reports a fault";
+        9: DriveDisabled, "drive_disabled", One, "a drive left operation enabled by itself";
+        10: ModeChanged, "mode_changed", One, "a drive has another mode than the one that it was given";
+        11: EnableTimeout, "enable_timeout", One, "a drive was not enabled in time";
+        12: NoTrajectory, "no_trajectory", Two, "a move could not be planned";
+        13: BusLost, "bus_lost", One, "bus-off, or the interface is down";
+        14: NotTransmitted, "not_transmitted", One, "set-points do not get onto the wire, or the queue is full";
+        15: NotAcknowledged, "not_acknowledged", One, "a drive in profile position does not acknowledge its target";
+        16: NodeLost, "node_lost", One, "a drive's heartbeat ceased";
+        17: NodeNotOperational, "node_not_operational", One, "a drive has left the NMT state operational";
+        18: UnexpectedBootUp, "unexpected_boot_up", One, "a drive has started anew";
+        19: EmergencyMessage, "emergency_message", One, "a drive sent an emergency message without a fault that explains it";
+        20: DuplicateNode, "duplicate_node", One, "two nodes have one node ID";
+        21: ForeignMaster, "foreign_master", One, "another node sends SYNC, set-points or NMT";
+        22: TimingUnfit, "timing_unfit", One, "too many slots were missed: see missed_slots";
+        23: StartPose, "start_pose", Two, "a stream begins too far from the joint";
+        24: JerkLimit, "jerk_limit", Two, "a set-point of a stream changes its acceleration faster than the limit";
+        25: BusErrorPassive, "bus_error_passive", Two, "the CAN controller has gone error passive";
+        26: ImplausibleFeedback, "implausible_feedback", One, "a joint is reported where it cannot have got to";
+        27: CallbackOverrun, "callback_overrun", Two, "a call of a callback took longer than its budget";
+        28: CallbackPanicked, "callback_panicked", Two, "a callback panicked";
+        29: NoTorqueInMode, "no_torque_in_mode", Two, "a torque or an impedance was wanted in another mode than \"cst\"";
+        30: StiffnessLimit, "stiffness_limit", Two, "an impedance was wanted that is stiffer than stiffness_max";
+        31: DampingLimit, "damping_limit", Two, "an impedance was wanted with more damping than damping_max";
+        32: ModeNotShown, "mode_not_shown", One, "a drive does not show the mode that it was changed to";
+        33: NotDisabled, "not_disabled", One, "a drive has not confirmed in time that it is disabled";
+        34: DriveEnabled, "drive_enabled", One, "a drive has torque while its group is disabled";
+        35: DriveLocal, "drive_local", One, "an enabled drive has cleared its remote bit (statusword bit 9)";
+        36: MeasuredPosition, "measured_position", One, "an enabled joint is beyond a position limit by more than its following error limit";
+        37: MeasuredVelocity, "measured_velocity", One, "an enabled joint is faster than 1.2 times its limit";
+        38: MeasuredTorque, "measured_torque", One, "an enabled drive exerts more than 1.2 times the limit for long, and not what it limits itself to (6072)";
+        39: NotAtRest, "not_at_rest", One, "a joint moves while it is to be enabled";
     }
     faults {
         /// A set-point, or the torque that is made of it here, was not a finite number.

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use super::bounds::Bounds;
 use super::drive_family::DriveFamily;
+use super::keys;
 use super::quantity::Quantity;
-use super::ranges;
 use super::read::section::Section;
 
 /// A family as the reader of configurations knows it.
@@ -55,9 +55,9 @@ impl<'s, 'a> FamilyKeys<'s, 'a> {
     /// The number of the axis among those of its node, `node_axis`; 1 where the key is not there. `None` if it is no such number,
     /// which is reported.
     pub fn node_axis(&mut self) -> Option<u8> {
-        match self.section.get("node_axis") {
+        match self.section.keyed(&keys::family::NODE_AXIS) {
             None => Some(1),
-            Some(entry) => entry.integer(ranges::NODE_AXIS).and_then(|number| u8::try_from(number).ok()),
+            Some(entry) => entry.integer(),
         }
     }
 

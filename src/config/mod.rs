@@ -2,8 +2,9 @@
 //!
 //! [`Config::load`] reads a file and either gives a configuration in which every value is possible, or a
 //! [`ConfigError`] with every problem of the file, each with its line and a way out. Quantities are bare numbers in SI
-//! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
+//! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format: [`reference()`].
 
+mod axis_ranges;
 #[doc(hidden)]
 pub mod bit_fields;
 pub(crate) mod bounds;
@@ -20,6 +21,8 @@ mod identity;
 mod in_code;
 mod interface;
 mod interface_error;
+mod key;
+mod keys;
 mod mode_words;
 mod model;
 mod position_unit;
@@ -27,10 +30,11 @@ mod problem_kind;
 pub(crate) mod quantities;
 pub(crate) mod quantity;
 pub mod quirks;
-mod ranges;
 pub(crate) mod read;
+mod reference;
 mod rules;
 mod scale;
+mod schema;
 mod sources;
 mod spelling;
 pub(crate) mod spot;
@@ -56,6 +60,8 @@ pub use position_unit::PositionUnit;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
 pub(crate) use read::{Knowledge, PhaseChoice, parse};
+pub use reference::reference;
+pub use schema::schema;
 pub use sources::{ConfigSources, SourcesError};
 pub use supervision::Supervision;
 pub use urdf::{Urdf, UrdfJoint};

@@ -1,8 +1,12 @@
 //! The fields of a configuration, by the paths of their keys.
 
+use std::fmt::Display;
+
 use takt_wire::printable::excerpt;
 
+use crate::config::key::Key;
 use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::Quantities;
 use crate::config::spot::{Problems, Spot};
 
 /// A name of a bus, an axis or a machine.
@@ -33,6 +37,26 @@ impl<'a> Fields<'a> {
         // `bus.period` is what a field of an axis may be at odds with; it is no field of the axis.
         let key = if key.starts_with("bus.") { key.to_owned() } else { format!("{}{key}", self.prefix) };
         Spot::field(key, &self.of, self.problems)
+    }
+
+    /// Checks a whole number by its row.
+    pub fn integer<T: Copy + Display + TryInto<i64>>(&self, key: &Key, value: T) -> Option<T> {
+        self.at(key.name).integer_of(key, value)
+    }
+
+    /// Checks a duration in ns by its row.
+    pub fn duration(&self, key: &Key, ns: u64) -> Option<u64> {
+        self.at(key.name).duration_of(key, ns)
+    }
+
+    /// Checks a bare number by its row.
+    pub fn number(&self, key: &Key, value: f64) -> Option<f64> {
+        self.at(key.name).number_of(key, value)
+    }
+
+    /// Checks a quantity by its row.
+    pub fn quantity(&self, key: &Key, quantities: Quantities, value: f64) -> Option<f64> {
+        self.at(key.name).quantity_of(key, quantities, value)
     }
 
     pub fn within(&self, key: &str) -> Self {

@@ -24,8 +24,8 @@ mod this_machine;
 pub use fields::{Fields, name};
 
 use super::error::ConfigError;
+use super::keys;
 use super::model::{Config, StreamDelay};
-use super::ranges;
 use super::spot::Problems;
 
 impl Config {
@@ -40,7 +40,7 @@ impl Config {
         name(&whole.at("name"), &self.name);
         cycle::validate(&self.cycle, &self.missed_slots, &whole.within("cycle"));
         if let StreamDelay::Fixed(delay_ns) = self.stream_delay {
-            whole.at("stream.delay").duration(delay_ns, ranges::STREAM_DELAY_S);
+            whole.within("stream").duration(&keys::stream::DELAY, delay_ns);
         }
         realtime::validate(&self.realtime, self.cycle.period_ns, &whole.within("realtime"));
         master::validate(&self.master, &whole.within("master"));
