@@ -8,10 +8,6 @@ use crate::controller::StartFailure;
 #[cfg(target_os = "linux")]
 use crate::controller::session::SessionError;
 use crate::faults::ScenarioError;
-#[cfg(target_os = "linux")]
-use crate::remote::ConnectError;
-#[cfg(target_os = "linux")]
-use crate::serve::ServeError;
 
 pub use crate::controller::assemble::AssembleError;
 #[cfg(target_os = "linux")]
@@ -55,14 +51,6 @@ pub enum Error {
     /// A controller in virtual time could not be made.
     #[error(transparent)]
     Assemble(#[from] AssembleError),
-    /// A controller of another process cannot be connected to.
-    #[cfg(target_os = "linux")]
-    #[error(transparent)]
-    Connect(#[from] ConnectError),
-    /// A controller cannot be offered to other processes.
-    #[cfg(target_os = "linux")]
-    #[error(transparent)]
-    Serve(#[from] ServeError),
     /// A command was not executed.
     #[error(transparent)]
     Command(#[from] CommandError),
@@ -90,10 +78,6 @@ impl fmt::Debug for Error {
             #[cfg(target_os = "linux")]
             Self::Session(error) => error,
             Self::Assemble(error) => error,
-            #[cfg(target_os = "linux")]
-            Self::Connect(error) => error,
-            #[cfg(target_os = "linux")]
-            Self::Serve(error) => error,
             Self::Command(error) => error,
             Self::Motion(error) => error,
             Self::Stream(error) => error,

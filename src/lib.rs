@@ -26,8 +26,7 @@
 //!
 //! # What is here
 //! The root has what most programs need: [`Config`], [`Controller`] and its [`Handle`]s, [`VirtualController`], [`VirtualRun`], [`Trajectory`], the
-//! [`Snapshot`] and the [`Event`]s that they give, and their errors; [`serve`](serve()) and [`connect`] for a controller of another
-//! process. The rest is in modules, one for each subject:
+//! [`Snapshot`] and the [`Event`]s that they give, and their errors. The rest is in modules, one for each subject:
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`trajectory`]: points with times, checked as a whole before they are carried out.
@@ -63,9 +62,7 @@
 //!
 //! ```text
 //! error                               one error for a program that embeds takt
-//! serve                               a running controller, offered to other processes
-//! controller                          the engine of a configuration, its life, its ports, the handles
-//! remote                              a controller of another process: shared state, packets, the client
+//! //! controller                          the engine of a configuration, its life, its ports, the handles
 //! command                             what may be asked of a running controller, and how it is refused
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! faults                              faults on purpose
@@ -78,8 +75,9 @@
 //! trajectory packet sleep_alignment monotonic_clock
 //! ```
 //!
-//! The tools, the panel and the program `takt` stand on this crate, as crates of their own. It stands on [`takt_sim`] (simulated buses and
-//! drives), [`takt_wire`] (protocols without I/O, times of frames on the wire, logs of frames) and [`takt_rt`].
+//! A controller of another process (`takt-remote`), the tools, the panel and the program `takt` stand on this crate, as crates of their
+//! own. It stands on [`takt_sim`] (simulated buses and drives), [`takt_wire`] (protocols without I/O, times of frames on the wire, logs of
+//! frames) and [`takt_rt`].
 //!
 //! A run meets the parts in this order: `config` reads the file, `link` opens the buses, `schedule` says whether everything fits,
 //! `controller` assembles the engine, paces it in the real-time thread or in virtual time, and leads it through its life (bring-up by
@@ -112,13 +110,6 @@ pub mod controller;
 pub mod journal;
 #[doc(hidden)]
 pub mod procedure;
-#[cfg(target_os = "linux")]
-#[doc(hidden)]
-#[allow(unnameable_types, reason = "the other crates of this project are handed them")]
-pub mod remote;
-#[cfg(target_os = "linux")]
-#[doc(hidden)]
-pub mod serve;
 
 mod monotonic_clock;
 mod packet;
@@ -150,10 +141,6 @@ pub use family::simulated_bus;
 pub use faults::{FaultInjector, Scenario};
 #[cfg(target_os = "linux")]
 pub use link::IfOwned;
-#[cfg(target_os = "linux")]
-pub use remote::{Client, ClientEvents, ClientGroup, ClientStream, ConnectError, connect};
-#[cfg(target_os = "linux")]
-pub use serve::{ServeError, ServeOptions, Server, serve};
 pub use telemetry::{Notice, RecordingDestination};
 pub use trajectory::{Interpolation, Trajectory, TrajectoryError, TrajectoryPoint};
 

@@ -1,16 +1,12 @@
-//! The words of a packet, one after another. What is taken from a packet of another process is checked word by word.
+//! The words of an entry of a journal, one after another. What is taken from a file is checked word by word.
 
-use std::time::Duration;
+use takt_rt::{AxisPoint, Frame, FrameKind, Id, MAX_GROUPS, PositionPoint, RequestTarget, StopCategory};
 
-use takt_rt::{
-    AxisPoint, Frame, FrameKind, Id, MAX_GROUPS, OperationMode, PositionPoint, RequestTarget, StopCategory,
-};
-
-/// A packet does not say what a packet can say. Its sender is no client of takt, or its memory is damaged.
+/// The words are none of an entry: the file is damaged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Malformed;
 
-/// Puts the words of a packet.
+/// Puts the words of an entry.
 #[derive(Clone, Debug, Default)]
 pub struct Put(pub Vec<u64>);
 
@@ -35,22 +31,6 @@ impl Put {
     pub fn numbers(&mut self, numbers: &[f64]) -> &mut Self {
         self.index(numbers.len());
         self.0.extend(numbers.iter().map(|number| number.to_bits()));
-        self
-    }
-
-    /// A duration, as whole nanoseconds.
-    pub fn duration(&mut self, duration: Duration) -> &mut Self {
-        self.word(u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX))
-    }
-
-    /// A text behind its length in bytes.
-    pub fn text(&mut self, text: &str) -> &mut Self {
-        self.index(text.len());
-        for bytes in text.as_bytes().chunks(size_of::<u64>()) {
-            let mut whole = [0; size_of::<u64>()];
-            whole.iter_mut().zip(bytes).for_each(|(to, from)| *to = *from);
-            self.word(u64::from_ne_bytes(whole));
-        }
         self
     }
 
@@ -99,10 +79,7 @@ impl Put {
     }
 }
 
-/// The words of an axis of a point.
-pub const AXIS_POINT_WORDS: usize = 7;
-
-/// Takes the words of a packet.
+/// Takes the words of an entry.
 #[derive(Clone, Copy, Debug)]
 pub struct Take<'a>(pub &'a [u64]);
 
@@ -119,7 +96,7 @@ impl Take<'_> {
         usize::try_from(self.word()?).map_err(|_| Malformed)
     }
 
-    /// A count of things of so many words each, which the packet has.
+    /// A count of things of so many words each, which there are.
     pub fn count_of(&mut self, words_each: usize) -> Result<usize, Malformed> {
         let count = self.index()?;
         let needed = count.checked_mul(words_each).ok_or(Malformed)?;
@@ -135,21 +112,6 @@ impl Take<'_> {
     pub fn numbers(&mut self) -> Result<Vec<f64>, Malformed> {
         let count = self.count_of(1)?;
         (0..count).map(|_| self.number()).collect()
-    }
-
-    /// A duration.
-    pub fn duration(&mut self) -> Result<Duration, Malformed> {
-        self.word().map(Duration::from_nanos)
-    }
-
-    /// A text.
-    pub fn text(&mut self) -> Result<String, Malformed> {
-        let bytes = self.index()?;
-        let words = bytes.div_ceil(size_of::<u64>());
-        let (text, rest) = self.0.split_at_checked(words).ok_or(Malformed)?;
-        self.0 = rest;
-        let text: Vec<u8> = text.iter().flat_map(|word| word.to_ne_bytes()).take(bytes).collect();
-        String::from_utf8(text).map_err(|_| Malformed)
     }
 
     /// A frame.
@@ -194,12 +156,6 @@ impl Take<'_> {
         }
     }
 
-    /// A mode of operation.
-    pub fn mode(&mut self) -> Result<OperationMode, Malformed> {
-        let number = i8::try_from(self.word()?).map_err(|_| Malformed)?;
-        OperationMode::from_number(number).ok_or(Malformed)
-    }
-
     /// What a point says of an axis.
     pub fn axis_point(&mut self) -> Result<AxisPoint, Malformed> {
         let (head, position) = (self.word()?, self.number()?);
@@ -217,7 +173,7 @@ impl Take<'_> {
         }
     }
 
-    /// The packet has no more words.
+    /// There are no more words.
     pub fn end(self) -> Result<(), Malformed> {
         if self.0.is_empty() { Ok(()) } else { Err(Malformed) }
     }

@@ -223,6 +223,20 @@ impl Frame {
         Self { id, kind, length: bytes.len().min(Self::MAX_BYTES) as u8, data }
     }
 
+    /// Returns `true` if one of the constructors can make it. A frame that was decoded from bytes of another process need not be such.
+    #[cfg(feature = "checkpoint")]
+    pub fn is_valid(&self) -> bool {
+        let number = self.id.value();
+        let id = if self.id.is_extended() { Id::extended(number) } else { Id::base(number) };
+        let made = id.and_then(|id| match self.kind {
+            FrameKind::Data => Self::data(id, self.payload()),
+            FrameKind::Remote => Self::remote(id, self.length),
+            FrameKind::Fd => Self::fd(id, self.payload(), false),
+            FrameKind::FdBitRateSwitch => Self::fd(id, self.payload(), true),
+        });
+        made.is_ok_and(|made| made == *self && made.data == self.data)
+    }
+
     /// The identifier.
     pub const fn id(&self) -> Id {
         self.id

@@ -60,9 +60,9 @@ pub mod plan;
 mod port;
 mod profile;
 mod record;
+mod recorded_numbers;
 mod rejection;
 mod request;
-mod rule;
 pub mod slcan;
 mod source;
 mod stop;
@@ -100,7 +100,7 @@ pub use engine::{
     BusParameters, CanopenNetwork, CycleCount, CycleInput, Deadline, Engine, EngineParameters,
     GroupParameters, Heartbeat, Receiver, SEND_BATCH, SendBatch, SetUpError,
 };
-pub use fault::Fault;
+pub use fault::{Fault, Rule};
 pub use frame::{Frame, FrameError, FrameFormat, FrameKind, Id};
 pub use guard::{AxisLimits, LimitError, braking_distance};
 pub use host::{AxisSnapshot, GroupSnapshot, HostInterface, Snapshot};
@@ -121,7 +121,6 @@ pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
     RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
-pub use rule::Rule;
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
     LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,

@@ -1,10 +1,10 @@
 //! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
 
 use crate::cia402::{self, OperationMode};
+use crate::fault::Rule;
 use crate::phase::Phase;
 use crate::rejection::RequestError;
 use crate::request::RequestId;
-use crate::rule::Rule;
 use crate::source::StreamState;
 use crate::stop::StopReason;
 use crate::stop_category::StopCategory;

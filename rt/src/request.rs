@@ -28,6 +28,7 @@ pub struct RequestEnvelope<const AXES: usize = MAX_AXES> {
 /// Who a request is for. What concerns the controller as a whole (SYNC, the time of day, the end), and what names its axis, is
 /// the same whoever it is for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum RequestTarget {
     /// Every group: all of them do it, or none. A motion of several groups does not exist: where there is more than one,
     /// [`Request::Move`], [`Request::Stream`] and the like must name theirs.

@@ -1,8 +1,7 @@
 //! How the group stops, and the one reason for it.
 
-use crate::fault::Fault;
+use crate::fault::{Fault, Rule};
 use crate::phase::Phase;
-use crate::rule::Rule;
 use crate::stop_category::StopCategory;
 
 /// The category of the stop for each rule.

@@ -6,7 +6,8 @@ use takt_rt::{
 };
 
 use super::latest::Words;
-use super::words::{drive_state_of, phase_of, put_rejection, put_stop, take_rejection, take_stop};
+use super::stop_words::{phase_of, put_stop, take_stop};
+use super::words::{drive_state_of, put_rejection, take_rejection};
 
 /// The largest number of words of an event: when it was seen, its kind, and a stop.
 pub const EVENT_WORDS: usize = 3 + 4;

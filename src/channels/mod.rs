@@ -19,6 +19,7 @@ mod callback_panic;
 mod callback_record;
 mod callbacks;
 mod client_requests;
+mod error;
 mod event_words;
 mod group_axes;
 mod host_side;
@@ -35,6 +36,7 @@ mod records;
 mod request_numbers;
 mod ring;
 mod rt_side;
+mod stop_words;
 mod stream;
 mod trajectories;
 mod words;
@@ -53,16 +55,15 @@ pub use callbacks::{
     CallbackClock, CallbackCommand, CallbackGiver, CallbackState, GivenCallback, LoopCallback,
 };
 pub use client_requests::{ClientRequests, MotionEnd, WAITING_AT_MOST};
-pub(crate) use event_words::EVENT_WORDS;
+pub use error::ChannelError;
+pub use event_words::EVENT_WORDS;
 pub use group_axes::GroupAxes;
 pub use host_side::HostSide;
 pub use journal::{HostInput, JournalEntry, JournalReader};
-pub(crate) use latest::{
-    Allocated, Attempt, Cells, Reader as LatestReader, Words, Writer as LatestWriter, latest,
-};
+pub use latest::{Allocated, Attempt, Cells, Reader as LatestReader, Words, Writer as LatestWriter, latest};
 pub use log_side::LogSide;
 pub use observed_events::EventReader;
-pub(crate) use observed_events::EventWriter;
+pub use observed_events::EventWriter;
 pub use observer::Observer;
 pub use questions::{QUESTIONS_AT_MOST, Questions};
 pub use request_numbers::RequestNumbers;
@@ -70,7 +71,7 @@ pub use ring::{Consumer, Producer, ring};
 pub use rt_side::RtSide;
 pub use stream::{GroupStream, SentPoint, Streamer, chunk};
 pub use trajectories::{GivenTrajectory, NumberedTrajectory, TrajectoryGiver};
-pub(crate) use words::{put_snapshot, snapshot_words, take_snapshot};
+pub use words::{put_snapshot, snapshot_words, take_snapshot};
 
 /// The capacity of each channel.
 #[derive(Clone, Debug)]
@@ -91,26 +92,6 @@ pub struct ChannelSizes {
     pub service_out: usize,
     /// Received service frames that wait for the host, of all buses together.
     pub service_in: usize,
-}
-
-/// Why a request or frame was not accepted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ChannelError {
-    /// The channel is full: the real-time thread does not run, or gets too much.
-    #[error("the channel to the real-time thread is full")]
-    Full,
-    /// No stream takes points.
-    #[error("no stream is running")]
-    NotStreaming,
-    /// No bus has this number.
-    #[error("there is no bus {bus}: the controller has {buses} buses")]
-    NoSuchBus {
-        /// The number of the bus.
-        bus: usize,
-        /// The number of buses.
-        buses: usize,
-    },
 }
 
 /// Reports of each drive that can wait, of those that are spoken to outside of the cycle.

@@ -3,7 +3,7 @@
 use takt_rt::{MotionReport, MotionReports, MotionState, RequestId};
 
 use super::latest::Words;
-use super::words::{fill, put_stop, take_stop};
+use super::stop_words::{put_stop, take_stop};
 
 /// Words of the reports at most. A stop takes four.
 pub const MOTION_WORDS: usize = MotionReports::CAPACITY * (2 + 4);
@@ -53,4 +53,17 @@ pub fn take_motions(words: &mut Words<'_>, motions: &mut MotionReports) {
         let axis = (packed >> 16 & 1 == 1).then_some((packed >> 8) as u8);
         Some(MotionReport { request, group: (packed >> 24) as u8, axis, state })
     });
+}
+
+/// Writes the places of a list that ends with its first `None`.
+pub fn fill<T>(places: &mut [Option<T>], mut next: impl FnMut() -> Option<T>) {
+    let mut has_ended = false;
+    for place in places {
+        let value = if has_ended { None } else { next() };
+        if has_ended && place.is_none() {
+            return;
+        }
+        has_ended = value.is_none();
+        *place = value;
+    }
 }

@@ -2,12 +2,13 @@
 
 use takt_rt::{
     Answers, AxisSnapshot, BusHealth, BusState, DriveState, GroupSnapshot, MAX_AXES, MAX_BUSES, MAX_GROUPS,
-    MotionReports, Origin, Phase, RejectReason, RequestError, RequestId, RequestKind, Rule, Snapshot,
-    StopCategory, StopCause, StopReason, StreamCounts, StreamReport, StreamState, TimingLevel,
+    MotionReports, Phase, RejectReason, RequestError, RequestId, RequestKind, Snapshot, StreamCounts,
+    StreamReport, StreamState, TimingLevel,
 };
 
 use super::latest::Words;
-use super::motion_words::{MOTION_WORDS, put_motions, take_motions};
+use super::motion_words::{MOTION_WORDS, fill, put_motions, take_motions};
+use super::stop_words::{pack, phase_of, put_stop, take_stop, unpack};
 
 /// The largest number of words of a snapshot of so many axes and buses.
 pub const fn snapshot_words(groups: usize, axes: usize, buses: usize) -> usize {
@@ -131,19 +132,6 @@ pub fn take_snapshot_into(words: &mut Words<'_>, snapshot: &mut Snapshot) {
     }
 }
 
-/// Writes the places of a list that ends with its first `None`.
-pub fn fill<T>(places: &mut [Option<T>], mut next: impl FnMut() -> Option<T>) {
-    let mut has_ended = false;
-    for place in places {
-        let value = if has_ended { None } else { next() };
-        if has_ended && place.is_none() {
-            return;
-        }
-        has_ended = value.is_none();
-        *place = value;
-    }
-}
-
 fn put_group(group: &GroupSnapshot, words: &mut Words<'_>) {
     words.put(pack([group.phase as u8, group.stop.is_some().into(), group.needs_bring_up.into(), 0]));
     words.put_f64(group.remaining_s);
@@ -228,42 +216,6 @@ fn take_stream(words: &mut Words<'_>) -> StreamReport {
     let state = StreamState::ALL.get(words.take() as usize).copied().unwrap_or_default();
     let [lag_ns, points, late_points, lost_points] = [(); 4].map(|()| words.take());
     StreamReport { state, counts: StreamCounts { lag_ns, points, late_points, lost_points } }
-}
-
-pub fn put_stop(stop: &StopReason, words: &mut Words<'_>) {
-    let (kind, number) = match stop.origin {
-        Origin::Group => (0, 0),
-        Origin::Axis(axis) => (1, axis),
-        Origin::Bus(bus) => (2, bus),
-    };
-    let origin = u64::from(number) << 32;
-    words.put(pack([stop.category as u8, stop.rule() as u8, stop.phase as u8, kind]) | origin);
-    let (seen, allowed) = stop.cause.numbers();
-    words.put_f64(seen);
-    words.put_f64(allowed);
-    words.put(stop.slot);
-}
-
-pub fn take_stop(words: &mut Words<'_>) -> StopReason {
-    let packed = words.take();
-    let [category, rule, phase, origin] = unpack(packed);
-    let (seen, allowed) = (words.take_f64(), words.take_f64());
-    let rule = Rule::ALL.get(usize::from(rule)).copied().unwrap_or(Rule::Requested);
-    StopReason {
-        category: match category {
-            0 => StopCategory::Zero,
-            1 => StopCategory::One,
-            _ => StopCategory::Two,
-        },
-        cause: StopCause::from_numbers(rule, seen, allowed).unwrap_or(StopCause::Requested),
-        origin: match origin {
-            0 => Origin::Group,
-            1 => Origin::Axis((packed >> 32) as u8),
-            _ => Origin::Bus((packed >> 32) as u8),
-        },
-        slot: words.take(),
-        phase: phase_of(phase),
-    }
 }
 
 fn put_axis(axis: &AxisSnapshot, words: &mut Words<'_>) {
@@ -359,20 +311,8 @@ fn take_bus(words: &mut Words<'_>) -> BusHealth {
     }
 }
 
-pub fn phase_of(number: u8) -> Phase {
-    Phase::ALL.get(usize::from(number)).copied().unwrap_or_default()
-}
-
 pub fn drive_state_of(number: u8) -> DriveState {
     DriveState::ALL.get(usize::from(number)).copied().unwrap_or_default()
-}
-
-fn pack([a, b, c, d]: [u8; 4]) -> u64 {
-    u32::from_le_bytes([a, b, c, d]).into()
-}
-
-fn unpack(word: u64) -> [u8; 4] {
-    (word as u32).to_le_bytes()
 }
 
 #[cfg(test)]
@@ -381,6 +321,7 @@ pub(super) mod tests {
     use crate::channels::latest::{Attempt, latest};
     use proptest::prelude::*;
     use takt_rt::{MotionReport, MotionState};
+    use takt_rt::{Origin, Rule, StopCategory, StopCause, StopReason};
 
     pub fn stop_reasons() -> impl Strategy<Value = StopReason> {
         let categories = prop::sample::select(vec![StopCategory::Zero, StopCategory::One, StopCategory::Two]);
@@ -403,7 +344,7 @@ pub(super) mod tests {
 
     pub fn rejections() -> impl Strategy<Value = RequestError> {
         let requests = prop::sample::select(&RequestKind::ALL[..]);
-        let reasons = prop::sample::select(&RejectReason::ALL[..]);
+        let reasons = prop::sample::select(RejectReason::all().collect::<Vec<_>>());
         let phases = prop::sample::select(&Phase::ALL[..]);
         (requests, reasons, any::<Option<u8>>(), phases)
             .prop_map(|(request, reason, axis, phase)| RequestError { request, reason, axis, phase })

@@ -5,7 +5,7 @@ use takt_rt::{AxisLimits, OperationMode};
 use crate::config::Axis;
 
 /// What the configuration says of an axis, wherever its controller runs. Its name and unit are in the [`Machine`](crate::telemetry::Machine).
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, bitcode::Encode, bitcode::Decode)]
 #[non_exhaustive]
 pub struct AxisProperties {
     /// What may never be exceeded: rad (m), seconds and N·m (N).
@@ -22,7 +22,8 @@ pub struct AxisProperties {
 
 impl AxisProperties {
     /// Those of an axis of a configuration.
-    pub(crate) fn of(axis: &Axis) -> Self {
+    #[doc(hidden)]
+    pub fn of(axis: &Axis) -> Self {
         Self {
             limits: axis.limits,
             node: axis.node,

@@ -12,7 +12,7 @@ use crate::telemetry::{Machine, words};
 use crate::trajectory::{RateError, TrajectoryError, axis_name};
 
 /// The real-time thread has refused a request.
-#[derive(Clone, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
 #[error("{words}")]
 pub struct Refused {
     /// The request and the reason; `None` if many later refusals have replaced it.
@@ -60,7 +60,7 @@ pub mod needed {
 }
 
 /// Why a command was not executed. It has changed nothing.
-#[derive(Clone, PartialEq, thiserror::Error)]
+#[derive(Clone, PartialEq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
 #[non_exhaustive]
 pub enum CommandError {
     /// The number of values is not the number of axes.
@@ -108,7 +108,7 @@ pub enum CommandError {
         /// The axis.
         axis: String,
         /// The mode that takes this command.
-        needed: &'static str,
+        needed: String,
     },
     /// Too many requests wait for the real-time thread. A stop always finds room.
     #[error("{waiting} requests are already waiting")]
@@ -182,7 +182,7 @@ impl CommandError {
 }
 
 /// Why a client of another process may not command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
 #[non_exhaustive]
 pub enum LeaseError {
     /// Another client commands.
@@ -214,7 +214,7 @@ pub enum LeaseError {
 }
 
 /// Why points were not taken; none of them was, then.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
 #[non_exhaustive]
 pub enum StreamError {
     /// A point needs an entry for each axis.

@@ -1,5 +1,5 @@
 //! What a program may ask of a running controller, and how it is refused: the same words for one in its own process (a
-//! [`Handle`](crate::Handle)) and for one in another process (a [`Client`](crate::Client)).
+//! [`Handle`](crate::Handle)) and for one in another process (a `Client` of `takt-remote`).
 
 mod axis_properties;
 mod error;
@@ -19,5 +19,4 @@ pub use lease_holder::LeaseHolder;
 pub use motion::{MotionId, MoveOptions, TrajectoryProgress};
 pub use point_check::{PointRefusal, check_point};
 pub use question::QuestionError;
-pub(crate) use running_controller::groups_in;
-pub use running_controller::{EventSource, RunningController};
+pub use running_controller::{EventSource, RunningController, groups_in};

@@ -9,7 +9,7 @@ use crate::telemetry::Machine;
 const TARGET_BITS: u32 = 8;
 
 /// Identifies a motion, or a change of the mode, for [`Handle::wait`](crate::Handle::wait).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, bitcode::Encode, bitcode::Decode)]
 pub struct MotionId {
     pub(crate) request: RequestId,
     /// Which stops discard it.
@@ -20,6 +20,11 @@ impl MotionId {
     /// The request that began it.
     pub const fn request(self) -> RequestId {
         self.request
+    }
+
+    /// The axes that it was asked for.
+    pub const fn target(self) -> RequestTarget {
+        self.target
     }
 
     /// It as one number, for programs in other languages.
@@ -42,7 +47,7 @@ impl MotionId {
 }
 
 /// Parameters of a move.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode)]
 pub struct MoveOptions {
     /// Fraction of the velocity limits, above 0 up to 1.
     pub velocity_scale: f64,
@@ -59,7 +64,7 @@ impl Default for MoveOptions {
 }
 
 /// How far a trajectory is.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode)]
 #[non_exhaustive]
 pub struct TrajectoryProgress {
     /// The time on the path, in seconds: that of the point that is passed now.
@@ -70,8 +75,9 @@ pub struct TrajectoryProgress {
     pub rate: f64,
 }
 
-/// How a motion has ended, by a state; `None` while it is under way. `newest_stop` is that of [`is_discarded`].
-pub(crate) fn result_in(
+/// How a motion has ended, by a state; `None` while it is under way. `newest_stop` is the newest stop that the real-time thread has taken
+/// of those that concern the request.
+pub fn result_in(
     state: &Snapshot,
     request: RequestId,
     newest_stop: RequestId,

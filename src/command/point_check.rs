@@ -5,7 +5,7 @@ use takt_rt::{AxisPoint, OperationMode};
 use crate::config::{Axis, Control};
 
 /// Why an axis does not take a point. rad and N·m, or m and N.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
 #[non_exhaustive]
 pub enum PointRefusal {
     /// A number is infinite or none.

@@ -3,7 +3,7 @@
 use takt_rt::Frame;
 
 /// Why a running controller does not send a question to a device on one of its buses. Nothing was sent.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
 #[non_exhaustive]
 pub enum QuestionError {
     /// There is no such bus.

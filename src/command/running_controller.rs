@@ -17,7 +17,7 @@ use crate::trajectory::TrajectoryPoint;
 /// Drives that have not reported within this time are brought up again. It covers several reports of the slowest drive.
 const REPORTS_WITHIN: Duration = Duration::from_secs(1);
 
-/// A running controller, in this process ([`Handle`](crate::Handle)) or in another one ([`Client`](crate::Client)): the calls that both
+/// A running controller, in this process ([`Handle`](crate::Handle)) or in another one (`Client` of `takt-remote`): the calls that both
 /// have, for programs and bindings that hold either.
 ///
 /// `target` says whose axes are meant: all of the controller, or those of one group, by its number in the configuration. Values of axes
@@ -252,19 +252,19 @@ pub trait RunningController: Send + Sync {
     /// Takes the lease, or renews it. A controller of this process needs none.
     ///
     /// # Errors
-    /// See [`Client::take_lease`](crate::Client::take_lease).
+    /// See `Client::take_lease` of `takt-remote`.
     fn take_lease(&self) -> Result<(), CommandError>;
 
     /// Takes the lease from whoever has it. A controller of this process needs none.
     ///
     /// # Errors
-    /// See [`Client::take_over`](crate::Client::take_over).
+    /// See `Client::take_over` of `takt-remote`.
     fn take_over(&self) -> Result<(), CommandError>;
 
     /// Gives the lease back.
     ///
     /// # Errors
-    /// See [`Client::release`](crate::Client::release).
+    /// See `Client::release` of `takt-remote`.
     fn release(&self) -> Result<(), CommandError>;
 
     /// The period of the cycle.
@@ -463,7 +463,7 @@ pub trait RunningController: Send + Sync {
 }
 
 /// The groups of a state that a target means.
-pub(crate) fn groups_in(state: &Snapshot, target: RequestTarget) -> &[GroupSnapshot] {
+pub fn groups_in(state: &Snapshot, target: RequestTarget) -> &[GroupSnapshot] {
     match target {
         RequestTarget::All => state.groups(),
         RequestTarget::Group(number) => {

@@ -2,32 +2,46 @@
 //! compares it with them.
 
 use super::drive_family::DriveFacts;
-use super::model::{Axis, Compliance, Control, Feedback, Limits, PdoMapping, Travel};
-use super::ranges;
+use super::keys;
+use super::model::{Axis, Compliance, Control, Feedback, Limits, MissedSlots, PdoMapping, Realtime, Travel};
 
 /// `[cycle] period`
-pub const PERIOD_NS: u64 = 1_000_000;
+pub const PERIOD_NS: u64 = keys::cycle::PERIOD.default_ns();
 /// `[cycle] command_phase`, as a fraction of the period.
-pub const COMMAND_PHASE: f64 = 0.55;
-
-/// `[cycle.missed_slots] warning`
-pub const MISSED_SLOTS_WARNING: u32 = 10;
-/// `[cycle.missed_slots] degraded`
-pub const MISSED_SLOTS_DEGRADED: u32 = 50;
-/// `[cycle.missed_slots] stop`
-pub const MISSED_SLOTS_STOP: u32 = 250;
-/// `[cycle.missed_slots] leak_slots`
-pub const MISSED_SLOTS_LEAK_SLOTS: u32 = 10;
-
-/// `[realtime] priority`
-pub const PRIORITY: u8 = 80;
-/// `[realtime] lock_memory`
-pub const LOCK_MEMORY: bool = true;
-/// `[realtime] hold_dma_latency`
-pub const HOLD_DMA_LATENCY: bool = true;
+const COMMAND_PHASE: f64 = 0.55;
 
 /// `[master] node`, a node ID
-pub const MASTER_NODE: u8 = 127;
+pub const MASTER_NODE: u8 = keys::master::NODE.default_number() as u8;
+/// `[program] repeat`
+pub const REPEAT: u32 = keys::program::REPEAT.default_number() as u32;
+/// `[simulation] seed`
+pub const SEED: u64 = keys::simulation::SEED.default_number() as u64;
+
+/// `[cycle.missed_slots]`
+pub const MISSED_SLOTS: MissedSlots = {
+    use keys::missed_slots::{DEGRADED, LEAK_SLOTS, STOP, WARNING};
+
+    MissedSlots {
+        warning: WARNING.default_number() as u32,
+        degraded: DEGRADED.default_number() as u32,
+        stop: STOP.default_number() as u32,
+        leak_slots: LEAK_SLOTS.default_number() as u32,
+    }
+};
+
+/// `[realtime]`
+pub const REALTIME: Realtime = {
+    use keys::realtime::{HOLD_DMA_LATENCY, LOCK_MEMORY, PRIORITY};
+
+    Realtime {
+        priority: Some(PRIORITY.default_number() as u8),
+        cpu: None,
+        lock_memory: LOCK_MEMORY.default_boolean(),
+        hold_dma_latency: HOLD_DMA_LATENCY.default_boolean(),
+        spin_guard_ns: None,
+    }
+};
+
 /// `[master] heartbeat` where every drive holds a position by itself.
 pub const MASTER_HEARTBEAT_NS: u64 = 100_000_000;
 /// `[master] heartbeat` where a drive would go on moving without the controller (CSV, CST, PP, PV, PT): the shortest for which
@@ -38,31 +52,10 @@ pub const HEARTBEATS_IN_TIMEOUT: u64 = 5;
 /// `[master] heartbeat_timeout` without a heartbeat.
 pub const HEARTBEAT_TIMEOUT_NS: u64 = 500_000_000;
 
-/// `[[bus]] bit_rate`
-pub const BIT_RATE: u32 = 1_000_000;
 /// `[[bus]] bit_rate` of a serial line
 pub const LINE_BIT_RATE: u32 = 115_200;
-/// `[[bus]] restart_ms`
-pub const RESTART_MS: u32 = 100;
-/// `[[bus]] service_frames_per_cycle`
-pub const SERVICE_FRAMES_PER_CYCLE: usize = 1;
-/// `[[bus]] sdo_while_enabled`
-pub const SDO_WHILE_ENABLED: bool = false;
-
-/// `[[axis]] answers_sync`
-pub const ANSWERS_SYNC: bool = true;
 /// `[[axis]] counts_per_turn` of a drive that is configured in code, where its family does not know them.
 pub const COUNTS_PER_TURN: f64 = 65_536.0;
-/// `[[axis]] gear_ratio`
-pub const GEAR_RATIO: f64 = 1.0;
-/// `[[axis]] missed_feedback_cycles`
-pub const MISSED_FEEDBACK_CYCLES: u16 = 5;
-/// `[[axis]] transmission_type`
-pub const TRANSMISSION_TYPE: u8 = 1;
-/// `[[axis]] feedback_delay`
-pub const FEEDBACK_DELAY_NS: u64 = 20_000;
-/// `[axis.torque_loop] torque_rise`
-pub const TORQUE_RISE_NS: u64 = 100_000_000;
 /// `[[axis]] start_tolerance` of a rotary axis in rad.
 pub const START_TOLERANCE_RAD: f64 = 0.02;
 /// `[[axis]] start_tolerance` of a linear axis in m.
@@ -71,9 +64,6 @@ pub const START_TOLERANCE_M: f64 = 0.002;
 pub const FOLLOWING_ERROR_RAD: f64 = 0.1;
 /// `[axis.following_error] limit` of a linear axis in m.
 pub const FOLLOWING_ERROR_M: f64 = 0.01;
-/// `[axis.following_error] time`
-pub const FOLLOWING_ERROR_TIME_NS: u64 = 50_000_000;
-
 /// `[[axis]] target_tolerance` of a rotary axis in rad.
 pub const TARGET_TOLERANCE_RAD: f64 = 0.01;
 /// `[[axis]] target_tolerance` of a linear axis in m.
@@ -102,26 +92,8 @@ pub const VISCOUS_FRICTION: f64 = 1.0;
 pub const COULOMB_FRICTION: f64 = 0.5;
 /// `[axis.simulated] peak_torque` in rated torques: ±3000 per mille in object 60B2.
 pub const PEAK_TO_RATED_TORQUE: f64 = 3.0;
-/// `[[axis]] power_up`. A real drive may ask for 8 s.
-pub const POWER_UP_NS: u64 = 200_000_000;
-
-/// `[program] repeat`
-pub const REPEAT: u32 = 1;
-
-/// `[telemetry] directory`
-pub const DIRECTORY: &str = "runs";
-/// `[telemetry] black_box`
-pub const BLACK_BOX_NS: u64 = 5_000_000_000;
-/// `[telemetry] ring_records`
-pub const RING_RECORDS: usize = 4096;
-
-/// `[simulation] seed`
-pub const SEED: u64 = 1;
 /// `[simulation] longest_gap`; two periods of the cycle where that is more
 pub const LONGEST_GAP_NS: u64 = 2_000_000;
-/// `[simulation] stops_for_missed_slots`
-pub const STOPS_FOR_MISSED_SLOTS: bool = false;
-
 /// `[cycle] command_phase`
 pub fn command_phase_ns(period_ns: u64) -> u64 {
     (COMMAND_PHASE * period_ns as f64).round() as u64
@@ -156,9 +128,10 @@ fn goes_on_alone(control: &Control) -> bool {
 
 /// `[master] heartbeat_timeout`
 pub fn heartbeat_timeout_ns(heartbeat_ns: Option<u64>) -> u64 {
-    let at_most_ns = (ranges::HEARTBEAT_TIMEOUT_S.end() * 1e9) as u64;
+    // Object 1016 has 16 bits, in ms.
+    const AT_MOST_NS: u64 = u16::MAX as u64 * 1_000_000;
     heartbeat_ns.map_or(HEARTBEAT_TIMEOUT_NS, |heartbeat_ns| {
-        heartbeat_ns.saturating_mul(HEARTBEATS_IN_TIMEOUT).min(at_most_ns)
+        heartbeat_ns.saturating_mul(HEARTBEATS_IN_TIMEOUT).min(AT_MOST_NS)
     })
 }
 
@@ -214,7 +187,11 @@ pub fn compliance(controls: &[Control]) -> Compliance {
         _ => None,
     });
     let (stiffness_max, damping_max) = gains.unwrap_or_default();
-    Compliance { stiffness_max, damping_max, torque_rise_ns: TORQUE_RISE_NS }
+    Compliance {
+        stiffness_max,
+        damping_max,
+        torque_rise_ns: const { keys::torque_loop::TORQUE_RISE.default_ns() },
+    }
 }
 
 /// `[axis.simulated] initial_position`: 0, or the limit nearest to it.

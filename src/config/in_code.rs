@@ -28,6 +28,7 @@ use takt_rt::{FeedForward, Follow, StopCategories, StreamDelay};
 
 use super::defaults;
 use super::drive_family::DriveFamily;
+use super::keys;
 use super::model::{
     Axis, Bus, CommandFrames, Config, Control, Cycle, FollowingError, FrictionShape, Interface, Joint,
     Limits, Master, MissedSlots, PowerUpState, Program, Realtime, SimulatedJoint, Simulation, Telemetry,
@@ -59,7 +60,7 @@ impl Config {
             simulation: Simulation {
                 seed: defaults::SEED,
                 longest_gap_ns: 0,
-                stops_for_missed_slots: defaults::STOPS_FOR_MISSED_SLOTS,
+                stops_for_missed_slots: const { keys::simulation::STOPS_FOR_MISSED_SLOTS.default_boolean() },
             },
         };
         config.with_period(defaults::PERIOD_NS)
@@ -79,35 +80,26 @@ impl Config {
 
 impl Default for MissedSlots {
     fn default() -> Self {
-        Self {
-            warning: defaults::MISSED_SLOTS_WARNING,
-            degraded: defaults::MISSED_SLOTS_DEGRADED,
-            stop: defaults::MISSED_SLOTS_STOP,
-            leak_slots: defaults::MISSED_SLOTS_LEAK_SLOTS,
-        }
+        defaults::MISSED_SLOTS
     }
 }
 
 impl Default for Realtime {
     fn default() -> Self {
-        Self {
-            priority: Some(defaults::PRIORITY),
-            cpu: None,
-            lock_memory: defaults::LOCK_MEMORY,
-            hold_dma_latency: defaults::HOLD_DMA_LATENCY,
-            spin_guard_ns: None,
-        }
+        defaults::REALTIME
     }
 }
 
 impl Default for Telemetry {
     fn default() -> Self {
+        use keys::telemetry::{BLACK_BOX, CANDUMP, DIRECTORY, RECORD, RING_RECORDS};
+
         Self {
-            directory: PathBuf::from(defaults::DIRECTORY),
-            is_recorded: true,
-            is_candump_written: false,
-            black_box_ns: Some(defaults::BLACK_BOX_NS),
-            ring_records: defaults::RING_RECORDS,
+            directory: PathBuf::from(const { DIRECTORY.default_word() }),
+            is_recorded: const { RECORD.default_boolean() },
+            is_candump_written: const { CANDUMP.default_boolean() },
+            black_box_ns: Some(const { BLACK_BOX.default_ns() }),
+            ring_records: const { RING_RECORDS.default_number() as usize },
         }
     }
 }
@@ -115,15 +107,17 @@ impl Default for Telemetry {
 impl Bus {
     /// A classic bus of 1 Mbit/s with the cycle of the controller.
     pub fn new(name: impl Into<String>, interface: Interface) -> Self {
+        use keys::bus::{BIT_RATE, RESTART_MS, SDO_WHILE_ENABLED, SERVICE_FRAMES};
+
         Self {
             name: name.into(),
             interface,
             divider: 1,
-            bit_rate: defaults::BIT_RATE,
+            bit_rate: const { BIT_RATE.default_number() as u32 },
             data_bit_rate: None,
-            restart_ms: defaults::RESTART_MS,
-            service_frames_per_cycle: defaults::SERVICE_FRAMES_PER_CYCLE,
-            sdo_while_enabled: defaults::SDO_WHILE_ENABLED,
+            restart_ms: const { RESTART_MS.default_number() as u32 },
+            service_frames_per_cycle: const { SERVICE_FRAMES.default_number() as usize },
+            sdo_while_enabled: const { SDO_WHILE_ENABLED.default_boolean() },
             command_frames: CommandFrames::default(),
         }
     }
@@ -132,6 +126,8 @@ impl Bus {
 impl Axis {
     /// A rotary axis in the usual mode of its family: an index into the buses, a node ID from 1 to 127, and limits in rad.
     pub fn new(name: impl Into<String>, bus: usize, node: u8, drive: DriveFamily, limits: Limits) -> Self {
+        use keys::axis;
+
         let (travel, control, mapping) = (Travel::Rotary, drive.usual_mode, defaults::mapping(&drive));
         let counts_per_turn = drive.counts_per_turn.unwrap_or(defaults::COUNTS_PER_TURN);
         let (identity, feedback) = (drive.identity, defaults::feedback(&drive, mapping));
@@ -144,7 +140,7 @@ impl Axis {
             other_modes: vec![],
             travel,
             counts_per_turn,
-            gear_ratio: defaults::GEAR_RATIO,
+            gear_ratio: const { axis::GEAR_RATIO.default_number() },
             reversed: false,
             zero_counts: 0,
             limits,
@@ -154,21 +150,21 @@ impl Axis {
             feed_forward: FeedForward::default(),
             following_error: FollowingError {
                 limit: defaults::following_error(travel),
-                time_ns: defaults::FOLLOWING_ERROR_TIME_NS,
+                time_ns: const { keys::following_error::TIME.default_ns() },
             },
             start_tolerance: defaults::start_tolerance(travel),
             target_tolerance: defaults::target_tolerance(travel, &[control]),
             follow: Follow::default(),
-            missed_feedback_cycles: defaults::MISSED_FEEDBACK_CYCLES,
-            transmission_type: defaults::TRANSMISSION_TYPE,
+            missed_feedback_cycles: const { axis::MISSED_FEEDBACK_CYCLES.default_number() as u16 },
+            transmission_type: const { axis::TRANSMISSION_TYPE.default_number() as u8 },
             mapping,
             feedback,
-            answers_sync: defaults::ANSWERS_SYNC,
-            feedback_delay_ns: defaults::FEEDBACK_DELAY_NS,
+            answers_sync: const { axis::ANSWERS_SYNC.default_boolean() },
+            feedback_delay_ns: const { axis::FEEDBACK_DELAY.default_ns() },
             heartbeat_ns: None,
             identity,
             dcf: None,
-            power_up_ns: defaults::POWER_UP_NS,
+            power_up_ns: const { axis::POWER_UP.default_ns() },
             joint: Joint::default(),
             simulated: SimulatedJoint::within(&limits, limits.torque),
         }

@@ -2,20 +2,27 @@
 //!
 //! [`Config::load`] reads a file and either gives a configuration in which every value is possible, or a
 //! [`ConfigError`] with every problem of the file, each with its line and a way out. Quantities are bare numbers in SI
-//! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format.
+//! units or texts with a unit (`"137 deg/s"`). `configs/reference.toml` is the description of the format: [`reference()`].
 
+mod axis_ranges;
 #[doc(hidden)]
 pub mod bit_fields;
 pub(crate) mod bounds;
+mod configured_family;
 mod data_file;
 pub(crate) mod defaults;
 #[cfg(feature = "miette")]
 mod diagnostic;
 mod drive_family;
 mod error;
+mod error_control;
 pub(crate) mod identifiers;
+mod identity;
 mod in_code;
 mod interface;
+mod interface_error;
+mod key;
+mod keys;
 mod mode_words;
 mod model;
 mod position_unit;
@@ -23,34 +30,43 @@ mod problem_kind;
 pub(crate) mod quantities;
 pub(crate) mod quantity;
 pub mod quirks;
-mod ranges;
 pub(crate) mod read;
+mod reference;
 mod rules;
 mod scale;
+mod schema;
 mod sources;
 mod spelling;
 pub(crate) mod spot;
 mod supervision;
+mod travel;
 pub(crate) mod urdf;
+mod urdf_error;
+mod urdf_limits;
 
 use std::fmt;
 use std::path::Path;
 
+pub use configured_family::{ConfiguredFamily, FamilyKeys};
 pub use drive_family::{
-    ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, ModeChangeRule, ModeSet, OwnIdentifiers,
-    Plausible, Protocol, VelocityUnit,
+    DriveFacts, DriveFamily, ModeChangeRule, ModeSet, OwnIdentifiers, Plausible, Protocol, VelocityUnit,
 };
 pub use error::{ConfigError, Location, Problem};
-pub use interface::InterfaceError;
+pub use error_control::ErrorControl;
+pub use interface_error::InterfaceError;
 pub use mode_words::{MODES, mode_word};
 pub use model::*;
 pub use position_unit::PositionUnit;
 pub use problem_kind::ProblemKind;
 pub use quantity::{Dimension, Quantity, QuantityError};
 pub(crate) use read::{Knowledge, PhaseChoice, parse};
+pub use reference::reference;
+pub use schema::schema;
 pub use sources::{ConfigSources, SourcesError};
-pub use supervision::{ErrorControl, Supervision};
-pub use urdf::{LimitOrigin, Urdf, UrdfError, UrdfJoint, UrdfLimits};
+pub use supervision::Supervision;
+pub use urdf::{Urdf, UrdfJoint};
+pub use urdf_error::UrdfError;
+pub use urdf_limits::{LimitOrigin, UrdfLimits};
 
 use takt_wire::printable::printable_path;
 use thiserror::Error;

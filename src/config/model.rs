@@ -17,8 +17,10 @@ use takt_wire::canopen::dcf::DeviceConfiguration;
 pub use takt_wire::quirks::PowerUpState;
 
 use super::drive_family::DriveFamily;
+pub use super::identity::Identity;
 use super::position_unit::PositionUnit;
-use super::urdf::UrdfLimits;
+pub use super::travel::Travel;
+use super::urdf_limits::UrdfLimits;
 
 /// A whole controller: one cycle, its buses, its axes and what they are to do.
 #[derive(Clone, Debug, PartialEq)]
@@ -384,18 +386,6 @@ impl Feedback {
     }
 }
 
-/// Whether an axis turns or slides.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Travel {
-    /// rad
-    Rotary,
-    /// m; so many in one turn.
-    Linear {
-        /// Lead in m.
-        lead_m: f64,
-    },
-}
-
 /// Limit of the following error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FollowingError {
@@ -403,19 +393,6 @@ pub struct FollowingError {
     pub limit: f64,
     /// For how long it may be further. Default 50 ms.
     pub time_ns: u64,
-}
-
-/// Expected identity of a drive; `None` accepts any value.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Identity {
-    /// Object 1000.
-    pub device_type: Option<u32>,
-    /// Object 1018:1.
-    pub vendor: Option<u32>,
-    /// Object 1018:2.
-    pub product: Option<u32>,
-    /// Object 1018:3.
-    pub revision: Option<u32>,
 }
 
 /// The moves of `takt run`, one after the other, the whole list `repeat` times.

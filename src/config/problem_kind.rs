@@ -5,9 +5,9 @@ use std::borrow::Cow;
 use takt_wire::canopen::dcf::DcfError;
 use thiserror::Error;
 
-use super::interface::InterfaceError;
+use super::interface_error::InterfaceError;
 use super::quantity::{self, Quantity};
-use super::urdf::UrdfError;
+use super::urdf_error::UrdfError;
 
 /// The kinds of problems. `key` is the whole path of a key, as in `axis.limits.velocity`.
 #[derive(Clone, Debug, PartialEq, Error)]

@@ -2,9 +2,9 @@
 
 use takt_rt::PositionCounter;
 
+use super::axis_ranges::AxisRanges;
 use super::model::{Axis, Limits, Travel};
 use super::quantity::Quantity;
-use super::ranges::AxisRanges;
 
 /// The quantities of an axis, and their ranges.
 #[derive(Clone, Copy)]

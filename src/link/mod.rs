@@ -12,6 +12,8 @@ pub mod modbus_line;
 #[cfg(target_os = "linux")]
 mod open;
 #[cfg(target_os = "linux")]
+mod open_error;
+#[cfg(target_os = "linux")]
 #[doc(hidden)]
 pub mod ownership;
 #[cfg_attr(not(target_os = "linux"), path = "no_port.rs")]
@@ -43,10 +45,10 @@ pub use interface::{
 #[cfg(target_os = "linux")]
 pub use interface::{InterfaceError, UnfitMode};
 #[cfg(target_os = "linux")]
-pub use open::OpenError;
-#[cfg(target_os = "linux")]
 #[doc(hidden)]
 pub use open::{open_interface, open_to_listen};
+#[cfg(target_os = "linux")]
+pub use open_error::OpenError;
 #[cfg(target_os = "linux")]
 pub use ownership::{
     ClaimError, HeardMaster, IfOwned, LockError, MasterActivity, ReleaseError, Role, TakeOverError,

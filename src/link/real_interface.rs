@@ -7,7 +7,7 @@ use takt_rt::linux::Attachment;
 
 use super::converter::open_converter;
 use super::interface::{InterfaceSettings, interface_index, prepare_interface};
-use super::open::OpenError;
+use super::open_error::OpenError;
 use super::port::LinkPort;
 use super::serial_line::device_number;
 use super::slcan::open_slcan;

@@ -15,7 +15,7 @@ const RANGES: usize = TIME_BOUNDS_NS.len() + 1;
 /// The words of [`TimeCounts`].
 const TIME_WORDS: usize = RANGES + 2;
 /// The words of [`LoopTiming`].
-pub(crate) const LOOP_TIMING_WORDS: usize = 3 * TIME_WORDS;
+pub const LOOP_TIMING_WORDS: usize = 3 * TIME_WORDS;
 
 /// How many times were how long.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -106,7 +106,8 @@ impl LoopTiming {
     }
 
     /// Writes it to the words of a mailbox.
-    pub(crate) fn put(&self, words: &mut Words<'_>) {
+    #[doc(hidden)]
+    pub fn put(&self, words: &mut Words<'_>) {
         [&self.wake, &self.sync, &self.compute].into_iter().for_each(|times| times.put(words));
     }
 
@@ -154,7 +155,7 @@ impl ShownTiming {
 }
 
 /// The newest timing in a mailbox; nothing is counted before the first one.
-pub(crate) fn newest_timing<C: crate::channels::Cells>(reader: &LatestReader<C>) -> LoopTiming {
+pub fn newest_timing<C: crate::channels::Cells>(reader: &LatestReader<C>) -> LoopTiming {
     loop {
         match reader.attempt(0, LoopTiming::take) {
             Attempt::Whole(timing, _) => return timing,

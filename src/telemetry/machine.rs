@@ -9,7 +9,7 @@ use crate::config::{Axis, Config, Travel};
 use crate::family;
 
 /// Names and units of a controller.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, bitcode::Encode, bitcode::Decode)]
 pub struct Machine {
     /// The name of the machine.
     pub name: String,
@@ -24,7 +24,7 @@ pub struct Machine {
 }
 
 /// Name, unit and resolution of an axis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, bitcode::Encode, bitcode::Decode)]
 pub struct AxisDescription {
     /// Its name in the configuration.
     pub name: String,
@@ -47,7 +47,9 @@ pub struct AxisDescription {
 }
 
 /// Magnitudes, or limits, of the derivatives of a set-point, in rad (m) and seconds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, bitcode::Encode, bitcode::Decode,
+)]
 pub struct SetPointMagnitudes {
     /// rad/s (m/s)
     pub velocity: f64,
@@ -58,7 +60,7 @@ pub struct SetPointMagnitudes {
 }
 
 /// Names of a bus.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, bitcode::Encode, bitcode::Decode)]
 pub struct BusDescription {
     /// Its name in the configuration.
     pub name: String,
@@ -71,7 +73,7 @@ pub struct BusDescription {
 }
 
 /// The unit of an axis' position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, bitcode::Encode, bitcode::Decode)]
 pub enum Unit {
     /// rad, and N·m
     #[serde(rename = "rad")]

@@ -372,10 +372,12 @@ mod tests {
         assert_eq!(constants(&EVENT, "rule"), rules);
         let requests = RequestKind::ALL.map(|request| (format!("Request{request:?}"), request as u8));
         assert_eq!(constants(&EVENT, "request"), requests);
-        let reasons = RejectReason::ALL.map(|reason| {
-            let debug = format!("{reason:?}");
-            (format!("Reason{}", debug.split(' ').next().unwrap()), reason.number())
-        });
+        let reasons: Vec<_> = RejectReason::all()
+            .map(|reason| {
+                let debug = format!("{reason:?}");
+                (format!("Reason{}", debug.split(' ').next().unwrap()), reason.number())
+            })
+            .collect();
         assert_eq!(constants(&EVENT, "reason"), reasons);
     }
 

@@ -61,8 +61,10 @@ pub use frame_feed::{FrameFeed, FrameReader};
 pub use history::OnBus;
 pub use listener::{Notice, Notify};
 pub use logger::{BlackBoxes, EachCycle, LogSummary, Logger, LoggerOptions};
-pub(crate) use loop_timing::{LOOP_TIMING_WORDS, ShownTiming, newest_timing, shown_timing};
+#[doc(hidden)]
+pub use loop_timing::{LOOP_TIMING_WORDS, newest_timing};
 pub use loop_timing::{LoopTiming, TIME_BOUNDS_NS, TimeCounts};
+pub(crate) use loop_timing::{ShownTiming, shown_timing};
 pub use machine::{AxisDescription, BusDescription, Machine, SetPointMagnitudes, Unit};
 pub use recorded::frames as recorded_frames;
 pub use recorded::{

@@ -7,7 +7,6 @@ use takt_rt::{
 
 use super::machine::Machine;
 
-mod cures;
 mod rejection;
 mod stop;
 

@@ -5,7 +5,7 @@ use std::fmt;
 use takt_wire::printable::Shown;
 
 /// What of a point is meant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, bitcode::Encode, bitcode::Decode)]
 #[non_exhaustive]
 pub enum PointQuantity {
     /// Its position.
@@ -27,7 +27,7 @@ impl fmt::Display for PointQuantity {
 }
 
 /// The limit that a motion breaks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, bitcode::Encode, bitcode::Decode)]
 #[non_exhaustive]
 pub enum BrokenLimit {
     /// The lowest or the highest position.
@@ -56,7 +56,7 @@ impl fmt::Display for BrokenLimit {
 
 /// Why a trajectory is refused: the first thing that is wrong with it. Points and axes are counted from 0. Positions in rad (m),
 /// and seconds. Nothing has changed then.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode)]
 #[non_exhaustive]
 pub enum TrajectoryError {
     /// There is no point.

@@ -3,7 +3,7 @@
 use super::error::{PointQuantity, TrajectoryError};
 
 /// A point of a trajectory, as in ROS a `JointTrajectoryPoint`: one value for each axis.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, bitcode::Encode, bitcode::Decode)]
 pub struct TrajectoryPoint {
     /// Seconds after the beginning of the trajectory.
     pub time_s: f64,

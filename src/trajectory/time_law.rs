@@ -37,7 +37,7 @@ const INTERVALS_AT_MOST: usize = 4_000;
 const SHORTEST_INTERVAL_S: f64 = 2e-5;
 
 /// Why the rate of a trajectory cannot be changed.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
 #[non_exhaustive]
 pub enum RateError {
     /// A rate is a finite number from 0 on.

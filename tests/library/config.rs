@@ -1,10 +1,12 @@
 //! The configurations that come with takt, and how values of a configuration are read.
 
+use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use takt::config::{
     Config, Control, Feedback, Interface, OverrideError, PowerUpState, ProblemKind, ProgramTarget, Travel,
+    reference, schema,
 };
 use takt::{Outcome, VirtualRun};
 
@@ -142,13 +144,54 @@ fn every_default_of_the_reference_is_the_one_that_is_built_in() {
     assert_eq!(parse(&rest.join("\n")), full);
 }
 
+/// `TAKT_WRITE=1` writes the files instead.
+#[test]
+fn the_reference_and_the_schema_are_those_of_the_rows() {
+    for (file, text) in [("reference.toml", reference()), ("takt.schema.json", schema())] {
+        if env::var_os("TAKT_WRITE").is_some() {
+            fs::write(config(file), &text).unwrap();
+        }
+        assert_eq!(fs::read_to_string(config(file)).unwrap(), text, "{file}");
+    }
+}
+
+#[test]
+fn the_schema_describes_every_key_of_every_configuration_that_comes_with_takt() {
+    fn undescribed(value: &toml::Value, schema: &serde_json::Value, path: &str, found: &mut Vec<String>) {
+        match value {
+            toml::Value::Table(table) if schema["type"] == "object" => {
+                for (key, value) in table {
+                    match schema["properties"].get(key) {
+                        Some(schema) => undescribed(value, schema, &format!("{path}.{key}"), found),
+                        None => found.push(format!("{path}.{key}")),
+                    }
+                }
+            }
+            toml::Value::Array(list) if schema["items"]["type"] == "object" => {
+                list.iter().for_each(|value| undescribed(value, &schema["items"], path, found));
+            }
+            _ => {}
+        }
+    }
+    let schema = serde_json::from_str(&schema()).unwrap();
+    let mut described = 0;
+    for file in configs() {
+        let mut found = vec![];
+        let text = fs::read_to_string(&file).unwrap();
+        undescribed(&toml::from_str(&text).unwrap(), &schema, "", &mut found);
+        assert!(found.is_empty(), "{file:?}: {found:?}");
+        described += 1;
+    }
+    assert!(described > 15);
+}
+
 #[test]
 fn the_reference_shows_every_key_there_is() {
     let text = fs::read_to_string(config("reference.toml")).unwrap();
     let places =
         text.lines().filter(|line| line.starts_with('[') || line.starts_with("name = \"reference\""));
     for place in places {
-        let (before, after) = text.split_at(text.find(place).unwrap() + place.len());
+        let (before, after) = text.split_at(text.find(&format!("\n{place}")).unwrap() + 1 + place.len());
         let error = Config::parse("reference.toml", &format!("{before}\nqqq = 1{after}")).unwrap_err();
         let known = error.problems().iter().find_map(|problem| match &problem.kind {
             ProblemKind::UnknownKey { key, known, .. } if key.ends_with("qqq") => Some(known.clone()),

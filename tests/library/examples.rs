@@ -4,10 +4,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use takt::{
-    Config, Controller, Handle, Outcome, Scenario, ServeOptions, SessionOptions, Snapshot, VirtualController,
-    serve,
-};
+use takt::{Config, Controller, Handle, Outcome, Scenario, SessionOptions, Snapshot, VirtualController};
 
 /// The programs that read the configuration of an arm, or of a joint.
 macro_rules! programs {
@@ -82,7 +79,7 @@ fn an_arm_is_moved_through_another_process() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("arm").display().to_string();
     let arm = Controller::start(config("arm6-erob.toml"), SessionOptions::default()).unwrap();
-    let _server = serve(arm.handle(), &name, ServeOptions::default()).unwrap();
+    let _server = takt_remote::serve(arm.handle(), &name, takt_remote::ServeOptions::default()).unwrap();
     let before = arm.state().axes[0].position_set;
     remote::run(&name).unwrap();
     // The point of the stream is followed after the program has gone.

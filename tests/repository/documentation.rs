@@ -99,6 +99,7 @@ fn sources(folder: &Path, text: &mut String) {
 fn every_word_that_is_said_to_be_ours_is_a_name_of_its_language() {
     let mut rust = String::new();
     sources(&root().join("src"), &mut rust);
+    sources(&root().join("crates/remote/src"), &mut rust);
     sources(&root().join("crates/wire/src"), &mut rust);
     sources(&root().join("crates/sim/src"), &mut rust);
     sources(&root().join("rt/src"), &mut rust);
@@ -126,4 +127,27 @@ fn every_word_that_is_said_to_be_ours_is_a_name_of_its_language() {
             "there is no {name}"
         );
     }
+}
+
+#[test]
+fn the_table_of_faults_has_every_rule_with_its_category() {
+    let text = fs::read_to_string(root().join("docs/faults.md")).unwrap();
+    let (_, after) = text.split_once("## What is noticed, and what follows").unwrap();
+    let rows =
+        after.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
+    let mut documented = Vec::new();
+    for row in rows.skip(2) {
+        let cells: Vec<&str> = row.split('|').map(str::trim).collect();
+        // All code in these cells is keys.
+        for key in cells[1].split('`').skip(1).step_by(2) {
+            documented.push((key.to_owned(), cells[3].parse::<u8>().unwrap()));
+        }
+    }
+    documented.sort();
+    documented.dedup();
+    let rules = takt::Rule::ALL.into_iter().filter(|rule| *rule != takt::Rule::Requested);
+    let mut rules: Vec<_> =
+        rules.map(|rule| (rule.key().to_owned(), rule.default_category() as u8)).collect();
+    rules.sort();
+    assert_eq!(documented, rules);
 }

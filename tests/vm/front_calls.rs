@@ -14,7 +14,8 @@ use std::error::Error;
 use std::thread::sleep;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-use takt::{Controller, MotionId, Phase, StopCategory, connect};
+use takt::{Controller, MotionId, Phase, StopCategory};
+use takt_remote::connect;
 
 use run_arguments::arguments;
 

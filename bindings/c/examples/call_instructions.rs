@@ -11,13 +11,14 @@ use std::hint::black_box;
 use std::mem::MaybeUninit;
 use std::ptr;
 
-use takt::{Client, Config, MoveOptions, RunningController, ServeOptions, StopCategory, VirtualController};
+use takt::{Config, MoveOptions, RunningController, StopCategory, VirtualController};
 use takt_c::errors::takt_result::{self, TAKT_OK};
 use takt_c::handles::takt_handle;
 use takt_c::life::{takt_now_ns, takt_stop};
 use takt_c::open::{takt_drives, takt_open, takt_options};
 use takt_c::state::{takt_read_state, takt_state};
 use takt_c::stream::{takt_push_at, takt_push_positions_at, takt_target};
+use takt_remote::{Client, ServeOptions};
 
 const AXES: usize = 6;
 
@@ -114,8 +115,8 @@ fn of_another_process(work: &str, repetitions: u64) -> bool {
     let Some(work) = work.strip_prefix("served-") else { return false };
     let Some((arm, folder)) = simulated().zip(tempfile::tempdir().ok()) else { return false };
     let name = folder.path().join("arm").display().to_string();
-    let Ok(_server) = takt::serve(arm.handle(), &name, ServeOptions::default()) else { return false };
-    let Ok(client) = takt::connect(&name) else { return false };
+    let Ok(_server) = takt_remote::serve(arm.handle(), &name, ServeOptions::default()) else { return false };
+    let Ok(client) = takt_remote::connect(&name) else { return false };
     let repeat = |call: &dyn Fn(&Client, u64) -> bool| {
         (0..repetitions).for_each(|number| assert!(call(&client, number)));
     };

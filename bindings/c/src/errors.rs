@@ -4,10 +4,8 @@ use std::cell::RefCell;
 use std::ffi::{CString, c_char};
 
 use takt::trajectory::{RateError, TrajectoryError};
-use takt::{
-    CommandError, ConnectError, Error, MotionError, PointRefusal, Refused, RejectReason, StreamError,
-    WaitError,
-};
+use takt::{CommandError, Error, MotionError, PointRefusal, Refused, RejectReason, StreamError, WaitError};
+use takt_remote::ConnectError;
 
 use crate::border::{self, Growing};
 use crate::handles::Scope;

@@ -10,8 +10,8 @@ use pyo3::types::{PyBool, PyDict, PyTuple};
 use takt::config::Interface;
 use takt::telemetry::RealtimeReport;
 use takt::{
-    Controller, Handle, IfOwned, Phase, RecordingDestination, RunningController, ServeOptions,
-    SessionOptions, WaitError, schedule,
+    Controller, Handle, IfOwned, Phase, RecordingDestination, RunningController, SessionOptions, WaitError,
+    schedule,
 };
 
 use crate::config::config;
@@ -64,7 +64,7 @@ fn with_all(link: Link, controller: &dyn RunningController) -> (Link, Group) {
 #[pyfunction]
 #[pyo3(signature = (name, *, take_over=false))]
 pub fn connect(py: Python<'_>, name: &str, take_over: bool) -> PyResult<Py<Arm>> {
-    let client = py.detach(|| takt::connect(name));
+    let client = py.detach(|| takt_remote::connect(name));
     let client = client.map_err(|error| raise(py, "StartError", &error.to_string(), &[]))?;
     if take_over {
         let taken = py.detach(|| client.take_over());
@@ -228,7 +228,8 @@ impl Arm {
     /// Lets other processes observe and command the controller by a name.
     #[pyo3(signature = (name, *, mode=0o600, lease=1.0))]
     fn serve(&self, py: Python<'_>, name: &str, mode: u32, lease: f64) -> PyResult<Server> {
-        let options = ServeOptions::default().with_mode(mode).with_lease(duration(py, "lease", lease)?);
+        let options =
+            takt_remote::ServeOptions::default().with_mode(mode).with_lease(duration(py, "lease", lease)?);
         Server::start(py, self.link.clone(), name, options)
     }
 

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use takt::{Client, Handle, RunningController};
+use takt::{Handle, RunningController};
+use takt_remote::Client;
 
 use crate::error::{raise, raise_argument};
 

@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::{mem, process};
 
 use pyo3::prelude::*;
-use takt::{Client, Controller, Outcome, StartFailure, VirtualController};
+use takt::{Controller, Outcome, StartFailure, VirtualController};
+use takt_remote::Client;
 
 use crate::error::{raise, raise_start};
 use crate::link::Link;

@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use takt::ServeOptions;
+use takt_remote::ServeOptions;
 
 use crate::error::raise;
 use crate::link::Link;
@@ -13,7 +13,7 @@ use crate::link::Link;
 /// Lets other processes observe and command a controller, until it is closed.
 #[pyclass(module = "takt", frozen)]
 pub struct Server {
-    server: Mutex<Option<takt::Server>>,
+    server: Mutex<Option<takt_remote::Server>>,
     link: Link,
     name: String,
 }
@@ -21,12 +21,12 @@ pub struct Server {
 impl Server {
     pub fn start(py: Python<'_>, link: Link, name: &str, options: ServeOptions) -> PyResult<Self> {
         let handle = link.own(py, "serves it")?.clone();
-        let server = py.detach(|| takt::serve(handle, name, options));
+        let server = py.detach(|| takt_remote::serve(handle, name, options));
         let server = server.map_err(|error| raise(py, "ArgumentError", &error.to_string(), &[]))?;
         Ok(Self { server: Mutex::new(Some(server)), link, name: name.to_owned() })
     }
 
-    fn lock(&self) -> MutexGuard<'_, Option<takt::Server>> {
+    fn lock(&self) -> MutexGuard<'_, Option<takt_remote::Server>> {
         self.server.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -4,7 +4,7 @@ use clap::Args;
 use clap_complete::Shell;
 
 use super::exit::Exit;
-use super::{command, print};
+use super::print;
 
 /// Print what a shell needs to complete the words of takt
 ///
@@ -17,9 +17,9 @@ pub struct Arguments {
     shell: Shell,
 }
 
-/// Prints the script for the shell.
-pub fn run(arguments: Arguments) -> Exit {
+/// Prints the script for the shell. `takt` is the whole command line.
+pub fn run(arguments: Arguments, takt: &mut clap::Command) -> Exit {
     let mut script = vec![];
-    clap_complete::generate(arguments.shell, &mut command(), "takt", &mut script);
+    clap_complete::generate(arguments.shell, takt, "takt", &mut script);
     print::text(&String::from_utf8_lossy(&script), Exit::Done)
 }

@@ -1,5 +1,6 @@
 //! `takt eds`: shows the contents of an EDS or DCF.
 
+mod problem;
 mod text;
 mod view;
 
@@ -8,11 +9,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 use takt::family::cia402;
-use takt_wire::canopen::eds::{self, Findings, Severity};
+use takt_wire::canopen::eds::{self, Findings};
 
 use super::exit::Exit;
 use super::print;
 use super::say;
+use problem::{PrintedProblem, problems};
 use view::View;
 
 /// Print the object dictionary of an EDS or DCF, with its PDOs and with what is wrong in the file
@@ -82,36 +84,6 @@ fn starting_configuration(arguments: &Arguments) -> Exit {
 struct PrintedFindings {
     error: String,
     problems: Vec<PrintedProblem>,
-}
-
-/// A problem of the file.
-#[derive(Serialize)]
-struct PrintedProblem {
-    severity: &'static str,
-    line: usize,
-    column: usize,
-    /// The line itself.
-    source: String,
-    message: String,
-    help: String,
-}
-
-fn problems(findings: &Findings) -> Vec<PrintedProblem> {
-    let printed = |problem| {
-        let place = findings.position(problem);
-        PrintedProblem {
-            severity: match problem.kind.severity() {
-                Severity::Warning => "warning",
-                Severity::Error => "error",
-            },
-            line: place.line,
-            column: place.column,
-            source: findings.source_line(problem).to_owned(),
-            message: problem.to_string(),
-            help: problem.kind.help(),
-        }
-    };
-    findings.problems().iter().map(printed).collect()
 }
 
 fn show(findings: Findings) {

@@ -138,8 +138,8 @@ impl CommandLine {
             Command::Send(arguments) => send::run(&arguments),
             Command::Jitter(arguments) => jitter::run(&arguments),
             Command::Top(arguments) => top::run(&arguments),
-            Command::Completions(arguments) => completions::run(arguments),
-            Command::Manual(arguments) => manual::run(&arguments),
+            Command::Completions(arguments) => completions::run(arguments, &mut command()),
+            Command::Manual(arguments) => manual::run(&arguments, command()),
         }
     }
 }

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::command;
 use super::exit::Exit;
 use super::usage_error::UsageError;
 
@@ -17,10 +16,10 @@ pub struct Arguments {
 }
 
 /// Writes one page for takt and one for each subcommand. The exit code is 2 if the folder cannot be written to.
-pub fn run(arguments: &Arguments) -> Exit {
+pub fn run(arguments: &Arguments, takt: clap::Command) -> Exit {
     let folder = &arguments.folder;
     let written = if folder.is_dir() {
-        clap_mangen::generate_to(command(), folder)
+        clap_mangen::generate_to(takt, folder)
     } else {
         Err(io::Error::from(io::ErrorKind::NotADirectory))
     };

@@ -15,7 +15,6 @@ use takt::link::RealInterface;
 use takt::link::modbus_line::ModbusLine;
 use takt::link::ownership::Ownership;
 use takt::link::serial_line::SerialSettings;
-use takt::remote;
 use takt_panel::{
     self, BenchBus, BenchDrive, BenchLink, Listening, Panel, PanelError, PanelOptions, PanelToken, Workplace,
 };
@@ -138,7 +137,7 @@ fn is_configuration(what: &str) -> bool {
 }
 
 fn show_controller(arguments: &Arguments, name: &str, interrupted: &AtomicBool) -> Result<Exit, UsageError> {
-    let client = remote::connect(name).map_err(|error| error.to_string())?;
+    let client = takt_remote::connect(name).map_err(|error| error.to_string())?;
     let listening = arguments.access.listen(arguments.address)?;
     let lease = client.clone();
     let take_lease: takt_panel::TakeLease = Box::new(move || lease.take_over());

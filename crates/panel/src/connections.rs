@@ -18,7 +18,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Notify;
 use tokio::time::sleep;
 
-use super::gate::{Visited, locked, show_states};
+use super::lock::locked;
 
 /// Connections with the token that may be open at the same time: a browser opens six for a page at most.
 const ADMITTED_AT_MOST: usize = 320;
@@ -30,9 +30,6 @@ const SHOWN_WITHIN: Duration = Duration::from_secs(1);
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// The largest head of a request, in bytes.
 const HEAD_AT_MOST: usize = 16 * 1024;
-/// How long pages are given to read that the panel has ended.
-const CLOSING_TIME: Duration = Duration::from_millis(150);
-
 /// The connection that a request has come by.
 #[derive(Clone, Debug)]
 pub struct Connection {
@@ -113,15 +110,8 @@ impl Places {
     }
 }
 
-/// Serves pages until the panel ends.
-pub async fn serve(panel: &impl Visited, routes: axum::Router, listener: TcpListener) {
-    tokio::select! {
-        () = accept(routes, listener) => {}
-        () = show_states(panel) => sleep(CLOSING_TIME).await,
-    }
-}
-
-async fn accept(routes: axum::Router, listener: TcpListener) {
+/// Accepts connections, and serves pages on each.
+pub async fn accept(routes: axum::Router, listener: TcpListener) {
     let places = Arc::<Places>::default();
     let routes = TowerToHyperService::new(routes);
     for number in 0.. {

@@ -6,7 +6,7 @@ use std::collections::{HashMap, VecDeque};
 use std::convert::Infallible;
 use std::io::Read;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes, to_bytes};
@@ -26,6 +26,7 @@ use tokio::time::{MissedTickBehavior, interval, sleep, timeout};
 use super::access::{Access, Denied};
 use super::command::{CommandRefusal, ProblemView};
 use super::connections::Connection;
+use super::lock::locked;
 use super::page::File;
 use super::pages::{PageNumber, PageRefusal, Pages};
 
@@ -92,11 +93,6 @@ impl Events {
         }
         self.kept.push_back((self.last, page, event(self.last)));
     }
-}
-
-/// A panic of another holder of a lock leaves what it guards consistent.
-pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Gate {

@@ -38,6 +38,8 @@ mod frames;
 mod gate;
 #[cfg(feature = "server")]
 mod listening;
+#[cfg(feature = "server")]
+mod lock;
 mod motion;
 pub(crate) mod motions;
 #[cfg(feature = "server")]
@@ -52,8 +54,8 @@ pub use access::TOKEN_AT_LEAST;
 #[cfg(feature = "server")]
 pub use bench::{BenchBus, BenchDrive, BenchLink, Workplace};
 #[cfg(feature = "server")]
-pub use listening::{
-    FrameSource, Listening, Panel, PanelError, PanelOptions, PanelToken, TakeLease, address,
-};
+pub use listening::{Listening, Panel, PanelError, PanelOptions, PanelToken, address};
 pub use motions::HELD_FOR;
 pub use pages::{PAGES_AT_MOST, PRESENT_FOR};
+#[cfg(feature = "server")]
+pub use server::{FrameSource, TakeLease};

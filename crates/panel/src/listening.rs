@@ -5,28 +5,20 @@ use std::io;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, ToSocketAddrs};
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use axum::Router;
+use tokio::time::sleep;
 
 use super::access::{Access, AccessError};
 use super::bench::{self, Bench, Worker, Workplace};
 use super::connections;
 use super::gate::{self, Visited};
-use super::server::{self, Server};
-use takt::command::{CommandError, RunningController};
-use takt::telemetry::FrameFeed;
-use takt_tools::monitor::BusDecoder;
+use super::server::{self, FrameSource, Server, TakeLease};
+use takt::command::RunningController;
 
-/// Takes over from another process that commands the controller, where there may be one.
-pub type TakeLease = Box<dyn Fn() -> Result<(), CommandError> + Send + Sync>;
-
-/// The frames of a controller of this process, for the monitor.
-pub struct FrameSource {
-    /// Where they come from.
-    pub feed: Arc<FrameFeed>,
-    /// What they mean, in the order of the buses.
-    pub decoders: Vec<BusDecoder>,
-}
+/// How long pages are given to read that the panel has ended.
+const CLOSING_TIME: Duration = Duration::from_millis(150);
 
 /// The token that every request of a page must carry.
 #[derive(Clone, Debug)]
@@ -224,7 +216,7 @@ impl Threads {
             let _guard = runtime.enter();
             tokio::net::TcpListener::from_std(listener)?
         };
-        self.spawn("takt-panel", move || runtime.block_on(connections::serve(&*panel, routes, listener)))
+        self.spawn("takt-panel", move || runtime.block_on(serve(&*panel, routes, listener)))
     }
 
     fn spawn(&mut self, name: &str, run: impl FnOnce() + Send + 'static) -> io::Result<()> {
@@ -240,6 +232,14 @@ impl Drop for Threads {
             // A thread that has panicked has told so.
             let _ = thread.join();
         }
+    }
+}
+
+/// Serves pages until the panel ends.
+async fn serve(panel: &impl Visited, routes: Router, listener: tokio::net::TcpListener) {
+    tokio::select! {
+        () = connections::accept(routes, listener) => {}
+        () = gate::show_states(panel) => sleep(CLOSING_TIME).await,
     }
 }
 

@@ -19,15 +19,16 @@ use super::access::Access;
 use super::chinese::Words;
 use super::command::{Command, CommandRefusal, target_of};
 use super::frames::{FrameView, Frames, Wanted};
-use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, locked, message, page_key};
-use super::listening::{FrameSource, TakeLease};
+use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, message, page_key};
+use super::lock::locked;
 use super::motions::{Motions, Problem};
 use super::page::{self, File};
 use super::pages::{Asked, PageNumber, PageRefusal};
 use super::view::{EventView, MachineView, Viewer, time_ms};
-use takt::command::{RunningController, WaitError};
-use takt::telemetry::OnBus;
+use takt::command::{CommandError, RunningController, WaitError};
 use takt::telemetry::missed_slots::MissedSlotsSoFar;
+use takt::telemetry::{FrameFeed, OnBus};
+use takt_tools::monitor::BusDecoder;
 
 /// Commands that may wait for the controller.
 const COMMANDS_WAITING: usize = 16;
@@ -35,6 +36,17 @@ const COMMANDS_WAITING: usize = 16;
 const LOOK: Duration = Duration::from_millis(100);
 /// So long after a page has asked for frames, they are not collected any more.
 const FRAMES_FOR: Duration = Duration::from_secs(2);
+
+/// Takes over from another process that commands the controller, where there may be one.
+pub type TakeLease = Box<dyn Fn() -> Result<(), CommandError> + Send + Sync>;
+
+/// The frames of a controller of this process, for the monitor.
+pub struct FrameSource {
+    /// Where they come from.
+    pub feed: Arc<FrameFeed>,
+    /// What they mean, in the order of the buses.
+    pub decoders: Vec<BusDecoder>,
+}
 
 /// What the threads of the panel share.
 pub struct Server {

@@ -71,6 +71,8 @@ pub mod homing_switches;
 pub mod line_faults;
 #[cfg(target_os = "linux")]
 pub mod live;
+#[cfg(target_os = "linux")]
+pub mod live_serial_device;
 mod loops;
 pub mod lss;
 pub mod mailbox;

@@ -5,6 +5,7 @@
 //! writes the objects.
 
 mod block;
+mod transfer;
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -14,7 +15,7 @@ use takt_wire::canopen::object::ObjectAddress;
 
 use super::random::Random;
 use super::sdo_reply::{AbortCode, aborted, addressed, downloaded, uploaded};
-use block::{BlockDownload, BlockUpload};
+use transfer::Transfer;
 
 /// The longest value of a transfer: bytes.
 const BUFFER: usize = 4096;
@@ -56,36 +57,6 @@ pub enum SdoFeatures {
 const EXPEDITED: [u8; 6] = [0x40, 0x22, 0x23, 0x27, 0x2B, 0x2F];
 /// The command with which a client aborts.
 const ABORT: u8 = 0x80;
-
-/// The transfer that is under way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Transfer {
-    #[default]
-    None,
-    Download {
-        address: ObjectAddress,
-        length: Option<usize>,
-        toggle: bool,
-    },
-    Upload {
-        address: ObjectAddress,
-        sent: usize,
-        toggle: bool,
-    },
-    BlockDownload(BlockDownload),
-    BlockUpload(BlockUpload),
-}
-
-impl Transfer {
-    fn address(self) -> Option<ObjectAddress> {
-        match self {
-            Self::None => None,
-            Self::Download { address, .. } | Self::Upload { address, .. } => Some(address),
-            Self::BlockDownload(transfer) => Some(transfer.address),
-            Self::BlockUpload(transfer) => Some(transfer.address),
-        }
-    }
-}
 
 /// The server of one node.
 #[derive(Clone, Debug)]

@@ -2,7 +2,8 @@
 
 use takt::rt::RequestTarget;
 use takt::telemetry::phase_words;
-use takt::{Client, ClientEvents, EventKind, Phase, RequestId, RunningController, Snapshot, Stopped};
+use takt::{EventKind, Phase, RequestId, RunningController, Snapshot, Stopped};
+use takt_remote::{Client, ClientEvents};
 use thiserror::Error;
 
 /// Reason for which a trajectory that has not begun is discarded.

@@ -5,7 +5,8 @@ use std::thread;
 
 use takt::rt::{RequestTarget, StopCategory};
 use takt::telemetry::CdrEncoder;
-use takt::{Client, ConnectError, RunningController, Snapshot, WaitError};
+use takt::{RunningController, Snapshot, WaitError};
+use takt_remote::{Client, ConnectError};
 use thiserror::Error;
 use zenoh::liveliness::LivelinessToken;
 use zenoh::pubsub::{Publisher, Subscriber};
@@ -114,7 +115,7 @@ impl Bridge {
         if !(0.1..=1000.0).contains(&options.rate_hz) {
             return Err(BridgeError::Rate { given: options.rate_hz });
         }
-        let controller = takt::connect(&options.controller)?;
+        let controller = takt_remote::connect(&options.controller)?;
         let described = &controller.machine().axes;
         let axes =
             described.iter().map(|axis| AxisPlace { name: axis.name.clone(), group: axis.group }).collect();

@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use takt::rt::{RequestTarget, StopCategory};
-use takt::{Client, CommandError, MotionId, RunningController, TrajectoryPoint};
+use takt::{CommandError, MotionId, RunningController, TrajectoryPoint};
+use takt_remote::Client;
 
 use crate::arrival::{Arrival, Discarded, Stops};
 use crate::clock::time_of_day_ns;

@@ -19,7 +19,7 @@ const ANSWER_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 100;
 /// spaced are told again after 20 ms.
 const OBEYING_NS: Nanoseconds = NANOSECONDS_PER_SECOND / 20;
 
-/// What a group needs by SDO in a slot.
+/// How far along a group is in switching its drives off or in stopping.
 #[derive(Clone, Copy)]
 struct Need {
     is_disabling: bool,

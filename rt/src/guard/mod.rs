@@ -203,7 +203,7 @@ fn check_outside(limits: &AxisLimits, last: f64, position: f64) -> Result<(), Fa
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rule::Rule;
+    use crate::fault::Rule;
     use proptest::prelude::*;
 
     const LIMITS: AxisLimits = AxisLimits {

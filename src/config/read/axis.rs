@@ -9,12 +9,14 @@ use super::bus::ReadBus;
 use super::control::modes;
 use super::entry::Entry;
 use super::limits::{ReadLimits, following_error, limits};
-use super::machine::{boolean, heartbeat, node};
+use super::machine::heartbeat;
 use super::section::Section;
 use super::travel::{counting, travel};
 use super::urdf::{DescribedJoint, Description};
+use crate::config::configured_family::{ConfiguredFamily, FamilyKeys};
 use crate::config::defaults;
-use crate::config::drive_family::{ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys, Protocol};
+use crate::config::drive_family::{DriveFacts, DriveFamily, Protocol};
+use crate::config::keys::{self, axis as axis_keys, identity as identity_keys, joint as joint_keys};
 use crate::config::model::{
     Axis, FeedForward, Feedback, Follow, FrictionShape, Identity, Interface, Joint, Limits, PdoMapping,
     PowerUpState, SimulatedJoint, Travel,
@@ -22,7 +24,6 @@ use crate::config::model::{
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::rules;
 use crate::config::rules::loops::Surroundings;
 use crate::config::rules::program::AxisView;
@@ -110,7 +111,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     });
     let bus =
         section.require("bus", "the name of its bus").and_then(|entry| bus_index(&entry, machine.buses));
-    let node_entry = section.require_own("node", "its node ID, 1 to 127");
+    let node_entry = section.require_own(axis_keys::NODE.name, "its node ID, 1 to 127");
     let families: Vec<_> = machine.families.iter().map(|family| (family.word(), *family)).collect();
     let example = families.first().map_or("", |(word, _)| word);
     let family = section
@@ -122,9 +123,9 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let drive = family_drive.as_deref();
     let node = node_entry.as_ref().and_then(|entry| match drive {
         Some(drive) if drive.protocol.is_of_serial_line() => {
-            entry.integer(ranges::LINE_ADDRESS).and_then(|address| u8::try_from(address).ok())
+            entry.integer(keys::LINE_ADDRESSES).and_then(|address| u8::try_from(address).ok())
         }
-        _ => node(entry),
+        _ => entry.integer(keys::master::NODE.integers()).and_then(|node| u8::try_from(node).ok()),
     });
     if let Some((drive, read)) = drive.zip(machine.bus(bus).filter(|read| read.bus.is_some())) {
         let name = read.name.as_deref().unwrap_or_default();
@@ -153,7 +154,7 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let ReadLimits { limits, shown_in, urdf } =
         limits(limits_section, q, travel.unwrap_or(Travel::Rotary), counting.as_ref(), &described);
     let following_error = following_error(section.section("following_error"), q, travel);
-    let power_up = section.get("power_up").and_then(|entry| entry.nanoseconds(ranges::POWER_UP_S));
+    let power_up = section.nanoseconds(&axis_keys::POWER_UP);
     let mut joint_section = section.section("joint");
     let joint = joint(&mut joint_section, q);
     let rated_torque = joint.rated_torque.or(limits.map(|limits| limits.torque)).unwrap_or(1.0);
@@ -184,20 +185,17 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
     let mapping = mapping(&mut section, drive);
     let feedback = feedback(&mut section, drive, mapping);
     let feed_forward = feed_forward(&mut section, drive);
-    let answers_sync = boolean(&mut section, "answers_sync", defaults::ANSWERS_SYNC);
-    let mut tolerance =
-        |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(q.position, q.ranges.deviation));
-    let start_tolerance = tolerance("start_tolerance");
-    let target_tolerance = tolerance("target_tolerance");
+    let answers_sync = section.boolean(&axis_keys::ANSWERS_SYNC);
+    let start_tolerance = section.quantity(&axis_keys::START_TOLERANCE, q);
+    let target_tolerance = section.quantity(&axis_keys::TARGET_TOLERANCE, q);
     let follow = section
-        .get("follow")
+        .get(axis_keys::FOLLOW.name)
         .and_then(|entry| entry.choice(&[("smooth", Follow::Smooth), ("exact", Follow::Exact)]));
     let missed = missed_feedback(&mut section, drive, period_ns);
-    let feedback_delay =
-        section.get("feedback_delay").and_then(|entry| entry.nanoseconds(ranges::FEEDBACK_DELAY_S));
-    let heartbeat_ns = section.get("heartbeat").and_then(|entry| heartbeat(&entry));
+    let feedback_delay = section.nanoseconds(&axis_keys::FEEDBACK_DELAY);
+    let heartbeat_ns = section.keyed(&axis_keys::HEARTBEAT).and_then(|entry| heartbeat(&entry));
     let identity = identity(section.section("identity"), drive);
-    let dcf = section.get("dcf").and_then(|entry| dcf(&entry, node));
+    let dcf = section.get(axis_keys::DCF.name).and_then(|entry| dcf(&entry, node));
 
     let place = bus.zip(node);
     let build = || {
@@ -226,16 +224,17 @@ fn axis(mut section: Section<'_>, machine: &Machine<'_>, earlier: &[ReadAxis]) -
             target_tolerance: target_tolerance
                 .unwrap_or_else(|| defaults::target_tolerance(travel, &controls)),
             follow: follow.unwrap_or_default(),
-            missed_feedback_cycles: missed.unwrap_or(defaults::MISSED_FEEDBACK_CYCLES),
+            missed_feedback_cycles: missed
+                .unwrap_or(const { axis_keys::MISSED_FEEDBACK_CYCLES.default_number() as u16 }),
             transmission_type,
             mapping,
             feedback,
             answers_sync,
-            feedback_delay_ns: feedback_delay.unwrap_or(defaults::FEEDBACK_DELAY_NS),
+            feedback_delay_ns: feedback_delay.unwrap_or(const { axis_keys::FEEDBACK_DELAY.default_ns() }),
             heartbeat_ns,
             identity,
             dcf,
-            power_up_ns: power_up.unwrap_or(defaults::POWER_UP_NS),
+            power_up_ns: power_up.unwrap_or(const { axis_keys::POWER_UP.default_ns() }),
             joint,
             simulated,
         })
@@ -261,9 +260,9 @@ fn missed_feedback(
     drive: Option<&DriveFacts>,
     period_ns: Option<u64>,
 ) -> Option<u16> {
-    let cycles = section.get("missed_feedback_cycles");
-    let Some(time) = section.get("missed_feedback_time") else {
-        return cycles?.integer(ranges::MISSED_FEEDBACK_CYCLES).and_then(|cycles| u16::try_from(cycles).ok());
+    let cycles = section.keyed(&axis_keys::MISSED_FEEDBACK_CYCLES);
+    let Some(time) = section.get(axis_keys::MISSED_FEEDBACK_TIME.name) else {
+        return cycles?.integer();
     };
     let key = time.spot.key.clone();
     if cycles.is_some() {
@@ -280,7 +279,7 @@ fn missed_feedback(
     }
     let period_ns = period_ns?.max(1);
     let cycle_s = period_ns as f64 / 1e9;
-    let most = (ranges::MISSED_FEEDBACK_CYCLES.end - 1) as f64;
+    let most = (axis_keys::MISSED_FEEDBACK_CYCLES.integers().end - 1) as f64;
     let time_ns = time.nanoseconds(cycle_s..=most * period_ns as f64 / 1e9)?;
     u16::try_from(time_ns / period_ns).ok()
 }
@@ -332,14 +331,11 @@ fn check_node(
 }
 
 fn joint(section: &mut Section<'_>, q: Quantities) -> Joint {
-    let mut value = |key, quantity, bounds| {
-        section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
-    };
     Joint {
-        inertia: value("inertia", q.inertia, q.ranges.inertia),
-        viscous_friction: value("viscous_friction", q.damping, q.ranges.viscous_friction),
-        coulomb_friction: value("coulomb_friction", q.effort, q.ranges.friction),
-        rated_torque: value("rated_torque", q.effort, q.ranges.effort),
+        inertia: section.quantity(&joint_keys::INERTIA, q),
+        viscous_friction: section.quantity(&joint_keys::VISCOUS_FRICTION, q),
+        coulomb_friction: section.quantity(&joint_keys::COULOMB_FRICTION, q),
+        rated_torque: section.quantity(&joint_keys::RATED_TORQUE, q),
     }
 }
 
@@ -351,25 +347,23 @@ fn simulated(
     drive: Option<&DriveFacts>,
     name: Option<&str>,
 ) -> SimulatedJoint {
-    let mut value = |key, quantity, bounds| {
-        section.get(key).and_then(|entry: Entry<'_>| entry.quantity(quantity, bounds))
-    };
-    let ranges = q.ranges;
-    let gravity = value("gravity", q.effort, ranges.friction);
-    let peak_torque = value("peak_torque", q.effort, ranges.effort);
-    let initial = section.get("initial_position").and_then(|entry| {
+    use keys::simulated::{FRICTION_SHAPE, GRAVITY, INITIAL_POSITION, PEAK_TORQUE, POWER_UP};
+
+    let gravity = section.quantity(&GRAVITY, q);
+    let peak_torque = section.quantity(&PEAK_TORQUE, q);
+    let initial = section.get(INITIAL_POSITION.name).and_then(|entry| {
         let position = entry.unbounded(q.position)?;
         let name = name.unwrap_or_default();
         rules::simulation::initial_position(&entry.spot, position, q, limits, name);
         Some(position)
     });
-    let friction = section.get("friction").and_then(|entry| {
+    let friction = section.get(FRICTION_SHAPE.name).and_then(|entry| {
         entry.choice(&[
             ("constant", FrictionShape::Constant),
             ("harmonic-drive", FrictionShape::HarmonicDrive),
         ])
     });
-    let power_up = section.get("power_up").and_then(|entry| {
+    let power_up = section.get(POWER_UP.name).and_then(|entry| {
         let choices =
             [("pre-operational", PowerUpState::PreOperational), ("operational", PowerUpState::Operational)];
         let is_duration = entry.is_quantity(Quantity::DURATION);
@@ -388,7 +382,7 @@ fn simulated(
     });
     section.finish();
     SimulatedJoint {
-        gravity: gravity.unwrap_or(0.0),
+        gravity: gravity.unwrap_or(const { GRAVITY.default_number() }),
         friction: friction.unwrap_or_default(),
         peak_torque: peak_torque.unwrap_or(defaults::PEAK_TO_RATED_TORQUE * rated_torque),
         initial_position: initial.unwrap_or_else(|| limits.map_or(0.0, defaults::initial_position)),
@@ -398,7 +392,7 @@ fn simulated(
 
 fn mapping(section: &mut Section<'_>, drive: Option<&DriveFacts>) -> PdoMapping {
     let choices = [("written", PdoMapping::Written), ("as-stored", PdoMapping::AsStored)];
-    let read = section.get("mapping").and_then(|entry| {
+    let read = section.get(axis_keys::MAPPING.name).and_then(|entry| {
         let mapping = entry.choice(&choices)?;
         if let Some(drive) = drive {
             rules::axis::mapping(&entry.spot, drive, mapping);
@@ -410,7 +404,7 @@ fn mapping(section: &mut Section<'_>, drive: Option<&DriveFacts>) -> PdoMapping 
 
 fn feedback(section: &mut Section<'_>, drive: Option<&DriveFacts>, mapping: PdoMapping) -> Vec<Feedback> {
     let choices = Feedback::ALL.map(|feedback| (feedback.word(), feedback));
-    let Some(entry) = section.get("feedback") else {
+    let Some(entry) = section.get(axis_keys::FEEDBACK.name) else {
         return drive.map_or(vec![], |drive| defaults::feedback(drive, mapping));
     };
     let mut feedback = vec![];
@@ -429,7 +423,7 @@ fn feed_forward(section: &mut Section<'_>, drive: Option<&DriveFacts>) -> FeedFo
         ("torque", FeedForward::Torque),
         ("velocity-and-torque", FeedForward::VelocityAndTorque),
     ];
-    let read = section.get("feed_forward").and_then(|entry| {
+    let read = section.get(axis_keys::FEED_FORWARD.name).and_then(|entry| {
         let feed_forward = entry.choice(&choices)?;
         rules::axis::feed_forward(&entry.spot, drive, feed_forward);
         Some(feed_forward)
@@ -438,12 +432,12 @@ fn feed_forward(section: &mut Section<'_>, drive: Option<&DriveFacts>) -> FeedFo
 }
 
 fn transmission_type(section: &mut Section<'_>) -> u8 {
-    let read = section.get("transmission_type").and_then(|entry| {
-        let value = u8::try_from(entry.integer(ranges::TRANSMISSION_TYPE)?).ok()?;
+    let read = section.keyed(&axis_keys::TRANSMISSION_TYPE).and_then(|entry| {
+        let value = entry.integer()?;
         rules::axis::transmission_type(&entry.spot, value);
         Some(value)
     });
-    read.unwrap_or(defaults::TRANSMISSION_TYPE)
+    read.unwrap_or(const { axis_keys::TRANSMISSION_TYPE.default_number() as u8 })
 }
 
 fn dcf(entry: &Entry<'_>, node: Option<u8>) -> Option<DeviceConfiguration> {
@@ -453,16 +447,16 @@ fn dcf(entry: &Entry<'_>, node: Option<u8>) -> Option<DeviceConfiguration> {
 
 fn identity(mut section: Section<'_>, drive: Option<&DriveFacts>) -> Identity {
     let default = drive.map_or(Identity::default(), |drive| drive.identity);
-    let mut value = |key, default| match section.get(key) {
+    let mut value = |key, default| match section.keyed(key) {
         None => default,
-        Some(entry) if entry.is_word("any") => None,
-        Some(entry) => entry.integer(0..1 << 32).and_then(|value| u32::try_from(value).ok()),
+        Some(entry) if entry.is_the_word() => None,
+        Some(entry) => entry.integer(),
     };
     let identity = Identity {
-        device_type: value("device_type", default.device_type),
-        vendor: value("vendor", default.vendor),
-        product: value("product", default.product),
-        revision: value("revision", default.revision),
+        device_type: value(&identity_keys::DEVICE_TYPE, default.device_type),
+        vendor: value(&identity_keys::VENDOR, default.vendor),
+        product: value(&identity_keys::PRODUCT, default.product),
+        revision: value(&identity_keys::REVISION, default.revision),
     };
     section.finish();
     identity

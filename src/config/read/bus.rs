@@ -6,13 +6,12 @@ use takt_rt::MAX_BUSES;
 
 use super::entry::Entry;
 use super::line;
-use super::machine::boolean;
 use super::section::Section;
 use crate::config::defaults;
+use crate::config::keys::{self, bus as bus_keys};
 use crate::config::model::{Bus, CommandFrames, Interface, SerialDevice};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::rules;
 use crate::config::spot::Spot;
 
@@ -61,7 +60,7 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>], lin
         }
         Some(name)
     });
-    let interface_entry = section.get("interface");
+    let interface_entry = section.get(bus_keys::INTERFACE.name);
     let interface = match &interface_entry {
         None => Some(Interface::Simulated),
         Some(entry) => interface(entry, earlier),
@@ -71,7 +70,7 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>], lin
         Some(Interface::Simulated) => name.is_some_and(|name| lines.contains(&name)),
         Some(Interface::SocketCan(_) | Interface::Slcan(_) | Interface::Converter(_)) | None => false,
     };
-    let bit_rate_entry = section.get("bit_rate");
+    let bit_rate_entry = section.get(bus_keys::BIT_RATE.name);
     let bit_rate = bit_rate_entry.as_ref().and_then(|entry| {
         let rate = entry.unbounded(Quantity::BIT_RATE)?;
         // Those of a line are those of its drives, which `rules::axis` knows.
@@ -80,14 +79,14 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>], lin
     let bit_rate = match &interface {
         Some(Interface::Serial(device)) => line_bit_rate(device, bit_rate_entry.as_ref(), bit_rate),
         _ if is_line => bit_rate.unwrap_or(defaults::LINE_BIT_RATE),
-        _ => bit_rate.unwrap_or(defaults::BIT_RATE),
+        _ => bit_rate.unwrap_or(const { bus_keys::BIT_RATE.default_number() as u32 }),
     };
     for key in rules::line::CAN_KEYS.into_iter().filter(|_| is_line) {
         if let Some(entry) = section.get(key) {
             entry.report(rules::line::can_key(&entry.spot.key));
         }
     }
-    let data_bit_rate = section.get("data_bit_rate").filter(|_| !is_line).and_then(|entry| {
+    let data_bit_rate = section.get(bus_keys::DATA_BIT_RATE.name).filter(|_| !is_line).and_then(|entry| {
         let rate = entry.unbounded(Quantity::BIT_RATE)?;
         rules::bus::data_bit_rate(
             &entry.spot,
@@ -96,20 +95,20 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>], lin
             interface.as_ref().unwrap_or(&Interface::Simulated),
         )
     });
-    let divider = match section.get("period") {
+    let divider = match section.get(bus_keys::PERIOD.name) {
         Some(entry) => divider(&entry, cycle_ns),
         None => Some(if is_line { line::divider(cycle_ns) } else { 1 }),
     };
-    let restart_ms = section.get("restart_ms").and_then(|entry| entry.integer(ranges::RESTART_MS));
-    let service_frames =
-        section.get("service_frames_per_cycle").and_then(|entry| entry.integer(ranges::SERVICE_FRAMES));
-    let sdo_while_enabled = boolean(&mut section, "sdo_while_enabled", defaults::SDO_WHILE_ENABLED);
+    let restart_ms = section.integer(&bus_keys::RESTART_MS);
+    let service_frames = section.integer(&bus_keys::SERVICE_FRAMES);
+    let sdo_while_enabled = section.boolean(&bus_keys::SDO_WHILE_ENABLED);
     let choices = [
         ("auto", None),
         ("one-per-axis", Some(CommandFrames::OnePerAxis)),
         ("shared", Some(CommandFrames::Shared)),
     ];
-    let command_frames = section.get("command_frames").and_then(|entry| entry.choice(&choices)).flatten();
+    let command_frames =
+        section.get(bus_keys::COMMAND_FRAMES.name).and_then(|entry| entry.choice(&choices)).flatten();
     section.finish();
     let bus = name.zip(interface).map(|(name, interface)| Bus {
         name: name.to_owned(),
@@ -117,10 +116,9 @@ fn bus<'a>(mut section: Section<'a>, cycle_ns: u64, earlier: &[ReadBus<'a>], lin
         divider: divider.unwrap_or(1),
         bit_rate,
         data_bit_rate,
-        restart_ms: restart_ms.and_then(|time| u32::try_from(time).ok()).unwrap_or(defaults::RESTART_MS),
+        restart_ms: restart_ms.unwrap_or(const { bus_keys::RESTART_MS.default_number() as u32 }),
         service_frames_per_cycle: service_frames
-            .and_then(|frames| usize::try_from(frames).ok())
-            .unwrap_or(defaults::SERVICE_FRAMES_PER_CYCLE),
+            .unwrap_or(const { bus_keys::SERVICE_FRAMES.default_number() as usize }),
         sdo_while_enabled,
         command_frames: command_frames.unwrap_or_default(),
     });
@@ -163,7 +161,7 @@ fn interface(entry: &Entry<'_>, earlier: &[ReadBus<'_>]) -> Option<Interface> {
 /// A bus may have one cycle in several of the controller's.
 fn divider(entry: &Entry<'_>, cycle_ns: u64) -> Option<u32> {
     let cycle_s = cycle_ns as f64 / 1e9;
-    let period_ns = entry.nanoseconds(cycle_s..=ranges::BUS_PERIOD_AT_MOST_S.max(cycle_s))?;
+    let period_ns = entry.nanoseconds(cycle_s..=keys::BUS_PERIOD_AT_MOST_S.max(cycle_s))?;
     if !period_ns.is_multiple_of(cycle_ns) {
         let period = Quantity::DURATION.show(cycle_s);
         entry.report_range(

@@ -1,13 +1,16 @@
 //! The mode of an axis, and the loops that the controller closes for it.
 
 use super::section::Section;
-use crate::config::bounds::Bounds;
 use crate::config::defaults;
 use crate::config::drive_family::DriveFacts;
+use crate::config::key::Key;
+use crate::config::keys::torque_loop::{
+    BANDWIDTH, COULOMB_FRICTION, DAMPING, DAMPING_MAX, INERTIA, STIFFNESS, STIFFNESS_MAX, TORQUE_RISE,
+    VISCOUS_FRICTION,
+};
+use crate::config::keys::velocity_loop::POSITION_GAIN;
 use crate::config::model::{Compliance, Control, Joint};
 use crate::config::quantities::Quantities;
-use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::rules;
 use crate::config::rules::loops::{self, Origin, Surroundings, TorqueLoop};
 
@@ -69,7 +72,7 @@ pub fn modes(
         let Some(surroundings) = surroundings else { break };
         match *law {
             Control::Velocity { position_gain } => {
-                loops::velocity_loop(&velocity_section.spot("position_gain"), position_gain, surroundings);
+                loops::velocity_loop(&velocity_section.spot(POSITION_GAIN.name), position_gain, surroundings);
             }
             Control::Torque { stiffness, damping, inertia, .. } => {
                 let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia: joint.inertia() };
@@ -135,15 +138,9 @@ struct AskedCompliance {
 impl AskedCompliance {
     fn read(section: &mut Section<'_>, q: Quantities) -> Self {
         Self {
-            stiffness_max: section
-                .get("stiffness_max")
-                .and_then(|entry| entry.quantity(q.stiffness, q.ranges.stiffness)),
-            damping_max: section
-                .get("damping_max")
-                .and_then(|entry| entry.quantity(q.damping, q.ranges.damping)),
-            torque_rise_ns: section
-                .get("torque_rise")
-                .and_then(|entry| entry.nanoseconds(ranges::TORQUE_RISE_S)),
+            stiffness_max: section.quantity(&STIFFNESS_MAX, q),
+            damping_max: section.quantity(&DAMPING_MAX, q),
+            torque_rise_ns: section.nanoseconds(&TORQUE_RISE),
         }
     }
 
@@ -154,8 +151,8 @@ impl AskedCompliance {
     /// The key of the highest value of a gain.
     fn key_of(gain: &'static str) -> &'static str {
         match gain {
-            "stiffness" => "stiffness_max",
-            "damping" => "damping_max",
+            "stiffness" => STIFFNESS_MAX.name,
+            "damping" => DAMPING_MAX.name,
             other => other,
         }
     }
@@ -172,8 +169,7 @@ impl AskedCompliance {
 
 /// `None` where a gain is wrong.
 fn velocity_loop(section: &mut Section<'_>, period_s: f64) -> Option<Control> {
-    let gain =
-        section.get("position_gain").map(|entry| entry.quantity(Quantity::GAIN, ranges::POSITION_GAIN));
+    let gain = section.keyed(&POSITION_GAIN).map(|entry| entry.quantity(Quantities::ROTARY));
     let position_gain = gain.unwrap_or_else(|| Some(defaults::position_gain(period_s)))?;
     Some(Control::Velocity { position_gain })
 }
@@ -185,22 +181,20 @@ fn torque_loop(
     joint: &Joint,
     period_s: f64,
 ) -> Option<(Control, Origin)> {
-    let mut value = |key, quantity, bounds: Bounds, default: Option<f64>| match section.get(key) {
-        Some(entry) => entry.quantity(quantity, bounds),
+    let mut value = |key: &'static Key, default: Option<f64>| match section.keyed(key) {
+        Some(entry) => entry.quantity(q),
         None => default,
     };
     let default_bandwidth = Some(defaults::torque_loop_bandwidth(period_s));
-    let bandwidth = value("bandwidth", Quantity::GAIN, ranges::BANDWIDTH, default_bandwidth);
-    let inertia = value("inertia", q.inertia, q.ranges.fed_forward_inertia, Some(joint.inertia()));
+    let bandwidth = value(&BANDWIDTH, default_bandwidth);
+    let inertia = value(&INERTIA, Some(joint.inertia()));
     let by_bandwidth = |gain: fn(f64, f64) -> f64| Some(gain(inertia?, bandwidth?));
     let default_stiffness = by_bandwidth(|inertia, bandwidth| inertia * bandwidth * bandwidth);
     let default_damping = by_bandwidth(|inertia, bandwidth| 2.0 * inertia * bandwidth);
-    let stiffness = value("stiffness", q.stiffness, q.ranges.stiffness, default_stiffness);
-    let damping = value("damping", q.damping, q.ranges.damping, default_damping);
-    let viscous_friction =
-        value("viscous_friction", q.damping, q.ranges.viscous_friction, Some(joint.viscous_friction()));
-    let coulomb_friction =
-        value("coulomb_friction", q.effort, q.ranges.friction, Some(joint.coulomb_friction()));
+    let stiffness = value(&STIFFNESS, default_stiffness);
+    let damping = value(&DAMPING, default_damping);
+    let viscous_friction = value(&VISCOUS_FRICTION, Some(joint.viscous_friction()));
+    let coulomb_friction = value(&COULOMB_FRICTION, Some(joint.coulomb_friction()));
     let are_given = [stiffness != default_stiffness, damping != default_damping];
     let origin = match bandwidth {
         Some(bandwidth) if are_given == [false; 2] => Origin::Bandwidth(bandwidth),

@@ -1,6 +1,6 @@
 //! One value of the file: its place, what it should be, and the problem if it is something else.
 
-use std::ops::{Range, RangeInclusive};
+use std::ops::{Deref, Range, RangeInclusive};
 use std::path::PathBuf;
 
 use takt_wire::printable::excerpt;
@@ -8,7 +8,9 @@ use toml::Spanned;
 use toml::de::{DeArray, DeInteger, DeTable, DeValue};
 
 use crate::config::bounds::Bounds;
+use crate::config::key::Key;
 use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::Quantities;
 use crate::config::quantity::{Quantity, QuantityError, Short};
 use crate::config::rules;
 use crate::config::spelling;
@@ -203,6 +205,54 @@ impl<'a> Entry<'a> {
         };
         self.report(kind);
         None
+    }
+}
+
+/// A value that must be one of those of its row.
+pub struct KeyedEntry<'a> {
+    entry: Entry<'a>,
+    key: &'static Key,
+}
+
+impl<'a> Deref for KeyedEntry<'a> {
+    type Target = Entry<'a>;
+
+    fn deref(&self) -> &Entry<'a> {
+        &self.entry
+    }
+}
+
+impl<'a> KeyedEntry<'a> {
+    pub fn new(entry: Entry<'a>, key: &'static Key) -> Self {
+        Self { entry, key }
+    }
+
+    pub fn into_entry(self) -> Entry<'a> {
+        self.entry
+    }
+
+    /// Returns `true` if the word stands here that may stand in place of a value.
+    pub fn is_the_word(&self) -> bool {
+        self.key.word.is_some_and(|word| self.entry.is_word(word))
+    }
+
+    pub fn integer<T: TryFrom<i64>>(&self) -> Option<T> {
+        self.entry.integer(self.key.integers()).and_then(|value| T::try_from(value).ok())
+    }
+
+    pub fn number(&self) -> Option<f64> {
+        self.entry.number(self.key.bounds())
+    }
+
+    /// In SI units, of an axis with these quantities where it depends on them.
+    pub fn quantity(&self, quantities: Quantities) -> Option<f64> {
+        let (quantity, bounds) = self.key.of(quantities);
+        self.entry.quantity(quantity, bounds)
+    }
+
+    /// A duration in whole nanoseconds.
+    pub fn nanoseconds(&self) -> Option<u64> {
+        self.quantity(Quantities::ROTARY).map(|seconds| (seconds * 1e9).round() as u64)
     }
 }
 

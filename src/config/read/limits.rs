@@ -6,15 +6,17 @@ use super::entry::Entry;
 use super::section::Section;
 use super::urdf::DescribedJoint;
 use crate::config::defaults;
+use crate::config::keys::following_error::{LIMIT, TIME};
+use crate::config::keys::limits as limit_keys;
 use crate::config::model::{FollowingError, Limits, Travel};
 use crate::config::position_unit::PositionUnit;
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::rules;
 use crate::config::spot::Spot;
-use crate::config::urdf::{LimitOrigin, UrdfJoint, UrdfLimits, exceeds};
+use crate::config::urdf::{UrdfJoint, exceeds};
+use crate::config::urdf_limits::{LimitOrigin, UrdfLimits};
 
 /// What was read of the limits of an axis.
 pub struct ReadLimits {
@@ -50,12 +52,10 @@ pub fn limits(
     let (velocity, velocity_origin) =
         magnitude(entry, q.velocity, judge, described.spot("velocity"), velocity_described, joint);
 
-    let acceleration = section
-        .require("acceleration", "highest acceleration: acceleration = \"8 rad/s^2\"")
-        .and_then(|entry| entry.quantity(q.acceleration, q.ranges.acceleration));
-    let deceleration =
-        section.get("deceleration").map(|entry| entry.quantity(q.acceleration, q.ranges.acceleration));
-    let jerk = section.get("jerk").map(|entry| entry.quantity(q.jerk, q.ranges.jerk));
+    section.require(limit_keys::ACCELERATION.name, "highest acceleration: acceleration = \"8 rad/s^2\"");
+    let acceleration = section.quantity(&limit_keys::ACCELERATION, q);
+    let deceleration = section.keyed(&limit_keys::DECELERATION).map(|entry| entry.quantity(q));
+    let jerk = section.keyed(&limit_keys::JERK).map(|entry| entry.quantity(q));
 
     let says = "highest torque, or force of a linear axis: torque = \"87 Nm\"";
     let effort_described = joint.and_then(|joint| joint.effort);
@@ -167,11 +167,11 @@ fn position_range(entry: &Entry<'_>, q: Quantities) -> Option<[f64; 2]> {
 }
 
 pub fn following_error(mut section: Section<'_>, q: Quantities, travel: Option<Travel>) -> FollowingError {
-    let limit = section.get("limit").and_then(|entry| entry.quantity(q.position, q.ranges.deviation));
-    let time_ns = section.get("time").and_then(|entry| entry.nanoseconds(ranges::FOLLOWING_ERROR_TIME_S));
+    let limit = section.quantity(&LIMIT, q);
+    let time_ns = section.nanoseconds(&TIME);
     section.finish();
     FollowingError {
         limit: limit.unwrap_or(defaults::following_error(travel.unwrap_or(Travel::Rotary))),
-        time_ns: time_ns.unwrap_or(defaults::FOLLOWING_ERROR_TIME_NS),
+        time_ns: time_ns.unwrap_or(const { TIME.default_ns() }),
     }
 }

@@ -4,7 +4,7 @@ use toml::de::{DeTable, DeValue};
 
 use takt_rt::EngineParameters;
 
-use crate::config::drive_family::ConfiguredFamily;
+use crate::config::configured_family::ConfiguredFamily;
 
 /// The names of the buses that have an axis whose drive is on a serial line. Whether a simulated bus is one must be known before
 /// its keys are read, and what is wrong with the axes is none of this.

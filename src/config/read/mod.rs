@@ -19,7 +19,7 @@ mod urdf;
 
 use toml::de::DeTable;
 
-use super::drive_family::ConfiguredFamily;
+use super::configured_family::ConfiguredFamily;
 use super::error::{ConfigError, Location, Problem};
 use super::model::{Axis, CommandFrames, Config};
 use super::problem_kind::ProblemKind;

@@ -5,22 +5,21 @@ use super::entry::Entry;
 use super::group::{ReadGroup, group_of};
 use super::section::Section;
 use crate::config::defaults;
+use crate::config::keys::program::REPEAT;
+use crate::config::keys::program_move::{ACCELERATION, DWELL, FOR, MINIMUM_DURATION, VELOCITY};
 use crate::config::model::{Program, ProgramMove, ProgramTarget};
 use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::rules::program::{self as rules, AxisView};
 use crate::config::spot::Spot;
 
 pub fn program(mut section: Section<'_>, axes: &[ReadAxis], groups: &[ReadGroup]) -> Program {
-    let repeat = section.get("repeat").and_then(|entry| entry.integer(ranges::REPEAT));
+    let repeat = section.integer(&REPEAT);
     let moves = section.sections("move").into_iter();
     let moves = moves.filter_map(|section| program_move(section, axes, groups)).collect();
     section.finish();
-    Program {
-        repeat: repeat.and_then(|repeat| u32::try_from(repeat).ok()).unwrap_or(defaults::REPEAT),
-        moves,
-    }
+    Program { repeat: repeat.unwrap_or(defaults::REPEAT), moves }
 }
 
 fn program_move(mut section: Section<'_>, axes: &[ReadAxis], groups: &[ReadGroup]) -> Option<ProgramMove> {
@@ -41,11 +40,9 @@ fn program_move(mut section: Section<'_>, axes: &[ReadAxis], groups: &[ReadGroup
         ["to", "speed", "torque", "for"].into_iter().for_each(|key| drop(section.get(key)));
         None
     };
-    let mut share =
-        |key| section.get(key).and_then(|entry: Entry<'_>| entry.quantity(Quantity::FRACTION, ranges::SCALE));
-    let (velocity_scale, acceleration_scale) = (share("velocity"), share("acceleration"));
-    let mut seconds = |key| section.get(key).and_then(|entry: Entry<'_>| duration(&entry));
-    let (minimum_duration_s, dwell_s) = (seconds("minimum_duration"), seconds("dwell"));
+    let mut value = |key| section.quantity(key, Quantities::ROTARY);
+    let (velocity_scale, acceleration_scale) = (value(&VELOCITY), value(&ACCELERATION));
+    let (minimum_duration_s, dwell_s) = (value(&MINIMUM_DURATION), value(&DWELL));
     section.finish();
     Some(ProgramMove {
         group: group?,
@@ -57,10 +54,6 @@ fn program_move(mut section: Section<'_>, axes: &[ReadAxis], groups: &[ReadGroup
     })
 }
 
-fn duration(entry: &Entry<'_>) -> Option<f64> {
-    entry.quantity(Quantity::DURATION, rules::duration_bounds())
-}
-
 /// The axes that a move moves, in their order, and the name of their group.
 struct Moved<'a> {
     axes: Vec<&'a ReadAxis>,
@@ -70,7 +63,7 @@ struct Moved<'a> {
 /// One of `to`, `speed` and `torque`; the latter two last for a time.
 fn program_target(section: &mut Section<'_>, moved: &Moved<'_>) -> Option<ProgramTarget> {
     let (to, speed, torque) = (section.get("to"), section.get("speed"), section.get("torque"));
-    let lasting = section.get("for");
+    let lasting = section.get(FOR.name);
     let ignored = |entry: &Option<Entry<'_>>, beside, belongs| {
         if let Some(entry) = entry {
             entry.report(ProblemKind::Ignored { key: entry.spot.key.clone(), beside, belongs });
@@ -78,7 +71,7 @@ fn program_target(section: &mut Section<'_>, moved: &Moved<'_>) -> Option<Progra
     };
     let one_of = "a move has one of `to`, `speed` and `torque`";
     let duration_s = |section: &mut Section<'_>| match &lasting {
-        Some(entry) => duration(entry),
+        Some(entry) => entry.quantity(Quantity::DURATION, FOR.bounds()),
         None => {
             section.require("for", "how long to go on: for = \"2 s\"");
             None

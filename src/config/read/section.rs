@@ -7,8 +7,10 @@ use takt_wire::printable::excerpt;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use super::entry::Entry;
+use super::entry::{Entry, KeyedEntry};
+use crate::config::key::Key;
 use crate::config::problem_kind::ProblemKind;
+use crate::config::quantities::Quantities;
 use crate::config::spelling;
 use crate::config::spot::{Problems, Spot};
 
@@ -100,6 +102,32 @@ impl<'a> Section<'a> {
         self.know(key, true);
         let found = find(self.own, key).or_else(|| find(self.defaults, key))?;
         Some(self.entry(key, found))
+    }
+
+    /// As [`Self::get`], for what has a row.
+    pub fn keyed(&mut self, key: &'static Key) -> Option<KeyedEntry<'a>> {
+        Some(KeyedEntry::new(self.get(key.name)?, key))
+    }
+
+    /// The value of a key, or its default.
+    pub fn boolean(&mut self, key: &'static Key) -> bool {
+        let value = self.get(key.name).and_then(|entry| entry.boolean());
+        value.unwrap_or(key.default_boolean())
+    }
+
+    /// The value of a key that is a whole number.
+    pub fn integer<T: TryFrom<i64>>(&mut self, key: &'static Key) -> Option<T> {
+        self.keyed(key)?.integer()
+    }
+
+    /// The value of a key that is a duration, in nanoseconds.
+    pub fn nanoseconds(&mut self, key: &'static Key) -> Option<u64> {
+        self.keyed(key)?.nanoseconds()
+    }
+
+    /// The value of a key that is a quantity, in SI units.
+    pub fn quantity(&mut self, key: &'static Key, quantities: Quantities) -> Option<f64> {
+        self.keyed(key)?.quantity(quantities)
     }
 
     /// What a key says here, whatever the defaults are; it is not allowed in them.

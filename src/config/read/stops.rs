@@ -3,9 +3,9 @@
 use takt_rt::{Rule, StopCategory};
 
 use super::section::Section;
-use crate::config::defaults;
+use crate::config::key::Key;
+use crate::config::keys::missed_slots::{DEGRADED, LEAK_SLOTS, STOP, WARNING};
 use crate::config::model::{MissedSlots, StopCategories};
-use crate::config::ranges;
 use crate::config::rules;
 
 /// A category for each rule, by its key.
@@ -27,21 +27,19 @@ pub fn stops(mut section: Section<'_>) -> StopCategories {
 /// The steps of the ladder, each at least as high as the one before.
 pub fn missed_slots(mut section: Section<'_>) -> MissedSlots {
     let mut earlier = 0;
-    let mut slots = |key, default: u32| {
-        let read = section.get(key).map(|entry| entry.integer(ranges::MISSED_SLOTS));
-        let value = read.unwrap_or(Some(default.into())).and_then(|value| u32::try_from(value).ok());
+    let default = MissedSlots::default();
+    let mut slots = |key: &'static Key, default: u32| {
+        let value = section.keyed(key).map_or(Some(default), |entry| entry.integer());
         if let Some(value) = value {
-            rules::cycle::missed_slots(&section.spot(key), value, earlier);
+            rules::cycle::missed_slots(&section.spot(key.name), value, earlier);
             earlier = earlier.max(value);
         }
         value.unwrap_or(default)
     };
-    let warning = slots("warning", defaults::MISSED_SLOTS_WARNING);
-    let degraded = slots("degraded", defaults::MISSED_SLOTS_DEGRADED);
-    let stop = slots("stop", defaults::MISSED_SLOTS_STOP);
-    let leak_slots = section.get("leak_slots").and_then(|entry| entry.integer(ranges::MISSED_SLOTS));
-    let leak_slots = leak_slots.and_then(|slots| u32::try_from(slots).ok());
+    let warning = slots(&WARNING, default.warning);
+    let degraded = slots(&DEGRADED, default.degraded);
+    let stop = slots(&STOP, default.stop);
+    let leak_slots = section.integer(&LEAK_SLOTS).unwrap_or(default.leak_slots);
     section.finish();
-    let leak_slots = leak_slots.unwrap_or(defaults::MISSED_SLOTS_LEAK_SLOTS);
     MissedSlots { warning, degraded, stop, leak_slots }
 }

@@ -6,14 +6,14 @@ use takt_wire::printable::excerpt;
 use super::loops::Surroundings;
 use super::{Fields, bit_fields, converter, identifiers, limits, line, loops, master, name, simulation};
 use crate::config::drive_family::{DriveFacts, ModeChangeRule, Protocol};
+use crate::config::keys;
 use crate::config::mode_words::{MODES, mode_word};
 use crate::config::model::{
     Axis, Config, Control, FeedForward, Feedback, Interface, Joint, Limits, PdoMapping, Travel,
 };
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::{Counting, Quantities};
-use crate::config::quantity::{Quantity, Short};
-use crate::config::ranges;
+use crate::config::quantity::Quantity;
 use crate::config::spelling;
 use crate::config::spot::Spot;
 
@@ -62,7 +62,7 @@ fn validate_place(axis: &Axis, earlier: &[Axis], config: &Config, fields: &Field
     };
     let spot = fields.at("node");
     let is_on_line = axis.drive.protocol.is_of_serial_line();
-    let nodes = if is_on_line { ranges::LINE_ADDRESS } else { ranges::NODE_ID };
+    let nodes = if is_on_line { keys::LINE_ADDRESSES } else { keys::master::NODE.integers() };
     if spot.integer(axis.node, &nodes).is_some() {
         if axis.node == config.master.node && !is_on_line {
             spot.report(duplicate_node(&bus.name, axis.node));
@@ -168,12 +168,9 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
         is_countable && limits::validate(&axis.limits, q, Some(&counting), &fields.within("limits"));
     let limits = are_sound.then_some(&axis.limits);
     limits::validate_following_error(&axis.following_error, q, &fields.within("following_error"));
-    for (key, value) in
-        [("start_tolerance", axis.start_tolerance), ("target_tolerance", axis.target_tolerance)]
-    {
-        fields.at(key).quantity(value, q.position, q.ranges.deviation);
-    }
-    fields.at("power_up").duration(axis.power_up_ns, ranges::POWER_UP_S);
+    fields.quantity(&keys::axis::START_TOLERANCE, q, axis.start_tolerance);
+    fields.quantity(&keys::axis::TARGET_TOLERANCE, q, axis.target_tolerance);
+    fields.duration(&keys::axis::POWER_UP, axis.power_up_ns);
     validate_joint(&axis.joint, q, &fields.within("joint"));
     simulation::validate_joint(
         &axis.simulated,
@@ -202,16 +199,17 @@ fn validate_motion(axis: &Axis, config: &Config, fields: &Fields<'_>) {
 }
 
 fn validate_joint(joint: &Joint, q: Quantities, fields: &Fields<'_>) {
-    let ranges = q.ranges;
+    use keys::joint::{COULOMB_FRICTION, INERTIA, RATED_TORQUE, VISCOUS_FRICTION};
+
     let values = [
-        ("inertia", joint.inertia, q.inertia, ranges.inertia),
-        ("viscous_friction", joint.viscous_friction, q.damping, ranges.viscous_friction),
-        ("coulomb_friction", joint.coulomb_friction, q.effort, ranges.friction),
-        ("rated_torque", joint.rated_torque, q.effort, ranges.effort),
+        (&INERTIA, joint.inertia),
+        (&VISCOUS_FRICTION, joint.viscous_friction),
+        (&COULOMB_FRICTION, joint.coulomb_friction),
+        (&RATED_TORQUE, joint.rated_torque),
     ];
-    for (key, value, quantity, bounds) in values {
+    for (key, value) in values {
         if let Some(value) = value {
-            fields.at(key).quantity(value, quantity, bounds);
+            fields.quantity(key, q, value);
         }
     }
 }
@@ -253,13 +251,12 @@ pub fn joint<'a>(
 }
 
 fn validate_counting(axis: &Axis, fields: &Fields<'_>) -> bool {
-    let show = |value: f64| Short(value).to_string();
     let lead = match axis.travel {
         Travel::Rotary => Some(0.0),
-        Travel::Linear { lead_m } => fields.at("lead").quantity(lead_m, Quantity::LENGTH, ranges::LEAD),
+        Travel::Linear { lead_m } => fields.quantity(&keys::axis::LEAD, Quantities::LINEAR, lead_m),
     };
-    let counts = fields.at("counts_per_turn").bounded(axis.counts_per_turn, ranges::COUNTS_PER_TURN, show);
-    let gear = fields.at("gear_ratio").bounded(axis.gear_ratio, ranges::GEAR_RATIO, show);
+    let counts = fields.number(&keys::axis::COUNTS_PER_TURN, axis.counts_per_turn);
+    let gear = fields.number(&keys::axis::GEAR_RATIO, axis.gear_ratio);
     lead.is_some() && counts.is_some() && gear.is_some()
 }
 
@@ -271,9 +268,8 @@ fn validate_process_data(axis: &Axis, fields: &Fields<'_>) {
         feedback(&fields.at("feedback"), Some(&axis.drive), *object, earlier);
     }
     transmission_type(&fields.at("transmission_type"), axis.transmission_type);
-    let missed = fields.at("missed_feedback_cycles");
-    missed.integer(axis.missed_feedback_cycles, &ranges::MISSED_FEEDBACK_CYCLES);
-    fields.at("feedback_delay").duration(axis.feedback_delay_ns, ranges::FEEDBACK_DELAY_S);
+    fields.integer(&keys::axis::MISSED_FEEDBACK_CYCLES, axis.missed_feedback_cycles);
+    fields.duration(&keys::axis::FEEDBACK_DELAY, axis.feedback_delay_ns);
     if let Some(heartbeat_ns) = axis.heartbeat_ns {
         master::heartbeat(&fields.at("heartbeat"), heartbeat_ns);
     }
@@ -383,7 +379,7 @@ pub fn feed_forward(spot: &Spot<'_>, drive: Option<&DriveFacts>, feed_forward: F
 
 /// 1 to 240: every so many SYNCs; 254 and 255: on the drive's own events (CiA 301, 7.5.2.36 and 7.5.2.38).
 pub fn transmission_type(spot: &Spot<'_>, value: u8) {
-    if spot.integer(value, &ranges::TRANSMISSION_TYPE).is_some() && matches!(value, 241..=253) {
+    if spot.integer_of(&keys::axis::TRANSMISSION_TYPE, value).is_some() && matches!(value, 241..=253) {
         spot.report_range(value.to_string(), "1 to 240 (SYNC), 254 or 255 (event)".to_owned());
     }
 }

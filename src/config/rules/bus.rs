@@ -5,10 +5,10 @@ use takt_rt::{EngineParameters, MAX_BUSES};
 
 use super::{Fields, name};
 use crate::config::bounds::Bounds;
+use crate::config::keys;
 use crate::config::model::{Config, Interface};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 pub fn validate(config: &Config, whole: &Fields<'_>) {
@@ -41,9 +41,8 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
         if let Some(rate) = bus.data_bit_rate {
             data_bit_rate(&fields.at("data_bit_rate"), f64::from(rate), bus.bit_rate, &bus.interface);
         }
-        fields.at("restart_ms").integer(bus.restart_ms, &ranges::RESTART_MS);
-        let service_frames = fields.at("service_frames_per_cycle");
-        service_frames.integer(bus.service_frames_per_cycle, &ranges::SERVICE_FRAMES);
+        fields.integer(&keys::bus::RESTART_MS, bus.restart_ms);
+        fields.integer(&keys::bus::SERVICE_FRAMES, bus.service_frames_per_cycle);
     }
 }
 
@@ -103,13 +102,13 @@ pub fn divider(spot: &Spot<'_>, divider: u32, cycle_ns: u64) -> Option<u32> {
         spot.report_range(show(period_ns), allowed);
         return None;
     }
-    spot.duration(period_ns, cycle_s..=ranges::BUS_PERIOD_AT_MOST_S.max(cycle_s)).map(|_| divider)
+    spot.duration(period_ns, cycle_s..=keys::BUS_PERIOD_AT_MOST_S.max(cycle_s)).map(|_| divider)
 }
 
 pub fn bit_rate(spot: &Spot<'_>, rate: f64) -> Option<u32> {
-    let found = ranges::BIT_RATES.into_iter().find(|allowed| (f64::from(*allowed) - rate).abs() < 1.0);
+    let found = keys::BIT_RATES.into_iter().find(|allowed| (f64::from(*allowed) - rate).abs() < 1.0);
     if found.is_none() {
-        let allowed = ranges::BIT_RATES.map(|rate| Quantity::BIT_RATE.show(rate.into())).join(", ");
+        let allowed = keys::BIT_RATES.map(|rate| Quantity::BIT_RATE.show(rate.into())).join(", ");
         spot.report_range(Quantity::BIT_RATE.show(rate), allowed);
     }
     found
@@ -117,7 +116,7 @@ pub fn bit_rate(spot: &Spot<'_>, rate: f64) -> Option<u32> {
 
 /// The data phase is at least as fast as the arbitration phase. An SLCAN adapter has some bit rates alone.
 pub fn data_bit_rate(spot: &Spot<'_>, rate: f64, bit_rate: u32, interface: &Interface) -> Option<u32> {
-    let bounds = Bounds::Between(bit_rate.into(), ranges::DATA_BIT_RATE_AT_MOST);
+    let bounds = Bounds::Between(bit_rate.into(), keys::DATA_BIT_RATE_AT_MOST);
     let rate = spot.quantity(rate, Quantity::BIT_RATE, bounds).map(|rate| rate.round() as u32)?;
     if matches!(interface, Interface::Slcan(_)) && DataBitRate::of(rate).is_none() {
         let show = |rate: u32| Quantity::BIT_RATE.show(rate.into());

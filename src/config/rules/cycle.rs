@@ -1,9 +1,12 @@
 //! The cycle, and the slots that it misses.
 
 use super::Fields;
+use crate::config::bounds::Bounds;
+use crate::config::keys::COMMAND_PHASE;
+use crate::config::keys::cycle::PERIOD;
+use crate::config::keys::missed_slots::{DEGRADED, LEAK_SLOTS, STOP, WARNING};
 use crate::config::model::{Cycle, MissedSlots};
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 pub fn validate(cycle: &Cycle, missed_slots: &MissedSlots, fields: &Fields<'_>) {
@@ -13,17 +16,17 @@ pub fn validate(cycle: &Cycle, missed_slots: &MissedSlots, fields: &Fields<'_>) 
     let fields = fields.within("missed_slots");
     let mut earlier = 0;
     for (key, slots) in
-        [("warning", missed_slots.warning), ("degraded", missed_slots.degraded), ("stop", missed_slots.stop)]
+        [(&WARNING, missed_slots.warning), (&DEGRADED, missed_slots.degraded), (&STOP, missed_slots.stop)]
     {
-        self::missed_slots(&fields.at(key), slots, earlier);
+        self::missed_slots(&fields.at(key.name), slots, earlier);
         earlier = earlier.max(slots);
     }
-    fields.at("leak_slots").integer(missed_slots.leak_slots, &ranges::MISSED_SLOTS);
+    fields.integer(&LEAK_SLOTS, missed_slots.leak_slots);
 }
 
 /// Object 1006 of the drives is in whole microseconds.
 pub fn period(spot: &Spot<'_>, period_ns: u64) -> Option<u64> {
-    spot.duration(period_ns, ranges::PERIOD_S)?;
+    spot.duration_of(&PERIOD, period_ns)?;
     if !period_ns.is_multiple_of(1000) {
         spot.report_range(Quantity::DURATION.show(period_ns as f64 / 1e9), "whole microseconds".to_owned());
     }
@@ -32,7 +35,7 @@ pub fn period(spot: &Spot<'_>, period_ns: u64) -> Option<u64> {
 
 /// The cycle must leave room on both sides of the command phase.
 pub fn command_phase(spot: &Spot<'_>, command_phase_s: f64, period_ns: u64) -> Option<u64> {
-    let (low, high) = (ranges::COMMAND_PHASE.start(), ranges::COMMAND_PHASE.end());
+    let Bounds::Between(low, high) = COMMAND_PHASE else { return None };
     let period_s = period_ns as f64 / 1e9;
     let show = |seconds: f64| Quantity::DURATION.show(seconds);
     // A share of the period is rounded to nanoseconds.
@@ -48,6 +51,7 @@ pub fn command_phase(spot: &Spot<'_>, command_phase_s: f64, period_ns: u64) -> O
 
 /// One step of the ladder, which is at least as high as the one before it.
 pub fn missed_slots(spot: &Spot<'_>, slots: u32, earlier: u32) {
-    let lowest = i64::from(earlier).max(ranges::MISSED_SLOTS.start);
-    spot.integer(slots, &(lowest..ranges::MISSED_SLOTS.end.max(lowest + 1)));
+    let allowed = STOP.integers();
+    let lowest = i64::from(earlier).max(allowed.start);
+    spot.integer(slots, &(lowest..allowed.end.max(lowest + 1)));
 }

@@ -4,11 +4,11 @@ use takt_rt::PositionCounter;
 
 use super::Fields;
 use crate::config::bounds::Bounds;
+use crate::config::keys;
 use crate::config::model::{FollowingError, Limits};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::{Counting, Quantities};
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 /// Returns whether the limits are sound, so that what depends on them can be judged.
@@ -17,10 +17,10 @@ pub fn validate(limits: &Limits, q: Quantities, counting: Option<&Counting>, fie
         position_range(&fields.at("position"), [limits.position_min, limits.position_max], q, counting);
     let checks = [
         velocity(&fields.at("velocity"), limits.velocity, q, counting),
-        fields.at("acceleration").quantity(limits.acceleration, q.acceleration, q.ranges.acceleration),
-        fields.at("deceleration").quantity(limits.deceleration, q.acceleration, q.ranges.acceleration),
-        fields.at("jerk").quantity(limits.jerk, q.jerk, q.ranges.jerk),
-        fields.at("torque").quantity(limits.torque, q.effort, q.ranges.effort),
+        fields.quantity(&keys::limits::ACCELERATION, q, limits.acceleration),
+        fields.quantity(&keys::limits::DECELERATION, q, limits.deceleration),
+        fields.quantity(&keys::limits::JERK, q, limits.jerk),
+        fields.quantity(&keys::limits::TORQUE, q, limits.torque),
     ];
     let are_in_range = checks.iter().all(Option::is_some);
     is_range && are_in_range && stopping_time(limits, q, |key| fields.at(key))
@@ -82,10 +82,10 @@ pub fn stopping_time<'a>(limits: &Limits, q: Quantities, at: impl Fn(&'static st
     let Limits { velocity, deceleration, jerk, .. } = *limits;
     let without_jerk_s = velocity / deceleration;
     let time_s = stopping_time_s(limits);
-    if time_s <= ranges::STOP_AT_MOST_S {
+    if time_s <= keys::STOP_AT_MOST_S {
         return true;
     }
-    let (key, value) = if without_jerk_s > ranges::STOP_AT_MOST_S {
+    let (key, value) = if without_jerk_s > keys::STOP_AT_MOST_S {
         let key = if deceleration == limits.acceleration { "acceleration" } else { "deceleration" };
         (key, q.acceleration.show(deceleration))
     } else {
@@ -94,7 +94,7 @@ pub fn stopping_time<'a>(limits: &Limits, q: Quantities, at: impl Fn(&'static st
     let allowed = format!(
         "what stops the joint from {} within {}, not in {}",
         q.velocity.show(velocity),
-        Quantity::DURATION.show(ranges::STOP_AT_MOST_S),
+        Quantity::DURATION.show(keys::STOP_AT_MOST_S),
         Quantity::DURATION.show(time_s),
     );
     at(key).report_range(value, allowed);
@@ -112,8 +112,8 @@ fn stopping_time_s(limits: &Limits) -> f64 {
 }
 
 pub fn validate_following_error(following_error: &FollowingError, q: Quantities, fields: &Fields<'_>) {
-    fields.at("limit").quantity(following_error.limit, q.position, q.ranges.deviation);
-    fields.at("time").duration(following_error.time_ns, ranges::FOLLOWING_ERROR_TIME_S);
+    fields.quantity(&keys::following_error::LIMIT, q, following_error.limit);
+    fields.duration(&keys::following_error::TIME, following_error.time_ns);
 }
 
 /// Returns `true` if a position is within the limits.

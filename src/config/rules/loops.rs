@@ -2,10 +2,10 @@
 
 use super::Fields;
 use super::loop_stability::{self, LEAST_DAMPING_RATIO, highest};
+use crate::config::keys::{torque_loop as keys, velocity_loop::POSITION_GAIN};
 use crate::config::model::Control;
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 /// What a loop is closed over.
@@ -55,21 +55,19 @@ pub fn validate(
 ) {
     match control {
         Control::Velocity { position_gain } => {
-            let spot = axis.within("velocity_loop").at("position_gain");
-            let is_sound = spot.quantity(position_gain, Quantity::GAIN, ranges::POSITION_GAIN).is_some();
-            if is_sound {
-                velocity_loop(&spot, position_gain, surroundings);
+            let fields = axis.within("velocity_loop");
+            if fields.quantity(&POSITION_GAIN, q, position_gain).is_some() {
+                velocity_loop(&fields.at(POSITION_GAIN.name), position_gain, surroundings);
             }
         }
         Control::Torque { stiffness, damping, inertia, viscous_friction, coulomb_friction } => {
             let fields = axis.within("torque_loop");
-            let ranges = q.ranges;
             let checks = [
-                fields.at("stiffness").quantity(stiffness, q.stiffness, ranges.stiffness),
-                fields.at("damping").quantity(damping, q.damping, ranges.damping),
-                fields.at("inertia").quantity(inertia, q.inertia, ranges.fed_forward_inertia),
-                fields.at("viscous_friction").quantity(viscous_friction, q.damping, ranges.viscous_friction),
-                fields.at("coulomb_friction").quantity(coulomb_friction, q.effort, ranges.friction),
+                fields.quantity(&keys::STIFFNESS, q, stiffness),
+                fields.quantity(&keys::DAMPING, q, damping),
+                fields.quantity(&keys::INERTIA, q, inertia),
+                fields.quantity(&keys::VISCOUS_FRICTION, q, viscous_friction),
+                fields.quantity(&keys::COULOMB_FRICTION, q, coulomb_friction),
             ];
             if checks.iter().all(Option::is_some) && simulated_inertia > 0.0 {
                 let gains = TorqueLoop { stiffness, damping, inertia, simulated_inertia };

@@ -1,13 +1,13 @@
 //! The controller as a CANopen node, and heartbeats.
 
 use super::Fields;
+use crate::config::keys::master::{HEARTBEAT, HEARTBEAT_TIMEOUT, NODE, TIME};
 use crate::config::model::Master;
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 pub fn validate(master: &Master, fields: &Fields<'_>) {
-    fields.at("node").integer(master.node, &ranges::NODE_ID);
+    fields.integer(&NODE, master.node);
     if let Some(heartbeat_ns) = master.heartbeat_ns {
         heartbeat(&fields.at("heartbeat"), heartbeat_ns);
     }
@@ -16,19 +16,19 @@ pub fn validate(master: &Master, fields: &Fields<'_>) {
         outlasts_heartbeat(&timeout, master.heartbeat_timeout_ns, master.heartbeat_ns);
     }
     if let Some(time_ns) = master.time_ns {
-        fields.at("time").duration(time_ns, ranges::TIME_S);
+        fields.duration(&TIME, time_ns);
     }
 }
 
 /// The period of a heartbeat (object 1017).
 pub fn heartbeat(spot: &Spot<'_>, period_ns: u64) -> Option<u64> {
-    spot.duration(period_ns, ranges::HEARTBEAT_S)?;
+    spot.duration_of(&HEARTBEAT, period_ns)?;
     whole_milliseconds(spot, period_ns)
 }
 
 /// The time after which a missing heartbeat is noticed (object 1016).
 pub fn heartbeat_timeout(spot: &Spot<'_>, timeout_ns: u64) -> Option<u64> {
-    spot.duration(timeout_ns, ranges::HEARTBEAT_TIMEOUT_S)?;
+    spot.duration_of(&HEARTBEAT_TIMEOUT, timeout_ns)?;
     whole_milliseconds(spot, timeout_ns)
 }
 

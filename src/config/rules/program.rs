@@ -2,11 +2,12 @@
 
 use super::{Fields, group};
 use crate::config::bounds::Bounds;
+use crate::config::keys::program::REPEAT;
+use crate::config::keys::program_move::{ACCELERATION, DWELL, FOR, MINIMUM_DURATION, VELOCITY};
 use crate::config::model::{Axis, Config, Control, Limits, ProgramMove, ProgramTarget};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
 use crate::config::quantity::Quantity;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 use super::limits::contains;
@@ -15,7 +16,7 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
     let (program, fields) = (&config.program, whole.within("program"));
     // `Program::default()` is no program; it repeats nothing.
     if !program.moves.is_empty() || program.repeat != 0 {
-        fields.at("repeat").integer(program.repeat, &ranges::REPEAT);
+        fields.integer(&REPEAT, program.repeat);
     }
     for (index, present) in program.moves.iter().enumerate() {
         let fields = fields.element("move", "program.moves", index, "");
@@ -25,10 +26,13 @@ pub fn validate(config: &Config, whole: &Fields<'_>) {
             continue;
         }
         validate_target(present, config, &fields);
-        fields.at("velocity").quantity(present.velocity_scale, Quantity::FRACTION, ranges::SCALE);
-        fields.at("acceleration").quantity(present.acceleration_scale, Quantity::FRACTION, ranges::SCALE);
-        for (key, value) in [("minimum_duration", present.minimum_duration_s), ("dwell", present.dwell_s)] {
-            duration(&fields.at(key), value);
+        for (key, value) in [
+            (&VELOCITY, present.velocity_scale),
+            (&ACCELERATION, present.acceleration_scale),
+            (&MINIMUM_DURATION, present.minimum_duration_s),
+            (&DWELL, present.dwell_s),
+        ] {
+            fields.quantity(key, Quantities::ROTARY, value);
         }
     }
 }
@@ -53,7 +57,7 @@ fn validate_target(present: &ProgramMove, config: &Config, fields: &Fields<'_>) 
             if let Some(spot) = of_axes("speed", velocity, &|spot, value, axis| speed(spot, value, axis)) {
                 some_axis_is_driven(&spot, velocity);
             }
-            duration(&fields.at("for"), *duration_s);
+            fields.quantity(&FOR, Quantities::ROTARY, *duration_s);
         }
         ProgramTarget::Torque { torque, duration_s } => {
             if let Some(spot) =
@@ -61,7 +65,7 @@ fn validate_target(present: &ProgramMove, config: &Config, fields: &Fields<'_>) 
             {
                 some_axis_is_driven(&spot, torque);
             }
-            duration(&fields.at("for"), *duration_s);
+            fields.quantity(&FOR, Quantities::ROTARY, *duration_s);
         }
     }
 }
@@ -148,12 +152,4 @@ pub fn some_axis_is_driven(spot: &Spot<'_>, values: &[f64]) -> bool {
         spot.report_range("0 for every axis".to_owned(), "more or less than 0 for one of them".to_owned());
     }
     is_any
-}
-
-fn duration(spot: &Spot<'_>, seconds: f64) {
-    spot.quantity(seconds, Quantity::DURATION, duration_bounds());
-}
-
-pub fn duration_bounds() -> Bounds {
-    Bounds::Between(*ranges::PROGRAM_S.start(), *ranges::PROGRAM_S.end())
 }

@@ -6,10 +6,10 @@ use super::Fields;
 use super::limits::contains;
 use crate::config::bounds::Bounds;
 use crate::config::drive_family::DriveFacts;
+use crate::config::keys;
 use crate::config::model::{Limits, PowerUpState, SimulatedJoint, Simulation};
 use crate::config::problem_kind::ProblemKind;
 use crate::config::quantities::Quantities;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 pub fn validate(simulation: &Simulation, period_ns: u64, fields: &Fields<'_>) {
@@ -19,7 +19,7 @@ pub fn validate(simulation: &Simulation, period_ns: u64, fields: &Fields<'_>) {
 /// The range of the longest gap, in seconds. The simulated world never pauses within a cycle.
 pub fn longest_gap(period_ns: u64) -> RangeInclusive<f64> {
     let period_s = period_ns as f64 / 1e9;
-    period_s..=ranges::LONGEST_GAP_AT_MOST_S.max(period_s)
+    period_s..=keys::LONGEST_GAP_AT_MOST_S.max(period_s)
 }
 
 /// The simulated joint of an axis. Its initial position is judged only where the limits are sound.
@@ -31,8 +31,8 @@ pub fn validate_joint(
     drive: &DriveFacts,
     fields: &Fields<'_>,
 ) {
-    fields.at("gravity").quantity(joint.gravity, q.effort, q.ranges.friction);
-    fields.at("peak_torque").quantity(joint.peak_torque, q.effort, q.ranges.effort);
+    fields.quantity(&keys::simulated::GRAVITY, q, joint.gravity);
+    fields.quantity(&keys::simulated::PEAK_TORQUE, q, joint.peak_torque);
     initial_position(&fields.at("initial_position"), joint.initial_position, q, limits, axis);
     power_up(&fields.at("power_up"), drive, joint.power_up);
 }

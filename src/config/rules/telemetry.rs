@@ -3,16 +3,16 @@
 use std::path::Path;
 
 use super::Fields;
+use crate::config::keys;
 use crate::config::model::Telemetry;
-use crate::config::ranges;
 use crate::config::spot::Spot;
 
 pub fn validate(telemetry: &Telemetry, fields: &Fields<'_>) {
     directory(&fields.at("directory"), &telemetry.directory);
     if let Some(black_box_ns) = telemetry.black_box_ns {
-        fields.at("black_box").duration(black_box_ns, ranges::BLACK_BOX_S);
+        fields.duration(&keys::telemetry::BLACK_BOX, black_box_ns);
     }
-    fields.at("ring_records").integer(telemetry.ring_records, &ranges::RING_RECORDS);
+    fields.integer(&keys::telemetry::RING_RECORDS, telemetry.ring_records);
 }
 
 pub fn directory(spot: &Spot<'_>, directory: &Path) {

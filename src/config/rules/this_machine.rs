@@ -16,7 +16,7 @@ impl Config {
     pub fn validate_on_this_machine(&self) -> Result<(), ConfigError> {
         self.validate()?;
         let problems = Problems::in_fields();
-        let fields = Fields { prefix: "realtime.".to_owned(), of: String::new(), problems: &problems };
+        let fields = Fields::of(&problems).within("realtime");
         cpu_is_present(&self.realtime, &fields);
         if problems.is_empty() {
             Ok(())

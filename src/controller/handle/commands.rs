@@ -255,7 +255,7 @@ impl Handle {
         if own.control == mode {
             Ok(own)
         } else {
-            Err(CommandError::WrongMode { axis: own.name.clone(), needed })
+            Err(CommandError::WrongMode { axis: own.name.clone(), needed: needed.to_owned() })
         }
     }
 

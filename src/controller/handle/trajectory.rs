@@ -208,9 +208,10 @@ impl GroupHandle {
         let trajectory = make(&TrajectoryConditions { start, limits: &limits, period_s })?;
         let moves = |(index, axis): &(usize, &Axis)| axis.control.is_profile() && trajectory.moves(*index);
         match self.own_axes().enumerate().find(moves) {
-            Some((_, axis)) => {
-                Err(CommandError::WrongMode { axis: axis.name.clone(), needed: needed::SET_POINTS })
-            }
+            Some((_, axis)) => Err(CommandError::WrongMode {
+                axis: axis.name.clone(),
+                needed: needed::SET_POINTS.to_owned(),
+            }),
             None => Ok(trajectory),
         }
     }

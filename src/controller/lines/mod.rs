@@ -8,6 +8,7 @@
 mod opening;
 mod port;
 mod simulated;
+mod status;
 #[cfg_attr(not(target_os = "linux"), path = "no_thread.rs")]
 mod thread;
 
@@ -20,9 +21,9 @@ use crate::config::Config;
 use crate::family::{self, OffCycleLine, OffCycleTarget};
 use crate::faults::{FaultInjector, LineFaults};
 pub use port::LinePort;
-use port::LineStatus;
 pub use simulated::SharedLine;
 use simulated::SimulatedEnd;
+use status::LineStatus;
 use thread::ThreadEnd;
 
 /// Every serial line of a configuration.

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::port::LineStatus;
 use super::simulated::SimulatedEnd;
+use super::status::LineStatus;
 use super::thread::ThreadEnd;
 use super::{Line, LineEnd, Lines, faults_of};
 use crate::config::{Config, Interface};

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use takt_rt::{Nanoseconds, OffCycleReport};
 
-use super::port::LineStatus;
+use super::status::LineStatus;
 use crate::config::Config;
 use crate::family::{self, OffCycleLine, OffCycleTarget};
 use crate::faults::LineFaults;

@@ -10,7 +10,7 @@ use takt_rt::linux::MonotonicClock;
 use takt_rt::{Clock, Nanoseconds, OffCycleReport};
 use tracing::{info, warn};
 
-use super::port::LineStatus;
+use super::status::LineStatus;
 use crate::family::{OffCycleLine, OffCycleTarget, OffCycleWish};
 use crate::faults::LineFaults;
 use crate::link::SerialLineError;

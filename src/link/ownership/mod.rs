@@ -15,7 +15,7 @@ use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, Clock, Nanoseconds, ReceiveBatch};
 
 use super::interface::{self, InterfaceSettings};
-use super::open::OpenError;
+use super::open_error::OpenError;
 use super::real_interface::RealInterface;
 use super::socketcan::SocketCanOptions;
 

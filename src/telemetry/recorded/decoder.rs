@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, HashMap};
 
 use takt_rt::CycleRecord;
 
+use super::RecordedEvent;
+use super::printable_name::name;
 use super::records::{self, Record};
-use super::{RecordedEvent, name};
 use crate::family;
 use crate::link::trace::TracedHealth;
 use crate::telemetry::history::OnBus;

@@ -7,8 +7,9 @@ use std::path::Path;
 
 use takt_rt::Nanoseconds;
 
+use super::printable_name::name;
 use super::records::{self, Record};
-use super::{RecordedError, name, walk};
+use super::{RecordedError, walk};
 use crate::link::trace::TracedFrame;
 use crate::telemetry::{messages, recording};
 

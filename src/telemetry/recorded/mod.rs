@@ -2,8 +2,10 @@
 
 mod cause;
 mod decoder;
+mod event;
 mod frames;
 mod journal;
+mod printable_name;
 mod records;
 mod walk;
 
@@ -15,8 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use takt_rt::{
-    AxisRecord, BusHealth, CycleRecord, CycleTiming, EventKind, GroupRecord, MAX_BUSES, MAX_GROUPS,
-    Nanoseconds, Phase,
+    AxisRecord, BusHealth, CycleRecord, CycleTiming, GroupRecord, MAX_BUSES, MAX_GROUPS, Nanoseconds, Phase,
 };
 
 use super::history::OnBus;
@@ -25,9 +26,11 @@ use super::statistics::Statistics;
 use super::wall_clock::WallClock;
 use crate::link::trace::TracedHealth;
 use decoder::{Decoder, Item};
+use printable_name::name;
 use takt_wire::printable::printable;
 
 pub use cause::Cause;
+pub use event::RecordedEvent;
 pub use frames::{RecordedFrame, RecordedFrames, frames};
 pub use journal::{RecordedJournal, journal, journal_in_memory};
 pub use walk::WalkError;
@@ -65,22 +68,6 @@ pub enum RecordedError {
         /// The message.
         message: &'static str,
     },
-}
-
-/// An event with its text.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct RecordedEvent {
-    /// The slot in which it was seen.
-    pub slot: u64,
-    /// When, on the monotonic clock of the run.
-    pub at_ns: Nanoseconds,
-    /// The group that it concerns; `None` for the controller as a whole, and in a recording of an earlier version.
-    pub group: Option<u8>,
-    /// Its text.
-    pub text: String,
-    /// Its kind; `None` if this version does not know it.
-    pub kind: Option<EventKind>,
 }
 
 /// A cycle with the axes that the recording has.
@@ -376,12 +363,4 @@ const SHORTEST_LOAD_NS: Nanoseconds = 50_000_000;
 fn is_inside(span_s: Option<&Range<f64>>, begin: Option<(u64, Nanoseconds)>, at_ns: Nanoseconds) -> bool {
     let (Some(span_s), Some((_, begin_ns))) = (span_s, begin) else { return true };
     span_s.contains(&((at_ns as f64 - begin_ns as f64) * 1e-9))
-}
-
-/// Names are repeated in every row of a report, so that a longer one would cost much more than its place in the file.
-const LONGEST_NAME: usize = 200;
-
-/// A name that can be shown.
-fn name(text: &str) -> String {
-    printable(&text.chars().take(LONGEST_NAME).collect::<String>())
 }

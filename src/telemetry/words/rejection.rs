@@ -251,7 +251,7 @@ mod tests {
 
     #[test]
     fn no_two_reasons_and_no_two_requests_have_the_same_words() {
-        let reasons = RejectReason::ALL.map(|reason| text(reason, Some(0)));
+        let reasons: Vec<_> = RejectReason::all().map(|reason| text(reason, Some(0))).collect();
         for (index, words) in reasons.iter().enumerate() {
             assert!(!reasons[..index].contains(words), "{words}");
         }

@@ -3,7 +3,6 @@
 use takt_rt::{Fault, Id, StopCause, StopReason};
 use takt_wire::printable::Shown;
 
-use super::cures::cure;
 use super::{category, mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
 
@@ -246,7 +245,7 @@ pub fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
         }
         _ => None,
     };
-    Some(of_drive.unwrap_or_else(|| cure(fault)))
+    Some(of_drive.unwrap_or_else(|| fault.cure()))
 }
 
 /// The full text of a stop: cause, phase, category, and the cure of a fault.

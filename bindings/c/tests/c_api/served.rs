@@ -10,7 +10,8 @@ use std::time::{Duration, Instant};
 
 use crate::library::{Installed, Library, MEMORY, THREADS, program};
 use takt::config::Interface;
-use takt::{Config, Controller, ServeOptions, SessionOptions};
+use takt::{Config, Controller, SessionOptions};
+use takt_remote::ServeOptions;
 use tempfile::TempDir;
 
 const LONG: Duration = Duration::from_secs(60);
@@ -36,7 +37,7 @@ impl Served {
             .spawn();
         let served = Self { process: process.unwrap(), folder };
         let begun = Instant::now();
-        while let Err(error) = takt::connect(&served.name()) {
+        while let Err(error) = takt_remote::connect(&served.name()) {
             assert!(begun.elapsed() < LONG, "{error}");
             thread::sleep(Duration::from_millis(10));
         }
@@ -74,7 +75,7 @@ fn serves_a_controller_until_it_is_killed() {
     config.telemetry.black_box_ns = None;
     let controller = Controller::start(config, SessionOptions::default()).unwrap();
     let options = ServeOptions::default().with_lease(LONG);
-    let _server = takt::serve(controller.handle(), &env::var(NAME).unwrap(), options).unwrap();
+    let _server = takt_remote::serve(controller.handle(), &env::var(NAME).unwrap(), options).unwrap();
     loop {
         thread::park();
     }

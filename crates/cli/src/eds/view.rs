@@ -8,7 +8,7 @@ use takt_wire::canopen::object::ObjectAddress;
 use takt_wire::canopen::objects::PdoDirection;
 use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 
-use super::PrintedProblem;
+use super::problem::PrintedProblem;
 
 /// Everything that is printed.
 #[derive(Serialize)]

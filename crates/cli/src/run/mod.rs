@@ -15,9 +15,9 @@ use takt::controller::session::{self, Session, SessionOptions};
 use takt::controller::{Controller, StartFailure};
 use takt::faults::{FaultInjector, Scenario, ScenarioError, ScenarioFault};
 use takt::schedule;
-use takt::serve::{Claim, ServeError, ServeOptions};
 use takt::telemetry::{EachCycle, Machine, Notice, RecordingDestination, RecordingOptions};
 use takt_panel::{FrameSource, Listening, PanelError};
+use takt_remote::{Claim, ServeError, ServeOptions};
 use takt_rt::Snapshot;
 use takt_tools::monitor::BusDecoder;
 

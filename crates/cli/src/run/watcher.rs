@@ -10,8 +10,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use takt::config::Config;
 use takt::controller::{Interrupt, Progress};
 use takt::faults::{FaultEvents, FaultInjector};
-use takt::remote::now_ns;
 use takt::telemetry::{Machine, Notice, words};
+use takt_remote::now_ns;
 use takt_rt::{Event, EventKind, Snapshot, StopCause};
 
 use crate::full_queue::FullQueues;

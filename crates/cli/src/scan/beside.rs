@@ -9,7 +9,7 @@ use takt::command::CommandError;
 use takt::family;
 use takt::family::scan::{Answered, BusScan, FoundDevice, PlaceOfScan, Scanned};
 use takt::link::{LinkPort, RealInterface};
-use takt::remote::{Client, Listener, connect};
+use takt_remote::{Client, connect, names_in_use};
 use takt_tools::commission::bus_scan;
 
 /// So long a question may wait behind others in the controller.
@@ -26,7 +26,7 @@ impl Owner {
     /// The controller that is served on this computer and has this interface, if there is one that answers here.
     pub fn of(interface: &RealInterface) -> Option<Self> {
         let interface = interface.to_string();
-        Listener::names_in_use().into_iter().find_map(|name| {
+        names_in_use().into_iter().find_map(|name| {
             let client = connect(&name).ok()?;
             let bus = client.machine().buses.iter().position(|bus| bus.interface == interface)?;
             Some(Self { name, client, bus })

@@ -5,8 +5,9 @@ use crate::exit::Exit;
 use crate::interruption;
 use crate::usage_error::UsageError;
 use takt_sim::line_faults::{FaultyLine, LineFault};
+use takt_sim::live_serial_device::{LiveSerialDevice, kinds};
 use takt_sim::pseudo_terminal::PseudoTerminal;
-use takt_sim::serial_device::{LiveSerialDevice, SerialDeviceKind, kinds};
+use takt_sim::serial_device::SerialDeviceKind;
 
 /// The kind of device with this name.
 pub fn named(text: &str) -> Result<&'static SerialDeviceKind, String> {

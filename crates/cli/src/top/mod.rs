@@ -20,7 +20,7 @@ use clap::Args;
 
 use super::exit::Exit;
 use super::usage_error::UsageError;
-use takt::remote::{Client, ConnectError, Listener, connect};
+use takt_remote::{ConnectError, connect, names_in_use};
 
 /// Show a running controller in the terminal: axes, timing, buses, events; jog and stop by keys
 ///
@@ -41,7 +41,7 @@ const NONE_SERVED: &str =
 /// Shows it until `q` is pressed. The exit code is 2 without a terminal, or without a controller.
 pub fn run(arguments: &Arguments) -> Exit {
     if arguments.list {
-        let names = Listener::names_in_use();
+        let names = names_in_use();
         if names.is_empty() {
             say!("takt: {NONE_SERVED}");
         }
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> Exit {
 fn named(name: Option<&str>) -> Result<String, String> {
     match name {
         Some(name) => Ok(name.to_owned()),
-        None => only(Listener::names_in_use()),
+        None => only(names_in_use()),
     }
 }
 
@@ -84,23 +84,11 @@ fn only(mut names: Vec<String>) -> Result<String, String> {
 }
 
 fn refusal(error: &ConnectError) -> String {
-    let names = Listener::names_in_use();
+    let names = names_in_use();
     match error {
         ConnectError::NotServed { .. } if !names.is_empty() => {
             format!("{error}; served are: {}", names.join(", "))
         }
         _ => error.to_string(),
     }
-}
-
-/// The model of a controller that was connected.
-fn model_of(name: &str, client: &Client) -> model::Model {
-    use takt::command::RunningController;
-    use takt_rt::RequestTarget;
-    let machine = client.machine().clone();
-    let limits = (0..machine.axes.len()).map(|axis| client.limits(axis)).collect();
-    let groups = (0u8..).zip(&machine.groups).map(|(group, _)| client.axes_of(RequestTarget::Group(group)));
-    let groups = groups.collect();
-    let seen = (terminal::look(client), takt::remote::now_ns());
-    model::Model::new(name, machine, (limits, groups), std::process::id(), seen)
 }

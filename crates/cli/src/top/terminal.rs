@@ -15,16 +15,15 @@ use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 use ratatui::crossterm::event::{
     self, Event as TerminalEvent, KeyCode, KeyEvent, KeyEventKind, KeyModifiers,
 };
-use takt_rt::{AxisPoint, Nanoseconds};
+use takt_rt::{AxisPoint, Nanoseconds, RequestTarget};
 
 use super::model::{Key, Model, Seen};
-use super::model_of;
 use super::request::Request;
 use super::view::{self, Palette};
 use crate::exit::Exit;
 use crate::interruption;
 use takt::command::RunningController;
-use takt::remote::{Client, ClientEvents, connect, now_ns};
+use takt_remote::{Client, ClientEvents, connect, now_ns};
 
 /// From one picture to the next one, if no key comes.
 const FRAME: Duration = Duration::from_millis(50);
@@ -92,6 +91,16 @@ pub fn look(client: &Client) -> Seen {
         lease: client.lease(),
         silent_for: client.silent_for(),
     }
+}
+
+/// The model of a controller that was connected.
+fn model_of(name: &str, client: &Client) -> Model {
+    let machine = client.machine().clone();
+    let limits = (0..machine.axes.len()).map(|axis| client.limits(axis)).collect();
+    let groups = (0u8..).zip(&machine.groups).map(|(group, _)| client.axes_of(RequestTarget::Group(group)));
+    let groups = groups.collect();
+    let seen = (look(client), now_ns());
+    Model::new(name, machine, (limits, groups), std::process::id(), seen)
 }
 
 struct View {

@@ -8,10 +8,8 @@ use std::time::{Duration, Instant};
 
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
-use takt::{
-    Client, CommandError, ConnectError, MotionError, MoveOptions, Phase, StopCategory, StreamError,
-    WaitError, connect,
-};
+use takt::{CommandError, MotionError, MoveOptions, Phase, StopCategory, StreamError, WaitError};
+use takt_remote::{Client, ConnectError, connect};
 use tempfile::TempDir;
 
 const LONG: Duration = Duration::from_secs(30);

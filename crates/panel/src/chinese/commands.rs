@@ -136,8 +136,8 @@ mod tests {
             CommandError::NoReply { after },
             CommandError::Ended,
         ];
-        let wrong_modes =
-            takt::command::needed::ALL.map(|needed| CommandError::WrongMode { axis: axis(), needed });
+        let wrong_modes = takt::command::needed::ALL
+            .map(|needed| CommandError::WrongMode { axis: axis(), needed: needed.to_owned() });
         let motions = [
             MotionError::Overtaken,
             MotionError::Replaced,

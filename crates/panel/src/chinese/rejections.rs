@@ -153,9 +153,9 @@ mod tests {
     #[test]
     fn every_rejection_is_chinese_whatever_was_asked() {
         let request = RequestKind::Move;
-        let mut all: Vec<RequestError> = RejectReason::ALL
+        let mut all: Vec<RequestError> = RejectReason::all()
             .map(|reason| RequestError { request, reason, axis: Some(0), phase: Phase::Holding })
-            .into();
+            .collect();
         let (axis, reason) = (None, RejectReason::StopLatched { rule: Rule::FollowingError });
         all.push(RequestError { request, reason, axis, phase: Phase::Disabled });
         all.extend(RequestKind::ALL.map(|request| {

@@ -341,15 +341,16 @@ fn a_panel_of_another_process_commands_by_its_client() {
     let folder = tempfile::tempdir().unwrap();
     let name = folder.path().join("arm").to_str().unwrap().to_owned();
     let controller = Controller::start(config("arm6-erob.toml"), SessionOptions::default()).unwrap();
-    let _server = takt::serve(controller.handle(), &name, takt::ServeOptions::default()).unwrap();
-    let client = takt::connect(&name).unwrap();
+    let _server =
+        takt_remote::serve(controller.handle(), &name, takt_remote::ServeOptions::default()).unwrap();
+    let client = takt_remote::connect(&name).unwrap();
     let lease = client.clone();
     let take_lease: takt_panel::TakeLease = Box::new(move || lease.take_over());
     let panel = Listening::begin(&options(None)).unwrap().show(client, Some(take_lease), None).unwrap();
     let shown = Shown { panel, controller };
     let mut page = shown.commander();
     // Another program commands, until the page takes over from it by name.
-    let other = takt::connect(&name).unwrap();
+    let other = takt_remote::connect(&name).unwrap();
     // Before the page asks for it: whoever commands without a pause keeps the lease.
     other.take_lease().unwrap();
     let is_other = AtomicBool::new(true);

@@ -4,14 +4,6 @@ use super::{BATTERY_FAULT, CommandedModule, Power};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::DriveFault;
 
-/// Defects that last.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Defects {
-    pub is_blocked: bool,
-    pub is_brake_stuck: bool,
-    pub is_silent: bool,
-}
-
 impl CommandedModule {
     /// Makes it detect a fault.
     pub fn inject_fault(&mut self, fault: DriveFault) {

@@ -7,7 +7,7 @@ use super::{CommandedModule, FOLLOWING_FAULT, Power};
 use crate::profile_motions::Motion;
 
 /// The period of the loops.
-pub const STEP_NS: Nanoseconds = 250_000;
+const STEP_NS: Nanoseconds = 250_000;
 const STEP_S: f64 = STEP_NS as f64 * 1e-9;
 
 impl CommandedModule {
@@ -16,6 +16,11 @@ impl CommandedModule {
         while self.stepped_ns + STEP_NS <= now_ns {
             self.step();
         }
+    }
+
+    /// When it is to be advanced again.
+    pub const fn wake_ns(&self) -> Nanoseconds {
+        self.stepped_ns + STEP_NS
     }
 
     fn step(&mut self) {

@@ -18,8 +18,6 @@ use super::motion::Generator;
 use super::plant::{Encoder, Gravity, Joint, JointParameters};
 use super::profile_motions::Motion;
 use super::servo::Servo;
-use defects::Defects;
-use loops::STEP_NS;
 
 /// The time that saving takes.
 const SAVE_NS: Nanoseconds = 3_000_000_000;
@@ -88,6 +86,14 @@ pub enum NotStarted {
     Disabled,
     /// It is not position-controlled, or there is no such motion mode.
     Mode,
+}
+
+/// Defects that last.
+#[derive(Clone, Copy, Debug, Default)]
+struct Defects {
+    is_blocked: bool,
+    is_brake_stuck: bool,
+    is_silent: bool,
 }
 
 /// A module without its protocol.
@@ -365,11 +371,6 @@ impl CommandedModule {
         if !self.parameters.has_battery {
             self.lose_turns();
         }
-    }
-
-    /// When it is to be advanced again.
-    pub const fn wake_ns(&self) -> Nanoseconds {
-        self.stepped_ns + STEP_NS
     }
 
     /// The truth about it.

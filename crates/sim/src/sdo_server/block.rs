@@ -4,46 +4,11 @@ use takt_wire::canopen::object::ObjectAddress;
 
 use crate::sdo_reply::{AbortCode, addressed};
 
-use super::{ObjectAccess, SdoServer, Transfer, check_length};
+use super::transfer::{BlockDownload, BlockUpload, DownloadPhase, Transfer, UploadPhase};
+use super::{ObjectAccess, SdoServer, check_length};
 
 /// Segments that the server takes in one block.
 const BLOCK_SIZE: u8 = 127;
-
-/// A block download: segments arrive until one is the last, then the end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct BlockDownload {
-    pub address: ObjectAddress,
-    length: Option<usize>,
-    has_crc: bool,
-    phase: DownloadPhase,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum DownloadPhase {
-    /// Segments arrive; this one was the last in sequence.
-    Segments { sequence: u8 },
-    /// The last segment has arrived.
-    End,
-}
-
-/// A block upload.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct BlockUpload {
-    pub address: ObjectAddress,
-    has_crc: bool,
-    /// Segments in a block.
-    size: u8,
-    /// Bytes that the client has confirmed, and segments that await it.
-    confirmed: usize,
-    phase: UploadPhase,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum UploadPhase {
-    Announced,
-    Segments,
-    End,
-}
 
 impl SdoServer {
     /// Returns `true` if segments of a block arrive, whose first byte is no command.

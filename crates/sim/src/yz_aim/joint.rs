@@ -31,7 +31,6 @@ use crate::plant::{Gravity, Joint};
 use crate::random::Random;
 use crate::sdo_server::{SdoFeatures, SdoServer};
 use crate::servo::Servo;
-use load_monitor::LoadMonitor;
 use takt_wire::quirks::PowerUpState;
 
 /// Longest time between two advances.
@@ -53,6 +52,14 @@ mod mode {
     pub const HOMING: i64 = OperationMode::Homing as i64;
     pub const INTERPOLATION: i64 = OperationMode::InterpolatedPosition as i64;
     pub const ALL: [i64; 4] = [PROFILE_POSITION, VELOCITY, HOMING, INTERPOLATION];
+}
+
+/// How long each overload has lasted.
+#[derive(Clone, Copy, Debug, Default)]
+struct LoadMonitor {
+    blocked_s: f64,
+    at_current_limit_s: f64,
+    behind_s: f64,
 }
 
 /// A simulated YZ-AIM integrated servo with CANopen.

@@ -8,6 +8,7 @@
 
 pub mod candump;
 mod candump_text;
+mod condition;
 mod csv;
 pub mod frame_text;
 mod line;
@@ -16,7 +17,8 @@ mod reader;
 mod time;
 mod writer;
 
-pub use reader::{LogCondition, LogError, read};
+pub use condition::{LogCondition, LogError};
+pub use reader::read;
 pub use writer::{LogFormat, LogWriter};
 
 use takt_rt::{Frame, Nanoseconds};

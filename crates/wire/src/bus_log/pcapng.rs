@@ -6,8 +6,7 @@ use std::io::{self, Read};
 use takt_rt::{Frame, FrameKind, Id, NANOSECONDS_PER_SECOND, Nanoseconds};
 
 use super::line::LineItem;
-use super::reader::{LogCondition, LogError};
-use super::{Direction, LoggedFrame};
+use super::{Direction, LogCondition, LogError, LoggedFrame};
 
 const SECTION_HEADER: u32 = 0x0A0D_0D0A;
 const INTERFACE_DESCRIPTION: u32 = 1;

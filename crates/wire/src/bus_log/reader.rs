@@ -4,64 +4,10 @@ use std::io::{self, BufRead, Read};
 
 use super::csv::Columns;
 use super::line::{LineItem, LineProblem};
-use super::{LoggedFrame, candump, candump_text, pcapng};
+use super::{LogCondition, LogError, LoggedFrame, candump, candump_text, pcapng};
 
 /// No line of a log is longer. What is longer is cut there.
 const LONGEST_LINE: u64 = 1 << 12;
-
-/// Why a file cannot be read as a log.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LogError {
-    /// It cannot be read.
-    #[error(transparent)]
-    Io(#[from] io::Error),
-    /// It is empty.
-    #[error("the file is empty: nothing was logged")]
-    Empty,
-    /// It is none of the logs that are known.
-    #[error(
-        "this is no log of a bus; line {line}: {problem}. A log of candump (-l, or what it prints), pcapng, a CSV table with the \
-         columns id and data, and recordings of takt are read"
-    )]
-    Unknown {
-        /// The first line that is of no log.
-        line: usize,
-        /// Why.
-        problem: String,
-    },
-    /// It is a capture of the older format.
-    #[error("this is a capture in the older format pcap; convert it: editcap -F pcapng CAPTURE NEW.pcapng")]
-    OldCapture,
-    /// A block of a pcapng file is impossible.
-    #[error("block {block} of the capture is damaged")]
-    Damaged {
-        /// The block, counted from 1.
-        block: usize,
-    },
-}
-
-/// What a log was like.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LogCondition {
-    /// Messages of CAN controllers about errors; they are no frames.
-    pub error_frames: u64,
-    /// Packets of other networks in a capture.
-    pub foreign: u64,
-    /// Lines (blocks of a capture) that were passed over.
-    pub malformed: u64,
-    /// The first of them, counted from 1, and why.
-    pub first_malformed: Option<(usize, String)>,
-    /// True if the end of the last block is missing.
-    pub is_cut_off: bool,
-}
-
-impl LogCondition {
-    pub(super) fn count_malformed(&mut self, at: usize, problem: String) {
-        self.malformed += 1;
-        self.first_malformed.get_or_insert((at, problem));
-    }
-}
 
 /// Passes each frame of a log to `visit`, in the order of the file, until that returns `false`.
 ///

@@ -4,7 +4,8 @@ use std::fs;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-use takt::{AxisSnapshot, Config, Controller, Phase, ServeOptions, Server, SessionOptions, serve};
+use takt::{AxisSnapshot, Config, Controller, Phase, SessionOptions};
+use takt_remote::{Client, ServeOptions, Server, serve};
 
 use super::*;
 
@@ -54,7 +55,7 @@ impl Stage {
     }
 
     fn client(&self) -> Client {
-        takt::connect(&self.bridge.options.controller).unwrap()
+        takt_remote::connect(&self.bridge.options.controller).unwrap()
     }
 
     fn positions(&self) -> Vec<f64> {

@@ -4,8 +4,8 @@ use takt_wire::printable::printable_path;
 
 use takt::config::LimitOrigin;
 
-use super::{counted_span, short, span, time};
-use crate::check::{AxisCheck, ComplianceCheck};
+use super::spans::{counted_span, short, span, time};
+use crate::check::result::{AxisCheck, ComplianceCheck};
 use crate::table::{Table, UNBROKEN};
 
 pub(super) fn is_shown_alike(first: &AxisCheck, second: &AxisCheck) -> bool {

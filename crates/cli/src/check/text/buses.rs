@@ -4,7 +4,7 @@ use takt::config::Bus;
 use takt::schedule::text::{message_name, microseconds, narrow, remedy, reserve, shortfall, sums};
 use takt::schedule::{BusSchedule, MessageSchedule};
 
-use super::{alike, counted_span, span, time};
+use super::spans::{alike, counted_span, span, time};
 use crate::columns::paragraph;
 use crate::table::{Table, UNBROKEN};
 

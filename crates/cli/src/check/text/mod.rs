@@ -2,6 +2,7 @@
 
 mod axes;
 mod buses;
+mod spans;
 
 use std::fmt::Write as _;
 
@@ -12,7 +13,7 @@ use takt::schedule::BusSchedule;
 use takt::schedule::text::microseconds;
 
 use super::lines;
-use super::{Check, GroupCheck};
+use super::result::{Check, GroupCheck};
 use crate::columns::paragraph;
 use crate::table::Table;
 use axes::{
@@ -20,6 +21,7 @@ use axes::{
     units_table, urdf_table,
 };
 use buses::{bus_text, buses_table, groups};
+use spans::{alike, time};
 
 /// The whole text: the verdict first, then what is doubtful, then the tables.
 pub fn whole(check: &Check, config: &Config) -> String {
@@ -154,47 +156,4 @@ fn automatic(check: &Check) -> String {
 fn send_phase(check: &Check) -> String {
     let sent = |phase_ns| format!(", set-points held until {} µs", microseconds(phase_ns));
     check.send_phase_ns.map(sent).unwrap_or_default()
-}
-
-/// The elements that follow each other and are alike.
-fn alike<T>(elements: &[T], are_alike: impl Fn(&T, &T) -> bool) -> Vec<&[T]> {
-    elements.chunk_by(are_alike).collect()
-}
-
-/// `a`, or `a, b`, or `a … z`; each name once where it is repeated.
-fn span<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let mut different: Vec<&str> = names.collect();
-    different.dedup();
-    match different[..] {
-        [first, _, .., last] if different.len() > 2 => format!("{first} … {last}"),
-        _ => different.join(", "),
-    }
-}
-
-/// The same with how many there are, where not all of them are named.
-fn counted_span<'a>(names: impl ExactSizeIterator<Item = &'a str>) -> String {
-    let count = names.len();
-    let span = span(names);
-    if count > 2 { format!("{span} ({count})") } else { span }
-}
-
-/// A number with five significant digits, without zeros at its end.
-fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return value.to_string();
-    }
-    let decimals = (4 - value.abs().log10().floor() as i32).clamp(0, 12) as usize;
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
-}
-
-/// A length of time in the unit that suits it.
-fn time(ns: u64) -> String {
-    if ns >= 1_000_000_000 && ns.is_multiple_of(100_000_000) {
-        format!("{} s", ns as f64 / 1e9)
-    } else if ns >= 1_000_000 && ns.is_multiple_of(100_000) {
-        format!("{} ms", ns as f64 / 1e6)
-    } else {
-        format!("{} µs", microseconds(ns))
-    }
 }

@@ -6,7 +6,7 @@ use takt_rt::Frame;
 
 use super::super::super::chinese::Words;
 use super::super::super::frames::FrameView;
-use super::super::super::gate::locked;
+use super::super::super::lock::locked;
 use super::super::Bench;
 use takt_tools::commission::ProcedureEvent;
 use takt_tools::commission::bus_session::SessionEvent;

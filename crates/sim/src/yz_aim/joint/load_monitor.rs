@@ -2,7 +2,7 @@
 
 use takt_rt::Nanoseconds;
 
-use super::YzAimJoint;
+use super::{LoadMonitor, YzAimJoint};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::DriveFault;
 use crate::yz_aim::alarms::{BATTERY, COMMUNICATION_LOST, StoppingAlarm};
@@ -16,14 +16,6 @@ const STALL_SHARE: f64 = 0.1;
 const AT_LIMIT: f64 = 0.999;
 /// The value of 2618h that allows the peak torque at standstill.
 const FULL_STANDSTILL_OUTPUT: f64 = 600.0;
-
-/// How long each overload has lasted.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct LoadMonitor {
-    blocked_s: f64,
-    at_current_limit_s: f64,
-    behind_s: f64,
-}
 
 impl YzAimJoint {
     /// The torque limit by 261Dh.

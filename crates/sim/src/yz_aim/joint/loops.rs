@@ -2,8 +2,7 @@
 
 use takt_rt::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
-use super::load_monitor::LoadMonitor;
-use super::{COUNTS_PER_SECOND_PER_RPM, NEVER, YzAimJoint, mode};
+use super::{COUNTS_PER_SECOND_PER_RPM, LoadMonitor, NEVER, YzAimJoint, mode};
 use crate::loops::ControlLoops;
 use crate::motion::Measured;
 use crate::yz_aim::device::Level;

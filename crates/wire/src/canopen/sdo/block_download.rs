@@ -3,7 +3,7 @@
 use super::abort::AbortCode;
 use super::block_upload::LOST_BLOCKS;
 use super::crc::checksum;
-use super::exchange::{ExchangeStep, FinalRequest};
+use super::exchange_step::{ExchangeStep, FinalRequest};
 use super::request::SdoRequest;
 use super::response::SdoResponse;
 use super::transfer::{Completed, SdoError};

@@ -2,7 +2,7 @@
 
 use super::abort::AbortCode;
 use super::crc::checksum;
-use super::exchange::{ExchangeStep, FinalRequest};
+use super::exchange_step::{ExchangeStep, FinalRequest};
 use super::request::SdoRequest;
 use super::response::SdoResponse;
 use super::transfer::{Completed, MAX_UPLOAD_BYTES, SdoError, Uploaded};

@@ -7,7 +7,8 @@
 use takt_rt::{Frame, Nanoseconds};
 
 use super::abort::AbortCode;
-use super::exchange::{Exchange, ExchangeStep};
+use super::exchange::Exchange;
+use super::exchange_step::ExchangeStep;
 use super::request::SdoRequest;
 use super::transfer::{Completed, SdoError, Transfer};
 use crate::canopen::{function_code, node_of};

@@ -5,9 +5,10 @@ use takt_rt::{Frame, Id};
 use super::abort::AbortCode;
 use super::block_download::{BlockDownload, Next};
 use super::block_upload::BlockUpload;
+use super::exchange_step::{ExchangeStep, FinalRequest};
 use super::request::SdoRequest;
 use super::response::SdoResponse;
-use super::transfer::{Completed, MAX_UPLOAD_BYTES, SdoError, Transfer, Uploaded};
+use super::transfer::{MAX_UPLOAD_BYTES, SdoError, Transfer};
 use super::wire::{self, BlockSize, Expedited, Segment};
 use crate::canopen::function_code;
 use crate::canopen::object::ObjectAddress;
@@ -25,61 +26,6 @@ enum ExchangePhase {
     DownloadSegments { sent: usize, toggle: bool },
     BlockUpload(BlockUpload),
     BlockDownload(BlockDownload),
-}
-
-/// The effect of a received frame on the transfer.
-#[derive(Debug)]
-pub(super) enum ExchangeStep {
-    /// It is not a response to this transfer.
-    Unusable,
-    /// It is part of a response.
-    Wait,
-    /// The next frame is due.
-    Send,
-    /// The server does not support this kind of transfer: a simpler one is used.
-    FallBack,
-    /// The transfer is finished.
-    Finish { outcome: Result<Completed, SdoError>, final_request: FinalRequest },
-}
-
-/// The final request of a finished transfer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum FinalRequest {
-    /// None, because the server has finished the transfer.
-    None,
-    /// The client aborts the transfer.
-    Abort(AbortCode),
-    /// The client confirms the end of a block upload.
-    BlockUploadEnd,
-}
-
-impl FinalRequest {
-    pub fn request(self, object: ObjectAddress) -> Option<SdoRequest> {
-        match self {
-            Self::None => None,
-            Self::Abort(code) => Some(SdoRequest::Abort { object, code }),
-            Self::BlockUploadEnd => Some(SdoRequest::BlockUploadEnd),
-        }
-    }
-}
-
-impl ExchangeStep {
-    pub fn fail(error: SdoError, code: AbortCode) -> Self {
-        Self::Finish { outcome: Err(error), final_request: FinalRequest::Abort(code) }
-    }
-
-    pub fn too_long() -> Self {
-        Self::fail(SdoError::TooLong { limit: MAX_UPLOAD_BYTES as u32 }, AbortCode::OutOfMemory)
-    }
-
-    fn uploaded(bytes: Vec<u8>, is_size_known: bool) -> Self {
-        let outcome = Ok(Completed::Uploaded(Uploaded { bytes, is_size_known }));
-        Self::Finish { outcome, final_request: FinalRequest::None }
-    }
-
-    fn downloaded() -> Self {
-        Self::Finish { outcome: Ok(Completed::Downloaded), final_request: FinalRequest::None }
-    }
 }
 
 impl Exchange {

@@ -18,6 +18,7 @@ mod block_upload;
 mod client;
 mod crc;
 mod exchange;
+mod exchange_step;
 mod request;
 mod response;
 mod transfer;
