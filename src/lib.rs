@@ -30,6 +30,7 @@
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`trajectory`]: points with times, checked as a whole before they are carried out.
+//! - [`words`](mod@words): a sentence as a template and its fields, for pages in other languages.
 //! - [`schedule`]: whether everything fits on the buses in the worst case.
 //! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
 //! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
@@ -72,7 +73,7 @@
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! channels                            the lock-free channels to the real-time thread
-//! trajectory packet sleep_alignment monotonic_clock
+//! trajectory packet sleep_alignment monotonic_clock words
 //! ```
 //!
 //! A controller of another process (`takt-remote`), the tools, the panel and the program `takt` stand on this crate, as crates of their
@@ -96,6 +97,7 @@ pub mod link;
 pub mod schedule;
 pub mod telemetry;
 pub mod trajectory;
+pub mod words;
 
 // What the other crates of this project stand on. It may change in any release.
 #[doc(hidden)]

@@ -40,8 +40,8 @@ pub use crate::procedure::{
     SdoQuirks,
 };
 pub use data_sheet::DataSheet;
-pub(crate) use error_words::{drive_error_words, own_error_words, own_errors};
-pub use error_words::{error_cure, error_words};
+pub(crate) use error_words::{coded, drive_error_words, own_error_words, own_errors};
+pub use error_words::{error_cure, error_words, standard_error};
 pub use off_cycle::{LineCounts, OffCycleBudget, OffCycleDrive, OffCycleLine, OffCycleTarget, OffCycleWish};
 pub use registry::{NameTaken, all, register};
 #[doc(hidden)]
@@ -54,7 +54,6 @@ pub use warning::{Warning, WarningKind, WarningSubject};
 pub(crate) use watchdog::least_shut_down_ns;
 pub use watchdog::{SignOfLife, Unwatched, Watchdog, stops_by_itself_after, unreached_words};
 
-use takt_wire::canopen::emcy::ErrorCode;
 use takt_wire::canopen::object::Object;
 use takt_wire::canopen::objects::PdoDirection;
 use takt_wire::canopen::sdo::SdoTiming;
@@ -66,19 +65,13 @@ use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use crate::family::scan::{FoundDevice, NodeIdentity, OwnProtocol, Recognised, StartingKeys};
 use crate::procedure::ModbusSession;
+use crate::words::Words;
 use takt_sim::{DevicesOnLine, Drive};
 
 /// ZeroErr eRob with CANopen firmware.
 pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACTS);
 /// YZ-AIM integrated servo, CANopen edition.
 pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
-
-/// A sentence of takt in English, and the same in Chinese. `{0}` is a name or a number, which stays as it is; `<1>` is made of words, which have a
-/// phrase of their own. They are numbered in the order of the English sentence.
-pub type ChinesePhrase = (&'static str, &'static str);
-
-/// A name or words in the meaning of a frame, in English and in Chinese.
-pub type ChineseTerm = (&'static str, &'static str);
 
 /// Describes frames in words.
 pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
@@ -236,25 +229,14 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
-    /// An error code of a drive in words. A drive whose data sheet has words of its own has those instead.
-    fn error_words(&self, code: u16) -> String {
-        ErrorCode(code).to_string()
+    /// An error code of a drive in words: its name in English and in Chinese ([`Words::bilingual`]). A drive whose data sheet has words of its own has those instead.
+    fn error_words(&self, code: u16) -> Words {
+        standard_error(code)
     }
 
     /// What clears a fault with this code, where the family knows more than the standard.
     fn error_cure(&self, _code: u16) -> Option<&'static str> {
         None
-    }
-
-    /// What the family says, in Chinese, beside what drives share: its errors and their cures, what fails in commissioning, what a scan
-    /// remarks. A sentence without a phrase stays English.
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        vec![]
-    }
-
-    /// Names and words in the meanings of its frames, in Chinese, beside those of CANopen and CiA 402.
-    fn chinese_terms(&self) -> Vec<ChineseTerm> {
-        vec![]
     }
 
     /// How its node ID and bit rate are set, where its drives have no LSS (CiA 305): a sentence for people.

@@ -355,7 +355,7 @@ impl Recording {
         self.write(self.event_channel, event.slot, event.at_ns)?;
         let Some(told) = self.missed_slots.told(*event) else { return Ok(()) };
         let so_far = match told.kind {
-            EventKind::MissedSlots { count } => Some(words::missed_slots(count)),
+            EventKind::MissedSlots { count } => Some(words::missed_slots(count).to_string()),
             _ => None,
         };
         let text = so_far.as_deref().unwrap_or(text);

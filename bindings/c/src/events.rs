@@ -143,7 +143,7 @@ impl takt_event {
             axis: axis.map_or(-1, i32::from),
             code,
             missed: events.missed(),
-            words: put_text(&event_words(event, machine)),
+            words: put_text(&event_words(event, machine).to_string()),
         }
     }
 }

@@ -66,7 +66,7 @@ impl Event {
             },
             axis: axis.and_then(|axis| machine.axes.get(usize::from(axis))).map(|axis| axis.name.clone()),
             group: group.cloned(),
-            words: event_words(event, machine),
+            words: event_words(event, machine).to_string(),
         }
     }
 }

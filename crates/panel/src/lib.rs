@@ -28,6 +28,7 @@ mod access;
 #[cfg(feature = "server")]
 mod bench;
 pub mod browser;
+#[cfg(all(test, feature = "server"))]
 mod chinese;
 pub(crate) mod command;
 #[cfg(feature = "server")]

@@ -16,7 +16,6 @@ use takt_rt::StopCategory;
 use tokio::sync::oneshot;
 
 use super::access::Access;
-use super::chinese::Words;
 use super::command::{Command, CommandRefusal, target_of};
 use super::frames::{FrameView, Frames, Wanted};
 use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, message, page_key};
@@ -176,8 +175,7 @@ impl Server {
             let reader = feed.reader();
             while self.are_frames_wanted() {
                 let Ok(OnBus { bus, what }) = reader.wait(LOOK) else { continue };
-                let words =
-                    decoders.get_mut(bus).map(|decoder| Words::of_meaning(&decoder.decode(&what.frame)));
+                let words = decoders.get_mut(bus).map(|decoder| decoder.decode(&what.frame).line());
                 let age_ns = self.controller.now_ns().saturating_sub(what.at_ns);
                 let mut frames = locked(&self.frames);
                 frames.lose(reader.take_lost());
@@ -187,7 +185,7 @@ impl Server {
                     bus,
                     direction: if what.is_sent { '>' } else { '<' },
                     frame: format!("{:?}", what.frame),
-                    words: words.unwrap_or_else(Words::none),
+                    words: words.unwrap_or_default(),
                 });
             }
         }
@@ -213,7 +211,8 @@ impl Server {
     pub fn lead_motions(&self) {
         let may_move = |page| self.gate.pages().may_move(page, Instant::now());
         let tell = |Problem { page, refusal }: Problem| {
-            self.gate.tell(Some(page), |_| message("problem", &refusal.view()));
+            self.gate
+                .tell(Some(page), |_| message("problem", &refusal.view(Some(self.controller.machine()))));
         };
         self.motions.run(may_move, tell);
     }
@@ -224,7 +223,7 @@ impl Server {
         self.commands.try_send(Work { what, reply }).map_err(|_| CommandRefusal::Busy)?;
         match replied.await {
             Ok(Ok(())) => Ok(done()),
-            Ok(Err(refusal)) => Err(refusal.into()),
+            Ok(Err(refusal)) => Err(Problematic::command(&refusal, Some(self.controller.machine()))),
             Err(_) => Err(CommandRefusal::Discarded.into()),
         }
     }
@@ -303,7 +302,7 @@ async fn stop(State(server): State<Arc<Server>>, request: Request) -> Result<Res
         0 => StopCategory::Zero,
         1 => StopCategory::One,
         2 => StopCategory::Two,
-        _ => return Err(Problematic::Malformed("stop categories are 0, 1 and 2".to_owned())),
+        _ => return Err(Problematic::Malformed("stop categories are 0, 1 and 2".into())),
     };
     server.motions.stop(target_of(group, server.controller.machine())?, category)?;
     if let (Ok(key), Some(number)) = (page_key(&headers), number) {

@@ -47,7 +47,7 @@ impl ClientEvents {
 
     /// An event as a sentence, with the names of the axes and buses.
     pub fn words(&self, event: &Event) -> String {
-        words::event(event, &self.connection.description.machine)
+        words::event(event, &self.connection.description.machine).to_string()
     }
 }
 

@@ -49,7 +49,7 @@ impl Events {
 
     /// An event as a sentence, with the names of the axes and buses.
     pub fn words(&self, event: &Event) -> String {
-        words::event(event, self.handle.machine())
+        words::event(event, self.handle.machine()).to_string()
     }
 }
 

@@ -62,7 +62,7 @@ fn emergency(target: &TargetDrive, message: &Emergency) -> String {
         // A code 00xx is that of the standard alone: the error has been reset.
         "error reset".to_owned()
     } else {
-        target.error_words(code)
+        target.error_words(code).to_string()
     };
     let mut words = format!("emergency: {error}, error register: {}", message.register);
     if message.manufacturer != [0; 5] {

@@ -8,6 +8,7 @@ use takt_wire::canopen::object::ObjectAddress;
 use super::failure::Failure;
 use crate::config::{Axis, DriveFamily, Limits, Quantity, Travel};
 use crate::family::{self, DataSheet, Family, is_rounded};
+use crate::words::Words;
 
 /// A value as the user wrote it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -135,7 +136,7 @@ impl TargetDrive {
     }
 
     /// An error code of the drive in words.
-    pub fn error_words(&self, code: u16) -> String {
+    pub fn error_words(&self, code: u16) -> Words {
         family::drive_error_words(&self.drive, code)
     }
 

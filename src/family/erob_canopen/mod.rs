@@ -17,11 +17,12 @@ use takt_wire::erob_can::entries;
 use takt_wire::erob_can::frame::{self, Request};
 
 use super::scan::{FoundDevice, StartingKeys};
-use super::{ChinesePhrase, ChineseTerm, Family, OtherProtocol, SettingUp, erob, erob_can};
+use super::{Family, OtherProtocol, SettingUp, coded, erob, erob_can, standard_error};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::AxisSession;
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
+use crate::words::Words;
 use takt_sim::Drive;
 use takt_sim::erob::ErobJoint;
 
@@ -76,20 +77,15 @@ impl Family for ErobCanopen {
         })
     }
 
-    fn error_words(&self, code: u16) -> String {
-        error_text(ErrorCode(code))
+    fn error_words(&self, code: u16) -> Words {
+        if ErrorCode(code) == MULTI_TURN_BATTERY {
+            return coded(code, Words::bilingual(erob::BATTERY_LOW));
+        }
+        standard_error(code)
     }
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         errors::error_advice(ErrorCode(code))
-    }
-
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        erob::chinese::PHRASES.to_vec()
-    }
-
-    fn chinese_terms(&self) -> Vec<ChineseTerm> {
-        erob::chinese_terms::TERMS.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

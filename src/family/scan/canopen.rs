@@ -176,7 +176,7 @@ pub fn remark_heard(device: &mut FoundDevice, heard: &HeardNode) {
     if let Some(emergency) = heard.emergency {
         let words = match device.drive.and_then(family::named) {
             Some(family) => family.error_words(emergency.code.0),
-            None => emergency.code.to_string(),
+            None => family::standard_error(emergency.code.0),
         };
         device.remark(format!("it reports an error: {words}"));
     }

@@ -134,8 +134,9 @@ impl SimulatedArm {
             let left_ns = self.due_ns.saturating_sub(self.controller.now_ns());
             self.controller.pass(LOOK.min(Duration::from_nanos(left_ns)));
             let problems = std::cell::RefCell::new(String::new());
+            let machine = self.controller.machine();
             self.motions.look(|Problem { refusal, .. }| {
-                problems.borrow_mut().push_str(&message("problem", &refusal.view()));
+                problems.borrow_mut().push_str(&message("problem", &refusal.view(Some(machine))));
             });
             messages.push_str(&problems.into_inner());
         }
@@ -154,7 +155,7 @@ impl SimulatedArm {
     pub fn command(&mut self, command: &str) -> Result<(), String> {
         let command: Command = read(command)?;
         let carried_out = self.motions.carry_out(PAGE, command, self.motions.stops(), &|| true);
-        carried_out.map_err(|refusal| text(&refusal.view()))
+        carried_out.map_err(|refusal| text(&refusal.view(Some(self.controller.machine()))))
     }
 
     /// Stops a group, or all: `{"group": null, "category": 1}`.
@@ -171,7 +172,7 @@ impl SimulatedArm {
         };
         let stopped = target_of(group, self.controller.machine())
             .and_then(|target| self.motions.stop(target, category));
-        stopped.map_err(|refusal| text(&refusal.view()))
+        stopped.map_err(|refusal| text(&refusal.view(Some(self.controller.machine()))))
     }
 
     /// Breaks something, or mends it: `{"what": "silent", "axis": 2, "is_broken": true}`.

@@ -109,7 +109,7 @@ async fn errors(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<
             history.push(value as u16);
         }
     }
-    let words: Vec<String> = history.iter().map(|code| s.error_words(*code)).collect();
+    let words: Vec<String> = history.iter().map(|code| s.error_words(*code).to_string()).collect();
     let text = if words.is_empty() { "empty".to_owned() } else { words.join(", ") };
     report.add("error_history", "error history", json!(history), text);
     Ok(())
