@@ -14,6 +14,7 @@
 //! In the order to read: `access` (who may ask), `pages` (who is there, who commands), `command`, `motions` and `motion` (what is asked and
 //! how it ends), `view` (what is shown), `gate` (what both kinds of panel share), `server` (the routes), `connections` (sockets and their bounds).
 //! Commissioning is `bench`: one thread more, `takt-bench`, which owns the buses.
+//! `metrics` serves the numbers of a run to Prometheus, within the same bounds.
 //! Without a server, `command`, `motions` and `view` serve a page of the simulated arm (the folder `browser`).
 #![deny(unsafe_code)]
 #![cfg_attr(not(feature = "server"), allow(dead_code, reason = "the pages of others need a server"))]
@@ -41,6 +42,8 @@ mod gate;
 mod listening;
 #[cfg(feature = "server")]
 mod lock;
+#[cfg(feature = "server")]
+mod metrics;
 mod motion;
 pub(crate) mod motions;
 #[cfg(feature = "server")]
@@ -56,6 +59,8 @@ pub use access::TOKEN_AT_LEAST;
 pub use bench::{BenchBus, BenchDrive, BenchLink, Workplace};
 #[cfg(feature = "server")]
 pub use listening::{Listening, Panel, PanelError, PanelOptions, PanelToken, address};
+#[cfg(feature = "server")]
+pub use metrics::MetricsServer;
 pub use motions::HELD_FOR;
 pub use pages::{PAGES_AT_MOST, PRESENT_FOR};
 #[cfg(feature = "server")]
