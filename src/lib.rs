@@ -63,7 +63,7 @@
 //!
 //! ```text
 //! error                               one error for a program that embeds takt
-//! //! controller                          the engine of a configuration, its life, its ports, the handles
+//! controller                          the engine of a configuration, its life, its ports, the handles
 //! command                             what may be asked of a running controller, and how it is refused
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! faults                              faults on purpose
@@ -73,7 +73,7 @@
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! channels                            the lock-free channels to the real-time thread
-//! trajectory packet sleep_alignment monotonic_clock words
+//! trajectory sleep_alignment monotonic_clock words
 //! ```
 //!
 //! A controller of another process (`takt-remote`), the tools, the panel and the program `takt` stand on this crate, as crates of their
@@ -114,7 +114,6 @@ pub mod journal;
 pub mod procedure;
 
 mod monotonic_clock;
-mod packet;
 #[cfg(target_os = "linux")]
 #[doc(hidden)]
 pub mod sleep_alignment;

@@ -26,6 +26,7 @@ pub trait Clock {
 
 /// How a wait ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Wake {
     /// The present, at or after the deadline.
     pub now_ns: Nanoseconds,

@@ -51,7 +51,7 @@ pub const PART_NUMBER: &str = "number";
 pub const METADATA: &str = "takt";
 
 /// The version of the format of the journal, in the metadata of its channel.
-pub const JOURNAL_VERSION: &str = "2";
+pub const JOURNAL_VERSION: &str = "3";
 /// The metadata record at the end of a journal.
 pub const JOURNAL_END: &str = "journal end";
 /// The metadata record that names the file of the configuration, and the interfaces that replace those of the file.

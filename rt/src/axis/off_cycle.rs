@@ -6,6 +6,7 @@ use crate::pdo::FeedbackSlot;
 
 /// What a drive has said outside of the cycle. At the joint: rad, rad/s and N·m, or m, m/s and N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct OffCycleReport {
     /// Its state: [`DriveState::OperationEnabled`] while it follows set-points, [`DriveState::SwitchedOn`] while it is being enabled or
     /// disabled, so that it may have torque.
