@@ -229,7 +229,7 @@ mod tests {
 
     fn entry() -> Entry {
         let config = Config::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/first.toml").as_ref());
-        let controller = VirtualController::start(&config.unwrap(), None).unwrap();
+        let controller = takt::VirtualController::start(&config.unwrap(), None).unwrap();
         Entry::Events(Mutex::new(controller.event_source()), Arc::new(controller.handle()))
     }
 
