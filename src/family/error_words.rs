@@ -86,6 +86,12 @@ pub fn drive_error_words(drive: &DriveFamily, code: u16) -> Words {
     own_error_words(own_errors(drive), code).unwrap_or_else(|| of(drive).error_words(code))
 }
 
+/// What clears the fault of a drive and its cause: its own cure, or else that of its family.
+pub fn drive_error_cure(drive: &DriveFamily, code: u16) -> &'static str {
+    let own = of(drive).data_sheet(drive).and_then(|sheet| sheet.own_cure(code));
+    own.unwrap_or_else(|| error_cure(Some(drive.word), code))
+}
+
 /// The error codes that a drive has its own words for.
 pub fn own_errors(drive: &DriveFamily) -> &[(u16, String)] {
     of(drive).data_sheet(drive).map_or(&[], DataSheet::own_errors)

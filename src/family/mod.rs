@@ -15,8 +15,6 @@ pub mod erob;
 #[doc(hidden)]
 pub mod erob_can;
 #[doc(hidden)]
-pub mod erob_canopen;
-#[doc(hidden)]
 pub mod erob_modbus;
 mod error_words;
 #[allow(unnameable_types, reason = "its sessions have no public name")]
@@ -40,7 +38,7 @@ pub use crate::procedure::{
     SdoQuirks,
 };
 pub use data_sheet::DataSheet;
-pub(crate) use error_words::{coded, drive_error_words, own_error_words, own_errors};
+pub(crate) use error_words::{coded, drive_error_cure, drive_error_words, own_error_words, own_errors};
 pub use error_words::{error_cure, error_words, standard_error};
 pub use off_cycle::{LineCounts, OffCycleBudget, OffCycleDrive, OffCycleLine, OffCycleTarget, OffCycleWish};
 pub use registry::{NameTaken, all, register};
@@ -69,7 +67,7 @@ use crate::words::Words;
 use takt_sim::{DevicesOnLine, Drive};
 
 /// ZeroErr eRob with CANopen firmware.
-pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACTS);
+pub const EROB_CANOPEN: DriveFamily = DriveFamily::built_in(cia402::erob_canopen);
 /// YZ-AIM integrated servo, CANopen edition.
 pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
 
@@ -104,9 +102,7 @@ pub trait Family: ConfiguredFamily {
 
     /// Whether a CANopen node with this identity is a drive of the family, and how surely.
     fn recognises(&self, identity: &NodeIdentity) -> Option<Recognised> {
-        let own = self.unconfigured()?.identity;
-        let is_it = own.vendor.is_some() && own.vendor == identity.vendor && own.product == identity.product;
-        is_it.then_some(Recognised::ByIdentity)
+        identity.is_of(&self.unconfigured()?.identity).then_some(Recognised::ByIdentity)
     }
 
     /// The protocols of their own by which drives of the family are found on a CAN bus.
@@ -220,7 +216,7 @@ pub trait Family: ConfiguredFamily {
     }
 
     /// The protocol that a drive with this node ID may speak instead, if it can be probed for.
-    fn other_protocol(&self, _node: u8) -> Option<OtherProtocol> {
+    fn other_protocol(&self, _drive: &DriveFamily, _node: u8) -> Option<OtherProtocol> {
         None
     }
 
@@ -375,7 +371,7 @@ pub(crate) fn sdo_quirks(drive: &DriveFamily, mut timing: SdoTiming) -> SdoQuirk
 /// Every identifier between a drive and its master: those of its frames, and those of another protocol that it may speak.
 pub(crate) fn identifiers(family: &DriveFamily, node: u8) -> Vec<Id> {
     let own = family.frame_identifiers(node).into_iter().map(|(id, _)| id);
-    let other = of(family).other_protocol(node);
+    let other = of(family).other_protocol(family, node);
     own.chain(other.into_iter().flat_map(|other| [other.request.id(), other.answer])).collect()
 }
 

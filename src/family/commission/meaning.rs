@@ -17,7 +17,7 @@ pub fn of(target: &TargetDrive, frame: &Frame) -> String {
         return nmt(command, target);
     }
     // Its identifiers are those of the SDO of another node, but SDO frames have eight bytes.
-    if let Some(other) = target.family().other_protocol(target.node)
+    if let Some(other) = target.family().other_protocol(&target.drive, target.node)
         && frame.payload().len() < 8
     {
         if frame.id() == other.request.id() {

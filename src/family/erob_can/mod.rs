@@ -114,7 +114,7 @@ impl Family for ErobCan {
         Box::pin(async { Ok(()) })
     }
 
-    fn other_protocol(&self, node: u8) -> Option<OtherProtocol> {
+    fn other_protocol(&self, _: &DriveFamily, node: u8) -> Option<OtherProtocol> {
         Some(OtherProtocol {
             name: "CANopen",
             request: SdoRequest::Upload { object: DEVICE_TYPE.address }.frame(node),

@@ -12,6 +12,7 @@ use takt_wire::printable::printable;
 use super::device::{Answered, FoundDevice};
 use super::heard::HeardNode;
 use super::session::ScanSession;
+use crate::config::Identity;
 use crate::family::{self, Family};
 
 /// A node of which nothing more is known.
@@ -36,6 +37,13 @@ pub struct NodeIdentity {
     pub revision: Option<u32>,
     /// Object 1018:4.
     pub serial: Option<u32>,
+}
+
+impl NodeIdentity {
+    /// Returns `true` if the node is a drive with this vendor and product.
+    pub fn is_of(&self, drive: &Identity) -> bool {
+        drive.vendor.is_some() && drive.vendor == self.vendor && drive.product == self.product
+    }
 }
 
 /// How surely a family takes a node for one of its drives.

@@ -87,6 +87,9 @@ async fn condition(
         let volts = millivolts as f64 / 1000.0;
         report.add("voltage_v", "DC link voltage", volts, format!("{volts} V"));
     }
+    if let Some(degrees) = reading.temperature_c {
+        report.add("temperature_c", "temperature", degrees, format!("{degrees} °C"));
+    }
     Ok(())
 }
 

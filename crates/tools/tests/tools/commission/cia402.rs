@@ -471,3 +471,21 @@ fn accelerations_are_written_in_the_unit_of_the_quirk_file() {
         bench.fastest.to_degrees()
     );
 }
+
+#[test]
+fn the_turn_count_is_cleared_by_the_object_of_the_quirk_file_with_consent() {
+    let quirks = Path::new("../../drives/erob-canopen.toml").canonicalize().unwrap();
+    let sheet = Path::new("../../configs/eds/erob-canopen.eds");
+    let mut bench = sheet_bench(sheet, &format!("quirks = {quirks:?}"));
+    assert!(bench.run(Task::Zero { is_confirmed: false }).unwrap_err().failure.is_refusal());
+    bench.run(move_to(absolute(-90.0))).unwrap();
+    let report = bench.run(Task::Zero { is_confirmed: true }).unwrap();
+    assert!((number(&report, "before_counts") + 4_096.0).abs() < 20.0, "{report:?}");
+    assert!((number(&report, "after_counts") - 12_288.0).abs() < 20.0, "{report:?}");
+    bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
+    let failed = bench.run(Task::ClearFault { is_confirmed: false }).unwrap_err();
+    assert!(matches!(failed.failure, Failure::NeedsConsent { option: "--yes", .. }), "{failed:?}");
+    assert_eq!(bench.observe().state, DriveState::Fault);
+    bench.run(Task::ClearFault { is_confirmed: true }).unwrap();
+    assert_eq!(bench.observe().state, DriveState::SwitchOnDisabled);
+}

@@ -3,7 +3,8 @@
 use takt_rt::Nanoseconds;
 use takt_wire::canopen::object::ObjectAddress;
 
-use super::{CanopenDevice, CanopenNode};
+use super::drive::Cia402Drive;
+use super::node::CanopenNode;
 use crate::object_dictionary::ObjectKind;
 use crate::pdo_engine::{check_parameter, is_parameter};
 use crate::sdo_reply::AbortCode;
@@ -14,14 +15,14 @@ const SAVE_SIGNATURE: u32 = u32::from_le_bytes(*b"save");
 const LOAD_SIGNATURE: u32 = u32::from_le_bytes(*b"load");
 
 /// The objects as the SDO server accesses them.
-pub(super) struct Objects<'a, D> {
-    pub(super) device: &'a mut D,
+pub(super) struct Objects<'a> {
+    pub(super) drive: &'a mut Cia402Drive,
     pub(super) now_ns: Nanoseconds,
 }
 
-impl<D: CanopenDevice> ObjectAccess for Objects<'_, D> {
+impl ObjectAccess for Objects<'_> {
     fn read(&mut self, address: ObjectAddress, value: &mut Vec<u8>) -> Result<(), AbortCode> {
-        let dictionary = &self.device.canopen().dictionary;
+        let dictionary = &self.drive.canopen.dictionary;
         let place = dictionary.find(address)?;
         if !dictionary.entry(place).is_readable {
             return Err(AbortCode::WriteOnly);
@@ -30,39 +31,43 @@ impl<D: CanopenDevice> ObjectAccess for Objects<'_, D> {
         if address.index == 0x1003 && i64::from(address.subindex) > history() {
             return Err(AbortCode::NoData);
         }
-        self.device.measure();
-        self.device.canopen().dictionary.append(place, value);
+        self.drive.measure();
+        self.drive.canopen.dictionary.append(place, value);
         Ok(())
     }
 
     fn check_write(&mut self, address: ObjectAddress) -> Result<Option<usize>, AbortCode> {
-        let dictionary = &self.device.canopen().dictionary;
+        let dictionary = &self.drive.canopen.dictionary;
         let place = dictionary.find(address)?;
         let entry = dictionary.entry(place);
         if !entry.is_writable {
             return Err(AbortCode::ReadOnly);
         }
         let length = (entry.kind != ObjectKind::Bytes).then_some(entry.length);
-        self.device.check_write(place)?;
+        self.drive.check_write(place)?;
         Ok(length)
     }
 
     fn write(&mut self, address: ObjectAddress, value: &[u8]) -> Result<(), AbortCode> {
-        let Self { device, now_ns } = self;
-        let node = device.canopen();
+        let Self { drive, now_ns } = self;
+        let has_one_code = drive.quirks.simulated.has_one_abort_code;
+        let node = &mut drive.canopen;
         let place = node.dictionary.find(address)?;
         let number = match (address.index, address.subindex) {
             // The objects show what they can do, and take a signature, whatever their range is.
             (0x1010 | 0x1011, 1..) => return node.take_signature(address.index, value, *now_ns),
-            _ => node.dictionary.decode(place, value)?,
+            _ => node.dictionary.decode(place, value).map_err(|code| match code {
+                AbortCode::ValueTooHigh | AbortCode::ValueTooLow if has_one_code => AbortCode::Value,
+                code => code,
+            })?,
         };
         check_communication(address, number)?;
-        device.check_value(address, place, number)?;
-        let node = device.canopen();
+        drive.check_value(address, number)?;
+        let node = &mut drive.canopen;
         check_parameter(&node.dictionary, address, number)?;
         node.dictionary.store(place, value)?;
         node.written(address.index, *now_ns);
-        device.written(address, *now_ns);
+        drive.written(address, *now_ns);
         Ok(())
     }
 }

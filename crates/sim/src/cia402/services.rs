@@ -1,28 +1,29 @@
-//! What the node of a device does with each frame and with time.
+//! The CANopen services of the drive: what its node does with each frame and with time.
 
 use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
 
 use super::access::Objects;
-use super::{CanopenDevice, NEVER, TakesField, ValueSource};
+use super::drive::Cia402Drive;
+use super::node::NEVER;
 use crate::drive::NodeState;
 use crate::errors::DeviceError;
+use crate::loops::ControlLoops;
 use crate::mailbox::Mailbox;
 use crate::network::NmtReset;
 use crate::object_dictionary::SimulatedDictionary;
 use crate::pdo_engine::{PdoEngine, RpdoReception};
 use crate::sdo_server::SdoServer;
 
-/// The CANopen services of a device.
-pub trait NodeServices: CanopenDevice {
+impl Cia402Drive {
     /// Receives a frame.
-    fn receive_frame(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
+    pub(super) fn receive_frame(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         if frame.id().is_extended() || frame.is_fd() {
             return;
         }
         if frame.kind() == FrameKind::Remote {
             return self.take_remote(now_ns, frame, mailbox);
         }
-        let node = self.canopen();
+        let node = &mut self.canopen;
         let id = frame.id().value();
         match id {
             0x000 => self.take_nmt(now_ns, frame.payload()),
@@ -40,7 +41,7 @@ pub trait NodeServices: CanopenDevice {
             _ if !node.has_pdos(now_ns) => {}
             _ if id == node.network.sync_id(&node.dictionary) => {
                 let is_right = frame.payload().len() == node.network.sync_length(&node.dictionary);
-                if is_right || !Self::CHECKS_SYNC_LENGTH {
+                if is_right || self.quirks.simulated.takes_any_sync {
                     self.take_sync(now_ns, frame.payload().first().copied());
                 } else {
                     node.errors.raise(DeviceError::SyncLength, &mut node.dictionary);
@@ -52,7 +53,7 @@ pub trait NodeServices: CanopenDevice {
 
     /// Answers a remote request: node guarding, or a TPDO.
     fn take_remote(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
-        let node = self.canopen();
+        let node = &mut self.canopen;
         if frame.id() == Id::canopen(0x700, node.id) {
             if let Some(byte) = node.network.guarded(now_ns, &node.dictionary) {
                 mailbox.push(Frame::of(frame.id(), [byte]));
@@ -60,14 +61,14 @@ pub trait NodeServices: CanopenDevice {
         } else if node.network.state() == NodeState::Operational {
             let answer = self.report(|pdos, dictionary| pdos.requested(frame.id(), dictionary));
             if let Some(answer) = answer {
-                mailbox.put(self.canopen().defects.sent(answer));
+                mailbox.put(self.canopen.defects.sent(answer));
             }
         }
     }
 
     /// Takes an NMT command.
     fn take_nmt(&mut self, now_ns: Nanoseconds, payload: &[u8]) {
-        let node = self.canopen();
+        let node = &mut self.canopen;
         let &[command, id] = payload else { return };
         if id != 0 && id != node.id || node.network.state() == NodeState::Initialising {
             return;
@@ -82,7 +83,7 @@ pub trait NodeServices: CanopenDevice {
             }
             None => {}
         }
-        let node = self.canopen();
+        let node = &mut self.canopen;
         if !was_operational && node.network.state() == NodeState::Operational {
             node.pdos_ready_ns = now_ns + node.delays.first_pdo_ns;
         }
@@ -92,19 +93,17 @@ pub trait NodeServices: CanopenDevice {
     /// Takes SYNC, with its counter if it has one.
     fn take_sync(&mut self, now_ns: Nanoseconds, counter: Option<u8>) {
         self.lock_loops(now_ns);
-        let takes = self.begin_rpdo();
-        let node = self.canopen();
-        node.pdos.apply_latched(&mut node.dictionary, &mut write_field(takes));
-        self.take_values(now_ns, ValueSource::Sync);
-        let delay_ns = self.canopen().delays.feedback_ns;
+        let node = &mut self.canopen;
+        node.pdos.apply_latched(&mut node.dictionary, &mut write_field);
+        self.take_values(now_ns);
+        let delay_ns = self.canopen.delays.feedback_ns;
         self.report(|pdos, dictionary| pdos.sample(now_ns, delay_ns, counter, dictionary));
     }
 
     /// Takes an RPDO.
     fn take_pdo(&mut self, now_ns: Nanoseconds, frame: &Frame) {
-        let takes = self.begin_rpdo();
-        let node = self.canopen();
-        match node.pdos.receive(now_ns, frame, &mut node.dictionary, &mut write_field(takes)) {
+        let node = &mut self.canopen;
+        match node.pdos.receive(now_ns, frame, &mut node.dictionary, &mut write_field) {
             RpdoReception::NotMine => {}
             RpdoReception::TooShort => {
                 // A series of short PDOs leads to one message.
@@ -116,7 +115,7 @@ pub trait NodeServices: CanopenDevice {
             RpdoReception::Latched(_) => self.clear_pdo_error(),
             RpdoReception::Applied(_) => {
                 self.clear_pdo_error();
-                self.take_values(now_ns, ValueSource::Rpdo);
+                self.take_values(now_ns);
             }
         }
     }
@@ -124,7 +123,7 @@ pub trait NodeServices: CanopenDevice {
     /// Ends the error of a short PDO.
     fn clear_pdo_error(&mut self) {
         let is_faulted = self.is_faulted();
-        let node = self.canopen();
+        let node = &mut self.canopen;
         if node.has_pdo_error && !is_faulted {
             node.has_pdo_error = false;
             node.errors.clear(&mut node.dictionary);
@@ -134,20 +133,20 @@ pub trait NodeServices: CanopenDevice {
     /// Takes an SDO request.
     fn take_request(&mut self, now_ns: Nanoseconds, request: [u8; 8]) {
         // The server is taken out for the call, because it accesses the rest of the device.
-        let mut server = std::mem::replace(&mut self.canopen().sdo, SdoServer::taken());
-        server.request(now_ns, request, &mut Objects { device: self, now_ns });
-        self.canopen().sdo = server;
+        let mut server = std::mem::replace(&mut self.canopen.sdo, SdoServer::taken());
+        server.request(now_ns, request, &mut Objects { drive: self, now_ns });
+        self.canopen.sdo = server;
     }
 
     /// Does what is due, and sends the frames that are due.
-    fn advance_node(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
-        let node = self.canopen();
+    pub(super) fn advance_node(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
+        let node = &mut self.canopen;
         if node.network.has_lost_master(now_ns) {
             node.network.follow_error_behaviour(&node.dictionary);
             self.lose_master();
-            self.canopen().stop_services();
+            self.canopen.stop_services();
         }
-        let node = self.canopen();
+        let node = &mut self.canopen;
         if node.pdos.has_lost_rpdo(now_ns) {
             node.errors.raise(DeviceError::RpdoTimeout, &mut node.dictionary);
         }
@@ -160,14 +159,14 @@ pub trait NodeServices: CanopenDevice {
 
     /// Sends the frames that are due.
     fn send_due(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
-        let node = self.canopen();
+        let node = &mut self.canopen;
         let id = node.id;
         if node.network.boot_if_due(now_ns, &node.dictionary) {
             node.pdos_ready_ns = now_ns;
             self.started(now_ns);
             mailbox.push(Frame::of(Id::canopen(0x700, id), [0]));
         }
-        let node = self.canopen();
+        let node = &mut self.canopen;
         if let Some(byte) = node.network.heartbeat(now_ns, &node.dictionary) {
             mailbox.push(Frame::of(Id::canopen(0x700, id), [byte]));
         }
@@ -181,7 +180,7 @@ pub trait NodeServices: CanopenDevice {
                 self.take_sync(now_ns, counter);
             }
         }
-        let node = self.canopen();
+        let node = &mut self.canopen;
         if node.network.has_services() {
             while let Some(answer) = node.sdo.answer(now_ns) {
                 mailbox.push(Frame::of(Id::canopen(0x580, id), answer));
@@ -196,7 +195,7 @@ pub trait NodeServices: CanopenDevice {
             if node.pdos.has_events() {
                 self.report(|pdos, dictionary| pdos.sample_events(now_ns, dictionary));
             }
-            let node = self.canopen();
+            let node = &mut self.canopen;
             while let Some(frame) = node.pdos.next(now_ns) {
                 mailbox.put(node.defects.sent(frame));
             }
@@ -208,7 +207,7 @@ pub trait NodeServices: CanopenDevice {
     fn report<T>(&mut self, take: impl FnOnce(&mut PdoEngine, &SimulatedDictionary) -> T) -> T {
         self.measure();
         let shown = self.shown();
-        let node = self.canopen();
+        let node = &mut self.canopen;
         let truth = node.defects.falsify(shown, &mut node.dictionary);
         let taken = take(&mut node.pdos, &node.dictionary);
         truth.restore(&mut node.dictionary);
@@ -216,16 +215,11 @@ pub trait NodeServices: CanopenDevice {
     }
 }
 
-impl<D: CanopenDevice> NodeServices for D {}
-
-/// Writes an object from an RPDO; a value that the device does not take is ignored.
-fn write_field(takes: TakesField) -> impl FnMut(&mut SimulatedDictionary, usize, u64) {
-    move |dictionary, place, bits| {
-        if dictionary.entry(place).is_writable
-            && let Some(number) = dictionary.accepted(place, bits)
-            && takes(place, number)
-        {
-            dictionary.set(place, number);
-        }
+/// Writes an object from an RPDO; a value out of its range is ignored.
+fn write_field(dictionary: &mut SimulatedDictionary, place: usize, bits: u64) {
+    if dictionary.entry(place).is_writable
+        && let Some(number) = dictionary.accepted(place, bits)
+    {
+        dictionary.set(place, number);
     }
 }

@@ -1,27 +1,19 @@
-//! The CANopen services of a simulated CiA 402 drive: what its node does with each frame and with time. The drive says what
-//! its objects mean, as [`CanopenDevice`], and has the services as [`NodeServices`].
-
-mod access;
-mod services;
+//! The communication of a simulated CiA 402 drive: its objects, its services, and when they are due.
 
 use takt_rt::{Frame, FrameKind, Nanoseconds};
-use takt_wire::canopen::object::ObjectAddress;
 use takt_wire::quirks::PowerUpState;
 
-use super::drive::NodeState;
-use super::errors::Errors;
-use super::feedback_defects::{FeedbackDefects, ShownObjects};
-use super::loops::ControlLoops;
-use super::network::Network;
-use super::object_dictionary::SimulatedDictionary;
-use super::pdo_engine::{PdoEngine, PdoFeatures};
-use super::sdo_reply::AbortCode;
-use super::sdo_server::SdoServer;
-pub use services::NodeServices;
+use crate::drive::NodeState;
+use crate::errors::Errors;
+use crate::feedback_defects::FeedbackDefects;
+use crate::network::Network;
+use crate::object_dictionary::SimulatedDictionary;
+use crate::pdo_engine::{PdoEngine, PdoFeatures};
+use crate::sdo_server::SdoServer;
 
 /// Longest time between two advances.
 const IDLE_NS: Nanoseconds = 1_000_000;
-const NEVER: Nanoseconds = Nanoseconds::MAX;
+pub(super) const NEVER: Nanoseconds = Nanoseconds::MAX;
 /// The identifiers of nothing but PDOs and SYNC: those of NMT, emergency messages, SDO and error control are others (CiA 301, 7.3.5).
 const PDO_IDS: std::ops::RangeInclusive<u32> = 0x180..=0x57F;
 
@@ -51,12 +43,12 @@ pub struct CanopenNode {
     pub errors: Errors,
     /// The defects of its feedback.
     pub defects: FeedbackDefects,
-    sdo: SdoServer,
-    pdos: PdoEngine,
-    delays: NodeDelays,
-    has_pdo_error: bool,
-    save_ns: Nanoseconds,
-    pdos_ready_ns: Nanoseconds,
+    pub(super) sdo: SdoServer,
+    pub(super) pdos: PdoEngine,
+    pub(super) delays: NodeDelays,
+    pub(super) has_pdo_error: bool,
+    pub(super) save_ns: Nanoseconds,
+    pub(super) pdos_ready_ns: Nanoseconds,
     /// When something is due, and when the node is to look for it.
     due_ns: Nanoseconds,
     wake_ns: Nanoseconds,
@@ -145,7 +137,7 @@ impl CanopenNode {
     }
 
     /// Stops the services that the NMT state does not allow.
-    fn stop_services(&mut self) {
+    pub(super) fn stop_services(&mut self) {
         if self.network.state() != NodeState::Operational {
             self.pdos.stop();
         }
@@ -154,67 +146,7 @@ impl CanopenNode {
         }
     }
 
-    fn has_pdos(&self, now_ns: Nanoseconds) -> bool {
+    pub(super) fn has_pdos(&self, now_ns: Nanoseconds) -> bool {
         self.network.state() == NodeState::Operational && now_ns >= self.pdos_ready_ns
     }
-}
-
-/// Whether a device takes a number in its range from an RPDO, by the place of the object.
-pub type TakesField = fn(usize, i64) -> bool;
-
-/// What brought new values to the dictionary.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ValueSource {
-    /// SYNC has applied the synchronous RPDOs.
-    Sync,
-    /// An RPDO that acts at once.
-    Rpdo,
-}
-
-/// A device behind a [`CanopenNode`].
-pub trait CanopenDevice: ControlLoops + Sized {
-    /// Whether SYNC must have the length that object 1019 says.
-    const CHECKS_SYNC_LENGTH: bool;
-
-    /// Its node.
-    fn canopen(&mut self) -> &mut CanopenNode;
-
-    /// RPDOs are about to be written: what the device takes from them.
-    fn begin_rpdo(&mut self) -> TakesField;
-
-    /// Acts on the modes, controlwords and set-points in the dictionary.
-    fn take_values(&mut self, now_ns: Nanoseconds, source: ValueSource);
-
-    /// Returns `true` if it is in a fault.
-    fn is_faulted(&self) -> bool;
-
-    /// Writes the measured values to the dictionary.
-    fn measure(&mut self);
-
-    /// The objects that a defect can change in the feedback.
-    fn shown(&self) -> ShownObjects;
-
-    /// The node has booted.
-    fn started(&mut self, now_ns: Nanoseconds);
-
-    /// Restarts everything except the joints and the saved parameters.
-    fn restart(&mut self, now_ns: Nanoseconds);
-
-    /// The master is lost.
-    fn lose_master(&mut self);
-
-    /// Checks that SDO can write an object of the dictionary now.
-    ///
-    /// # Errors
-    /// The abort code.
-    fn check_write(&self, place: usize) -> Result<(), AbortCode>;
-
-    /// Checks what the range of an object does not say of a value.
-    ///
-    /// # Errors
-    /// The abort code.
-    fn check_value(&self, address: ObjectAddress, place: usize, value: i64) -> Result<(), AbortCode>;
-
-    /// Applies the effects of a value that SDO has written.
-    fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds);
 }
