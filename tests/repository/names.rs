@@ -90,10 +90,11 @@ const NAMES: [&str; 22] = [
 ];
 
 /// The files that may name a family, and why.
-const MAY_NAME: [(&str, &str); 4] = [
+const MAY_NAME: [(&str, &str); 5] = [
     ("crates/wire/src/lib.rs", "it declares the folders of makers' own protocols"),
     ("src/family/registry.rs", "it is the list of the families"),
     ("src/family/mod.rs", "it declares their folders, and their names for configurations in code"),
+    ("src/config/keys.rs", "it says which keys are for the drives of one family, and what is so with some"),
     ("src/config/in_code.rs", "its documentation has an example, which needs some drive"),
 ];
 

@@ -81,7 +81,7 @@ impl Page {
 }
 
 fn machine() -> Machine {
-    let config = Path::new(REPOSITORY).join("configs/arm6-erob.toml");
+    let config = Path::new(REPOSITORY).join("configs/arm-and-gripper.toml");
     Machine::of(&Config::load(&config).unwrap())
 }
 

@@ -28,11 +28,11 @@ use super::commission::dictionary::ObjectEntry;
 use super::commission::profile::words::statusword_words;
 use super::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
 use super::scan::{FoundDevice, NodeIdentity, Recognised, StartingKeys};
-use super::{DataSheet, Family, OtherProtocol, SettingUp, own_error_words};
+use super::{DataSheet, Family, OtherProtocol, SettingUp, own_error_words, standard_error};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFacts, DriveFamily, FamilyKeys};
+use crate::words::Words;
 use bring_up::Sheet;
 use takt_sim::Drive;
-use takt_wire::canopen::emcy::ErrorCode;
 use takt_wire::canopen::object::Object;
 use takt_wire::canopen::objects::{PdoDirection, STATUSWORD};
 
@@ -187,9 +187,9 @@ impl Family for Cia402 {
         })
     }
 
-    fn error_words(&self, code: u16) -> String {
+    fn error_words(&self, code: u16) -> Words {
         let own = self.built_in_device().map_or(&[][..], |device| &device.quirks.errors);
-        own_error_words(own, code).unwrap_or_else(|| ErrorCode(code).to_string())
+        own_error_words(own, code).unwrap_or_else(|| standard_error(code))
     }
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {

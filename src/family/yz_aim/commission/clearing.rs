@@ -75,8 +75,7 @@ async fn reset(c: &SdoSession, alarm: Alarm) -> Result<(), Failure> {
         let voltage = c.read(&VOLTAGE).await? as f64 / 327.0;
         if voltage > HIGHEST_VOLTAGE {
             let voltage = format!("{voltage:.1}");
-            let what =
-                crate::words!("{alarm}, the supply is at {voltage} V", alarm = alarm.words(), voltage);
+            let what = crate::words!("{alarm}, the supply is at {voltage} V", alarm = alarm.words(), voltage);
             return Err(Failure::FaultPersists { what, advice: alarm.advice() });
         }
     }
