@@ -8,12 +8,8 @@ use crate::modules::{Arrow, Crate, Names, Source};
 use crate::rust_files::shown;
 
 /// The files that use each other all the same: what these use does not count.
-const EXCEPTIONS: [&str; 28] = [
+const EXCEPTIONS: [&str; 24] = [
     "bindings/c/src/errors.rs",
-    "crates/cli/src/drive/mod.rs",
-    "crates/cli/src/monitor/mod.rs",
-    "crates/cli/src/scan/mod.rs",
-    "crates/cli/src/top/view/mod.rs",
     "crates/remote/src/serve/mod.rs",
     "crates/sim/src/canopen_node/access.rs",
     "rt/src/axis/feedback.rs",
