@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use crate::border::{self, Growing};
 use crate::errors::takt_result;
-use crate::handles::{self, Entry, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
 use crate::life::command;
+use crate::scope::Scope;
 
 /// Who commands a controller that is served to other processes. Set `size` to `sizeof(takt_lease)`.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,8 @@ use takt::telemetry::Unit;
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{self, Entry, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
+use crate::scope::Scope;
 
 /// Room for a name, with the zero at its end.
 pub const TAKT_NAME_LENGTH: usize = 64;

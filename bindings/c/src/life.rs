@@ -7,8 +7,9 @@ use takt::{CommandError, Outcome, Phase, StopCategory};
 
 use crate::border;
 use crate::errors::{self, Failure, takt_result};
-use crate::handles::{self, Entry, Owner, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
 use crate::posix;
+use crate::scope::{Owner, Scope};
 use crate::state::{put_state, takt_phase, takt_state};
 
 /// How a stop is made (IEC 60204-1, 9.2.2). It is not safety-rated: for that the drives have STO, in hardware.

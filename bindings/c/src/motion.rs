@@ -6,8 +6,9 @@ use takt::{CommandError, MotionId, MoveOptions, OperationMode};
 
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
 use crate::posix;
+use crate::scope::Scope;
 
 /// A motion that was begun, for takt_wait(). It needs not be closed. A copy of it is as good.
 #[derive(Clone, Copy, Debug)]

@@ -12,7 +12,8 @@ use takt::{
 
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{self, Entry, Owner, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
+use crate::scope::{Owner, Scope};
 
 /// Where the drives of a controller are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,8 @@ use takt::{AxisSnapshot, BusHealth, Snapshot, StopReason, TimingLevel};
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
+use crate::scope::Scope;
 
 /// The most axes of a controller.
 pub const TAKT_MAX_AXES: usize = 32;

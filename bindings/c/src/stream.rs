@@ -7,7 +7,8 @@ use takt::rt::{MAX_AXES, PositionPoint};
 
 use crate::border;
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
+use crate::scope::Scope;
 use crate::trajectory::{check_axes, values};
 
 /// What is wanted of an axis.

@@ -4,8 +4,9 @@ use takt::TrajectoryPoint;
 
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
 use crate::motion::{begin, takt_motion};
+use crate::scope::Scope;
 
 /// How far a trajectory is. Set `size` to `sizeof(takt_progress)`.
 #[derive(Clone, Copy, Debug)]
