@@ -7,7 +7,7 @@ use takt_wire::quirks::Quirks;
 use super::axis::{Axis, AxisEvent};
 use super::places::{AXIS_OFFSET, is_measured};
 use super::{Cia402Parameters, NotADrive, dictionary_of};
-use crate::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, TakesField, ValueSource};
+use crate::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, NodeServices, TakesField, ValueSource};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::{Drive, DriveFault, Observation};
 use crate::errors::DeviceError;

@@ -10,7 +10,7 @@ use super::ErobParameters;
 use super::device::{Change, ErobDevice};
 use super::motion::ErobMotion;
 use super::objects::{OBJECTS, at, is_measured};
-use crate::canopen_node::{CanopenDevice, CanopenNode, NodeDelays};
+use crate::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, NodeServices};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::{Drive, DriveFault, Observation};
 use crate::errors::DeviceError;
