@@ -8,8 +8,7 @@ use crate::modules::{Arrow, Crate, Names, Source};
 use crate::rust_files::shown;
 
 /// The files that use each other all the same: what these use does not count.
-const EXCEPTIONS: [&str; 22] = [
-    "crates/remote/src/serve/mod.rs",
+const EXCEPTIONS: [&str; 21] = [
     "rt/src/axis/feedback.rs",
     "rt/src/axis/mod.rs",
     "rt/src/bit_fields/frame.rs",

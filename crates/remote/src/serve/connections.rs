@@ -12,8 +12,8 @@ use nix::unistd::geteuid;
 use takt::command::LeaseError;
 use takt_rt::RequestTarget;
 
-use super::Served;
 use super::lease::Claimant;
+use super::served::Served;
 use super::worker::Worker;
 use crate::commands::StopRequest;
 use crate::memory::Memory;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use takt::command::{EventSource, WaitError};
 use takt_rt::{RequestId, RequestTarget};
 
-use super::Served;
+use super::served::Served;
 use crate::layout::LeaseShown;
 use crate::shown::{ShownWriter, now_ns};
 

@@ -6,8 +6,8 @@ use takt::command::{CommandError, LeaseError, MotionId, StreamError};
 use takt::trajectory::TrajectoryPoint;
 use takt_rt::{Nanoseconds, RequestTarget};
 
-use super::Served;
 use super::lease::Claimant;
+use super::served::Served;
 use crate::commands::{Command, Demand};
 use crate::replies::{Answer, Reply};
 use crate::shown::now_ns;
