@@ -7,12 +7,12 @@ use std::thread::{self, JoinHandle};
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Snapshot, StopCategory};
 
-use super::in_loop::Callbacks;
+use super::callbacks::Callbacks;
 use super::life::Life;
 use super::messages::Messages;
 use super::pace::Pace;
 use super::start_failure::StartFailure;
-use super::trajectory::Trajectories;
+use super::trajectories::Trajectories;
 use super::{Handle, Shared};
 use crate::channels::MotionEnd;
 use crate::config::Config;

@@ -18,11 +18,14 @@ pub struct Events {
     reader: EventReader,
 }
 
-impl Events {
-    pub(super) fn new(handle: &Handle) -> Self {
-        Self { handle: handle.clone(), reader: handle.0.events.begin_now() }
+impl Handle {
+    /// The events from now on. Each observer has its own place among them.
+    pub fn events(&self) -> Events {
+        Events { handle: self.clone(), reader: self.0.events.begin_now() }
     }
+}
 
+impl Events {
     /// Waits for the next event, for no longer than `at_most`.
     ///
     /// # Errors

@@ -5,13 +5,10 @@ use std::time::Duration;
 
 use takt_rt::{
     AxisLimits, CallbackCycle, CallbackId, CallbackRun, Follow, Nanoseconds, Request, RequestTarget, Rule,
-    SlotPlan,
 };
 
 use super::Handle;
-use crate::channels::{
-    CallbackCommand, CallbackGiver, CallbackRecord, CallbackState, CallbackTimes, GivenCallback,
-};
+use crate::channels::{CallbackCommand, CallbackRecord, CallbackState, CallbackTimes, GivenCallback};
 use crate::command::{CommandError, MotionError, MotionId};
 
 /// A callback that has panicked is back from the real-time thread within this time.
@@ -29,20 +26,6 @@ pub struct CallbackOptions {
     /// What is done with a command beyond the limits: [`Follow::Smooth`] tracks it within them, [`Follow::Exact`] stops the group. `None`
     /// is as each axis is configured.
     pub follow: Option<Follow>,
-}
-
-/// What the handles of a controller need for callbacks.
-pub(super) struct Callbacks {
-    pub(super) giver: CallbackGiver,
-    /// The longest budget.
-    pub(super) longest_ns: Nanoseconds,
-}
-
-impl Callbacks {
-    /// The budgets end with the time in which the set-points of a cycle must be ready.
-    pub(super) fn new(giver: CallbackGiver, plan: &SlotPlan) -> Self {
-        Self { giver, longest_ns: plan.latest_set_points_ns.saturating_sub(plan.command_phase_ns) }
-    }
 }
 
 /// A callback that leads a group, or has led it. To drop the handle changes nothing.

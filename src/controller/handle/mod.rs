@@ -22,6 +22,7 @@
 //! every call takes `&self`. After the end every command and every wait of a handle returns an error that says `Ended`. The
 //! owner dereferences to a handle, so a program of one thread needs no handle of its own.
 
+mod callbacks;
 mod commands;
 #[cfg(target_os = "linux")]
 mod controller;
@@ -36,6 +37,7 @@ mod question;
 mod running_controller;
 mod start_failure;
 mod stream;
+mod trajectories;
 mod trajectory;
 mod virtual_controller;
 mod waiting;
@@ -48,11 +50,11 @@ use takt_rt::Snapshot;
 use crate::channels::{BringUpFailures, ClientRequests, EventReader, Observer, Questions, Streamer};
 use crate::config::{Axis, Group};
 use crate::telemetry::{LoopTiming, Machine, ShownTiming};
-use in_loop::Callbacks;
+use callbacks::Callbacks;
 use life::Life;
 use messages::Messages;
 use pace::{Pace, VirtualPace};
-use trajectory::Trajectories;
+use trajectories::Trajectories;
 
 #[cfg(target_os = "linux")]
 pub use controller::Controller;
@@ -119,11 +121,6 @@ impl Handle {
     /// How punctual all cycles since the start were; a few milliseconds old. All times are 0 in virtual time.
     pub fn timing(&self) -> LoopTiming {
         self.0.timing.newest()
-    }
-
-    /// The events from now on. Each observer has its own place among them.
-    pub fn events(&self) -> Events {
-        Events::new(self)
     }
 
     /// The failures to write a recording, a candump log or a black box until now. The motion goes on after them.

@@ -1,16 +1,18 @@
 //! Trajectories: points with times, along which the speed may be changed, and which may be paused and resumed.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisLimits, ExecutionStart, MAX_GROUPS, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request,
-    RequestId, RequestTarget, TrajectoryId,
+    AxisLimits, ExecutionStart, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request, RequestId,
+    RequestTarget,
 };
 
-use super::{GroupHandle, Handle};
-use crate::channels::{GivenTrajectory, GroupAxes, TrajectoryGiver};
+use super::Handle;
+use super::group::GroupHandle;
+use super::trajectories::{Present, TrajectoryState};
+use crate::channels::{GivenTrajectory, GroupAxes};
 use crate::command::{CommandError, MotionId, TrajectoryProgress, needed};
 use crate::config::Axis;
 use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError, TrajectoryPoint};
@@ -21,46 +23,6 @@ const FIRST_MARGIN_S: f64 = 0.02;
 const LONGEST_MARGIN_S: f64 = 1.0;
 /// A trajectory that has been granted takes the place of the present one within this time, unless the motion ends before.
 const TAKING_OVER: Duration = Duration::from_secs(5);
-
-/// The trajectories of the handles of a controller.
-pub(super) struct Trajectories {
-    giver: TrajectoryGiver,
-    /// Those of each group.
-    groups: [Mutex<TrajectoryState>; MAX_GROUPS],
-}
-
-#[derive(Default)]
-struct TrajectoryState {
-    /// The trajectory that was granted last.
-    present: Option<Present>,
-    /// Those whose requests may not have been taken yet.
-    submitted: Vec<(TrajectoryId, RequestId)>,
-}
-
-/// A trajectory that was granted.
-#[derive(Clone)]
-struct Present {
-    motion: RequestId,
-    id: TrajectoryId,
-    given: Arc<GivenTrajectory>,
-    /// The rate that it has while it is not paused.
-    rate: f64,
-    is_paused: bool,
-}
-
-impl Trajectories {
-    pub(super) fn new(giver: TrajectoryGiver) -> Self {
-        Self { giver, groups: Default::default() }
-    }
-
-    /// Commands of trajectories of a group wait for one another; no other call needs this lock.
-    fn lock(&self, group: u8) -> MutexGuard<'_, TrajectoryState> {
-        let [first, ..] = &self.groups;
-        let state = self.groups.get(usize::from(group)).unwrap_or(first);
-        // A panic of another holder of the lock leaves the state consistent.
-        state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
 
 impl Handle {
     /// Starts a trajectory through points with times, as ROS' `JointTrajectory` has them: see [`Trajectory::new`]. All of it is checked

@@ -6,11 +6,11 @@ use std::time::Duration;
 
 use takt_rt::StopCategory;
 
-use super::in_loop::Callbacks;
+use super::callbacks::Callbacks;
 use super::life::Life;
 use super::pace::{Pace, VirtualLog, VirtualPace};
 use super::start_failure::StartFailure;
-use super::trajectory::Trajectories;
+use super::trajectories::Trajectories;
 use super::{Handle, Shared};
 use crate::channels::{LogSide, MotionEnd};
 use crate::config::Config;
