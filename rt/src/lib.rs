@@ -36,6 +36,7 @@ mod answers;
 mod axis;
 mod bit_fields;
 mod bit_set;
+mod capacity;
 #[cfg(feature = "checkpoint")]
 mod checkpoint;
 mod cia402;
@@ -88,6 +89,7 @@ pub use bit_fields::{
     ReplyValue, ReplyValues, RunningMode, SetUpAgain, Setting, StateCodes,
 };
 pub use bit_set::BitSet;
+pub use capacity::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 #[cfg(feature = "checkpoint")]
 pub use checkpoint::CheckpointError;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
@@ -112,10 +114,7 @@ pub use pdo::{
 pub use phase::Phase;
 pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};
 pub use profile::ProfileTarget;
-pub use record::{
-    AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, MAX_AXES, MAX_BUSES, MAX_GROUPS,
-    RecordedStop,
-};
+pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, RecordedStop};
 pub use rejection::{RejectReason, RequestError};
 pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,

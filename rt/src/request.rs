@@ -1,10 +1,10 @@
 //! What can be asked of the controller and of its groups. Why it may be rejected is in `rejection`.
 
+use crate::capacity::MAX_AXES;
 use crate::cia402::OperationMode;
 use crate::frame::Id;
 use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, TransmissionType};
 use crate::profile::ProfileTarget;
-use crate::record::MAX_AXES;
 use crate::source::CallbackRun;
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;

@@ -49,6 +49,7 @@ use arrayvec::ArrayVec;
 
 use crate::axis::Axis;
 use crate::bit_set::BitSet;
+use crate::capacity::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::dispatch::Dispatch;
 use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
@@ -56,7 +57,7 @@ use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::places::Places;
 use crate::port::BusHealth;
-use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
+use crate::record::{CycleTiming, EventKind};
 use crate::time::Nanoseconds;
 use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};

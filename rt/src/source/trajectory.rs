@@ -4,8 +4,8 @@
 //! moment of the execution: at first they are the same; a speed override, a pause or a resumption changes the law, and never
 //! the path. The real-time thread only samples both, from memory that the host owns.
 
+use crate::capacity::MAX_AXES;
 use crate::plan::State;
-use crate::record::MAX_AXES;
 
 /// A polynomial of the fifth degree, its coefficients in ascending order: the position of an axis (rad or m) at a time in
 /// seconds.
