@@ -64,6 +64,7 @@ mod record;
 mod recorded_numbers;
 mod rejection;
 mod request;
+mod sender_byte;
 pub mod slcan;
 mod source;
 mod stop;
@@ -78,8 +79,8 @@ mod wire;
 pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, Exchange, FeedForward, FeedbackSince, Jump,
-    ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, PositionCounter, SenderByte,
-    Supervision, TorqueLimits,
+    ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, PositionCounter, Supervision,
+    TorqueLimits,
 };
 pub use bit_fields::{
     BesideTarget, BitField, BitRange, ByteOrder, CodeRange, CommandTargets, CommandValue, CommandValues,
@@ -120,6 +121,7 @@ pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
     RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
+pub use sender_byte::SenderByte;
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
     LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,

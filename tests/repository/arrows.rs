@@ -8,10 +8,7 @@ use crate::modules::{Arrow, Crate, Names, Source};
 use crate::rust_files::shown;
 
 /// The files that use each other all the same: what these use does not count.
-const EXCEPTIONS: [&str; 15] = [
-    "rt/src/axis/feedback.rs",
-    "rt/src/axis/mod.rs",
-    "rt/src/bit_fields/frame.rs",
+const EXCEPTIONS: [&str; 12] = [
     "rt/src/engine/mod.rs",
     "rt/src/engine/state.rs",
     "src/family/adapter_warning.rs",
