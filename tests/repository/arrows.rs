@@ -8,9 +8,7 @@ use crate::modules::{Arrow, Crate, Names, Source};
 use crate::rust_files::shown;
 
 /// The files that use each other all the same: what these use does not count.
-const EXCEPTIONS: [&str; 12] = [
-    "rt/src/engine/mod.rs",
-    "rt/src/engine/state.rs",
+const EXCEPTIONS: [&str; 10] = [
     "src/family/adapter_warning.rs",
     "src/family/bit_fields/commission/mod.rs",
     "src/family/bit_fields/scan/mod.rs",

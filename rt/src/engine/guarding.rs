@@ -7,9 +7,8 @@
 
 use arrayvec::ArrayVec;
 
-use super::Engine;
 use super::parameters::EngineParameters;
-use crate::axis::{Axis, Supervision};
+use crate::axis::Supervision;
 use crate::frame::{Frame, Id};
 use crate::function_code;
 use crate::watch::node_state;
@@ -124,6 +123,13 @@ impl<const AXES: usize> NodeGuards<AXES> {
         self.nodes.iter_mut().find(|guard| (guard.bus, guard.node) == (bus, node))
     }
 
+    /// The buses and the numbers of the nodes that have been asked and have not replied yet.
+    #[inline]
+    pub(super) fn unanswered(&self) -> impl Iterator<Item = (u8, u8)> {
+        let is_asked = |guard: &&NodeGuard| matches!(guard.exchange, Exchange::Asked { .. });
+        self.nodes.iter().filter(is_asked).map(|guard| (guard.bus, guard.node))
+    }
+
     /// Returns `true` if a node is not asked at all, or has replied: then it watches the controller.
     pub(super) fn allows_enabling(&self, bus: u8, node: u8) -> bool {
         let guard = self.nodes.iter().find(|guard| (guard.bus, guard.node) == (bus, node));
@@ -131,21 +137,6 @@ impl<const AXES: usize> NodeGuards<AXES> {
             matches!(guard.exchange, Exchange::Answered { .. } | Exchange::Asked { before: Some(_) })
         };
         guard.is_none_or(has_replied)
-    }
-}
-
-impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
-    /// Lets a slot pass without a reply, for the axes of the nodes that have been asked for one.
-    #[inline]
-    pub(super) fn watch_guarded_nodes(&mut self) {
-        for guard in &self.shared.guards.nodes {
-            if matches!(guard.exchange, Exchange::Asked { .. }) {
-                let is_its = |axis: &&mut Axis| {
-                    (axis.parameters().bus, axis.parameters().node) == (guard.bus, guard.node)
-                };
-                self.axes.iter_mut().filter(is_its).for_each(Axis::note_unanswered_guarding);
-            }
-        }
     }
 }
 

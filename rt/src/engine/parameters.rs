@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::SEND_BATCH;
+use super::send_batch::SEND_BATCH;
 use crate::axis::{Axis, AxisParameters, AxisParametersError, Exchange, FeedbackSince, Supervision};
 use crate::bit_fields::FieldDriveParameters;
 use crate::bit_set::BitSet;
