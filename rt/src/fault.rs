@@ -41,7 +41,7 @@ macro_rules! faults {
                 }
             }
 
-            /// What breaks it, for people.
+            /// Returns the condition that breaks it, in words.
             pub const fn sentence(self) -> &'static str {
                 match self {
                     $(Self::$rule => $says,)*

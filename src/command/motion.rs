@@ -75,7 +75,7 @@ pub struct TrajectoryProgress {
     pub rate: f64,
 }
 
-/// How a motion has ended, by a state; `None` while it is under way. `newest_stop` is the newest stop that the real-time thread has taken
+/// Returns the result of a motion, by a state; `None` while it is under way. `newest_stop` is the newest stop that the real-time thread has taken
 /// of those that concern the request.
 pub fn result_in(
     state: &Snapshot,

@@ -8,7 +8,7 @@ use super::quantities::Quantities;
 use super::quantity::{Quantity, Short};
 use super::spot::Spot;
 
-/// A row.
+/// A row of the table of keys.
 #[derive(Clone, Copy)]
 pub struct Key {
     pub name: &'static str,
@@ -16,11 +16,11 @@ pub struct Key {
     /// A word that may stand in place of a value.
     pub word: Option<&'static str>,
     pub shown: Shown,
-    /// What it is for, behind it in `configs/reference.toml`; further lines stand below it.
+    /// Explanation; its first line stands behind the key in `configs/reference.toml`, further ones below it.
     pub sentence: &'static str,
 }
 
-/// What a key may be.
+/// The type and the range of a key.
 #[derive(Clone, Copy)]
 pub enum Values {
     Boolean,
@@ -41,7 +41,7 @@ pub enum Values {
     OneOrList(&'static Values),
 }
 
-/// How `configs/reference.toml` shows a key.
+/// The value of a key in `configs/reference.toml`.
 #[derive(Clone, Copy)]
 pub enum Shown {
     /// With its default.
@@ -73,7 +73,7 @@ pub struct Table {
 }
 
 impl Key {
-    /// The default.
+    /// Returns the default of a number, in SI units.
     ///
     /// # Panics
     /// It is no number, or depends on other keys: those that ask are constants.
@@ -85,7 +85,7 @@ impl Key {
         }
     }
 
-    /// The default in nanoseconds.
+    /// Returns the default of a duration, in nanoseconds.
     ///
     /// # Panics
     /// As [`Self::default_number`].
@@ -93,7 +93,7 @@ impl Key {
         (self.default_number() * 1e9 + 0.5) as u64
     }
 
-    /// The default.
+    /// Returns the default of a key that is true or false.
     ///
     /// # Panics
     /// It is not true or false: those that ask are constants.
@@ -104,7 +104,7 @@ impl Key {
         }
     }
 
-    /// The default.
+    /// Returns the default of a key that is a word.
     ///
     /// # Panics
     /// It is no word: those that ask are constants.
@@ -115,7 +115,7 @@ impl Key {
         }
     }
 
-    /// The whole numbers that it may be; none if it is something else.
+    /// Returns the allowed whole numbers; none for a key of another type.
     pub fn integers(&self) -> Range<i64> {
         match self.values {
             Values::Integer(low, high) => low..high.saturating_add(1),
@@ -124,7 +124,7 @@ impl Key {
         }
     }
 
-    /// The values that a number or a quantity of it may have.
+    /// Returns the bounds of a number or a quantity.
     pub fn bounds(&self) -> Bounds {
         match self.values {
             Values::Number(bounds) | Values::Quantity(_, bounds) => bounds,
@@ -132,7 +132,7 @@ impl Key {
         }
     }
 
-    /// What it is of an axis.
+    /// Returns the quantity and its bounds for an axis with these quantities.
     pub fn of(&self, quantities: Quantities) -> (Quantity, Bounds) {
         match self.values {
             Values::OfAxis(of) => of(quantities),
@@ -141,7 +141,7 @@ impl Key {
         }
     }
 
-    /// The line of the reference, and those below it.
+    /// Writes its line of the reference, and those below it.
     pub fn write_to(&self, text: &mut String) {
         let (start, literal, is_default) = match self.shown {
             Shown::Default(literal) => ("", self.literal(literal), true),
@@ -159,7 +159,7 @@ impl Key {
         }
     }
 
-    /// The range of its values, as far as the head of the reference does not state it.
+    /// Returns the range in words, unless the head of the reference states it.
     fn range(&self) -> String {
         match self.values {
             // Where it is that of the type, it says nothing.
@@ -169,7 +169,7 @@ impl Key {
         }
     }
 
-    /// A default as it is written in a file.
+    /// Returns a default as it is written in a file.
     pub fn literal(&self, literal: Literal) -> String {
         match (literal, self.values) {
             (Literal::Boolean(value), _) => value.to_string(),
@@ -189,7 +189,7 @@ impl Key {
     }
 }
 
-/// As a duration is written in a file.
+/// Returns a duration as it is written in a file.
 fn show_duration(seconds: f64) -> String {
     Quantity::DURATION.show(seconds).replace('µ', "u")
 }

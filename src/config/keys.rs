@@ -122,11 +122,11 @@ tables! {
         COMMAND_PHASE "command_phase": Values::Quantity(Quantity::FRACTION, super::COMMAND_PHASE); or "auto", Computed("0.55"), "when set-points are made from feedback: a fraction of the period, a time, or \"auto\"\n\"auto\" finds it from the worst case of every bus: after the last feedback, with as much reserve for a late wake-up\nbefore it as after it; a file for which there is none is refused with the sums. `takt check` shows what \"auto\" is,\nand in which range the command phase may lie.";
     }
 
-    missed_slots "[cycle.missed_slots]", "every missed slot counts one; one is forgiven after so many slots" {
-        WARNING "warning": integer(1, 1_000_000), count(10), "from so many on there is a warning";
-        DEGRADED "degraded": integer(1, 1_000_000), count(50), "from so many on no stream is begun";
-        STOP "stop": integer(1, 1_000_000), count(250), "from so many on the group stops; simulated buses do not mind, see [simulation]";
-        LEAK_SLOTS "leak_slots": integer(1, 1_000_000), count(10), "used slots after which one is forgiven";
+    missed_slots "[cycle.missed_slots]", "a bucket that each missed slot fills by one, and that leak_slots used slots empty by one" {
+        WARNING "warning": integer(1, 1_000_000), count(10), "missed slots in the bucket at which takt warns";
+        DEGRADED "degraded": integer(1, 1_000_000), count(50), "missed slots at which no stream is begun any more";
+        STOP "stop": integer(1, 1_000_000), count(250), "missed slots at which the group stops; not with simulated buses alone, see [simulation]";
+        LEAK_SLOTS "leak_slots": integer(1, 1_000_000), count(10), "used slots after which the bucket loses one";
     }
 
     stream "[stream]", "" {
@@ -144,8 +144,8 @@ tables! {
     master "[master]", "the controller as a CANopen node" {
         NODE "node": integer(1, 127), count(127), "its node ID (CiA 301, 7.4.1)";
         HEARTBEAT "heartbeat": time(10e-3, 65.535); or "off", Computed("\"100 ms\""), "or \"off\": drives then do not notice when the controller dies\nWith an axis in mode \"csv\", \"cst\", \"pp\", \"pv\" or \"pt\" the default is 20 ms, or the period of the cycle where that is longer: such a drive\ngoes on moving until it notices that the controller is gone. `takt check` shows for how long, and how far.";
-        HEARTBEAT_TIMEOUT "heartbeat_timeout": time(1e-3, 65.535), Computed("\"500 ms\""), "five heartbeats; after so long without one a drive stops by itself";
-        TIME "time": time(10e-3, 3600.0); or "off", word("off"), "or the period of TIME, which tells the drives the time of day: \"10 s\"";
+        HEARTBEAT_TIMEOUT "heartbeat_timeout": time(1e-3, 65.535), Computed("\"500 ms\""), "five heartbeats; a drive stops by itself after this time without one";
+        TIME "time": time(10e-3, 3600.0); or "off", word("off"), "or the period of TIME, by which drives know the time of day: \"10 s\"";
     }
 
     bus "[[bus]]", "" {
@@ -155,7 +155,7 @@ tables! {
         DATA_BIT_RATE "data_bit_rate": Values::Quantity(Quantity::BIT_RATE, Bounds::Between(1.0, DATA_BIT_RATE_AT_MOST)), Comment("\"5 Mbit/s\""), "of the data phase of CAN FD frames; without it the bus is classic";
         PERIOD "period": time(250e-6, BUS_PERIOD_AT_MOST_S), Computed("\"1 ms\""), "of its cycle: that of the controller or a multiple, 32 times at most; a YZ-AIM interpolates at 2 ms";
         RESTART_MS "restart_ms": integer(0, 60_000), count(100), "how long after bus-off the kernel restarts the controller, 0 never; holds where takt brings the interface up";
-        SERVICE_FRAMES "service_frames_per_cycle": integer(1, 32), count(1), "NMT and SDO frames sent in one cycle at most, while enabled, beside the heartbeat";
+        SERVICE_FRAMES "service_frames_per_cycle": integer(1, 32), count(1), "NMT and SDO frames sent in one cycle at most, while enabled, apart from the heartbeat";
         SDO_WHILE_ENABLED "sdo_while_enabled": Boolean, is(false), "true needs room for a request and its answer in every cycle";
         COMMAND_FRAMES "command_frames": Words(&["auto", "one-per-axis", "shared"]), word("auto"), "\"one-per-axis\", \"shared\" (axes of a group share RPDOs by dummy mapping, where their \"cia402\" data\nsheets allow it and it shortens the frames of a cycle), or \"auto\": shared only if the bus does not carry its traffic otherwise";
     }
@@ -164,7 +164,7 @@ tables! {
         DRIVE "drive": Text, Example("\"erob-canopen\""), "or \"yz-aim\"; or \"cia402\": any other CiA 402 drive, by its data sheet";
         EDS "eds": Text, Comment("\"my-drive.eds\""), "only with \"cia402\", and required: an EDS or DCF, from this file's folder";
         NODE_AXIS "node_axis": integer(1, 8), Comment("2"), "only with \"cia402\"; default 1: which axis of a drive with several (CiA 402-2); they have one bus, node and eds";
-        COMMUNICATION_TIMEOUT "communication_timeout": Values::Quantity(Quantity::DURATION, Bounds::Between(0.0, 4.0)), Comment("\"500 ms\""), "only with \"erob-modbus\"; default; so long the drive waits for its master; \"0 ms\": for ever";
+        COMMUNICATION_TIMEOUT "communication_timeout": Values::Quantity(Quantity::DURATION, Bounds::Between(0.0, 4.0)), Comment("\"500 ms\""), "only with \"erob-modbus\"; default 500 ms; time-out of the drive for requests of its master; \"0 ms\": none";
         DESCRIPTION "description": Text, Comment("\"damiao-dm-mit\""), "only with \"bit-fields\", and required: a description that comes with takt, or the path of one";
         EXTENDED "extended": Boolean, Comment("true"), "only with \"hollow-can\"; default: false; whether the motor is in extended mode";
         MASTER_ID "master_id": integer(0, 0x7FF), Comment("0x65"), "only with \"bit-fields\": the identifier by which the motor replies";
@@ -187,16 +187,16 @@ tables! {
         ZERO_COUNTS "zero_counts": integer(i32::MIN as i64, i32::MAX as i64), count(0), "the count at which the joint is at 0";
         POSITION_AT_ZERO_COUNTS "position_at_zero_counts": POSITION, Comment("\"30 deg\""), "the same in another way: where the joint is when the drive counts 0";
         MAPPING "mapping": Words(&["written", "as-stored"]), Computed("\"written\""), "or \"as-stored\": the drive keeps its own, of which a YZ-AIM knows no other\nA stored mapping is read back and followed, and counted with as many full PDOs as would be written.";
-        FEEDBACK "feedback": List(&Words(&["operation_mode", "velocity", "torque", "current", "error_code"])), Computed("[\"operation_mode\"]"), "beside statusword and position: also \"velocity\", \"torque\", \"current\", \"error_code\"\nWith \"operation_mode\", a mode that another master changes is noticed at once; it costs 10 us of a bus of 1 Mbit/s for each drive. Without it,\nonly the motion of the drive shows the change (following_error). The PDOs of a YZ-AIM carry none.";
+        FEEDBACK "feedback": List(&Words(&["operation_mode", "velocity", "torque", "current", "error_code"])), Computed("[\"operation_mode\"]"), "in addition to statusword and position: also \"velocity\", \"torque\", \"current\", \"error_code\"\nWith \"operation_mode\", a mode that another master changes is noticed at once; it costs 10 us of a bus of 1 Mbit/s for each drive. Without it,\nonly the motion of the drive shows the change (following_error). The PDOs of a YZ-AIM carry none.";
         ANSWERS_SYNC "answers_sync": Boolean, is(true), "of a YZ-AIM: false spares the bus a frame, and feedback is a cycle older";
         TRANSMISSION_TYPE "transmission_type": integer(1, 255), count(1), "of the PDOs: 1 = every SYNC, 2 = every second one, up to 240; 254, 255 = on events\nMore than 1 lessens the load but not the worst case: without a counter in SYNC all drives may answer the same one.";
         FEEDBACK_DELAY "feedback_delay": time(0.0, 0.01), usually(20e-6), "the longest time from SYNC until feedback is ready to be sent, for `takt check`";
         START_TOLERANCE "start_tolerance": DEVIATION, Computed("\"0.02 rad\""), "0.002 m for a linear axis; no stream with follow = \"exact\" may begin farther from the joint";
         TARGET_TOLERANCE "target_tolerance": DEVIATION, Computed("\"0.01 rad\""), "1 mm for a linear axis; a program that leaves the joint farther off its target has not finished\nIn mode \"cst\" the default is 1.5 * coulomb_friction / stiffness where that is more: static friction holds a joint off its target there.";
         FOLLOW "follow": Words(&["smooth", "exact"]), word("smooth"), "a stream is followed as closely as the limits allow; \"exact\": what breaks a limit is a stop";
-        FEED_FORWARD "feed_forward": Words(&["none", "velocity", "torque", "velocity-and-torque"]), word("none"), "\"velocity\": 60B1 in csp and ip, \"torque\": 60B2 in csp, csv and ip, or \"velocity-and-torque\"\nThe torque is what a stream feeds forward, and fits beside the target. The velocity is that of the set-point, and takes another frame.";
-        MISSED_FEEDBACK_CYCLES "missed_feedback_cycles": integer(1, 1000), count(5), "so many cycles without feedback stop the group";
-        MISSED_FEEDBACK_TIME "missed_feedback_time": Values::Quantity(Quantity::DURATION, Bounds::Finite), Comment("\"50 ms\""), "in its place: the whole cycles in so long, 1 to 1000 of them";
+        FEED_FORWARD "feed_forward": Words(&["none", "velocity", "torque", "velocity-and-torque"]), word("none"), "\"velocity\": 60B1 in csp and ip, \"torque\": 60B2 in csp, csv and ip, or \"velocity-and-torque\"\nThe torque is what a stream feeds forward, and fits into the PDO of the target. The velocity is that of the set-point, and takes another frame.";
+        MISSED_FEEDBACK_CYCLES "missed_feedback_cycles": integer(1, 1000), count(5), "cycles without feedback after which the group stops";
+        MISSED_FEEDBACK_TIME "missed_feedback_time": Values::Quantity(Quantity::DURATION, Bounds::Finite), Comment("\"50 ms\""), "in its place: a time of 1 to 1000 cycles, rounded down to whole ones";
         HEARTBEAT "heartbeat": time(10e-3, 65.535); or "off", word("off"), "the drive's own; feedback in every cycle proves the drive alive as well\nA drive that has no heartbeat (1017), but 100C and 100D, is asked for its state instead: node guarding, at this period, or else at that of\n[master] heartbeat; the drive stops by itself after [master] heartbeat_timeout without a request. `takt check` says which of both is in force.";
         POWER_UP "power_up": time(0.0, 60.0), usually(0.2), "until the drive answers: `takt drive` waits for it, a simulated drive takes it; a real eRob takes 8 s";
         DCF "dcf": Text, Comment("\"shoulder.dcf\""), "a DCF or concise DCF, from this file's folder: written at bring-up and read back;\n`takt check` refuses values that contradict the limits of the axis, as a 60C6 below the deceleration";
@@ -246,7 +246,7 @@ tables! {
         RATED_TORQUE "rated_torque": EFFORT, Example("\"87 Nm\""), "of the drive at the joint, unless the drive reports it (object 6076); the torque limit unless given";
     }
 
-    simulated "[axis.simulated]", "what stands in on a simulated bus, beside the joint" {
+    simulated "[axis.simulated]", "the simulated drive, in addition to [axis.joint]" {
         GRAVITY "gravity": FRICTION, usually(0.0), "a quarter turn from 0, where the joint hangs; the weight of a linear axis";
         FRICTION_SHAPE "friction": Words(&["constant", "harmonic-drive"]), word("constant"), "Coulomb friction; \"harmonic-drive\": little at rest, all of it from 0.8 rad/s on";
         PEAK_TORQUE "peak_torque": EFFORT, Computed("\"261 Nm\""), "three times the rated torque";
@@ -266,7 +266,7 @@ tables! {
     }
 
     program_move "[[program.move]]", "a coordinated move of every axis of a group to rest" {
-        GROUP "group": Text, Example("\"arm\""), "which group moves, where there are several; the moves of different groups go on at the same time";
+        GROUP "group": Text, Example("\"arm\""), "which group moves, where there are several; different groups move at the same time";
         TO "to": OneOrList(&POSITION), Example("[\"30 deg\"]"), "a target for every axis of the group in its order, or one for all: \"30 deg\"";
         VELOCITY "velocity": Values::Quantity(Quantity::FRACTION, SHARE), usually(1.0), "of the velocity limits";
         ACCELERATION "acceleration": Values::Quantity(Quantity::FRACTION, SHARE), usually(1.0), "of the acceleration and jerk limits";
@@ -274,7 +274,7 @@ tables! {
         DWELL "dwell": time(0.0, 3600.0), usually(0.0), "standstill after the move";
         SPEED "speed": OneOrList(&super::SPEED), Comment("[\"45 deg/s\"]"), "in place of `to`, for axes in mode \"pv\": go at this speed …";
         TORQUE "torque": OneOrList(&EFFORT), Comment("[\"2 Nm\"]"), "… or in mode \"pt\" push with this torque …";
-        FOR "for": time(0.0, 3600.0), Comment("\"2 s\""), "… for so long, and stop";
+        FOR "for": time(0.0, 3600.0), Comment("\"2 s\""), "… for this time, and stop";
     }
 
     telemetry "[telemetry]", "" {

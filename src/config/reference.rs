@@ -10,7 +10,7 @@ use super::bounds::Bounds;
 use super::key::{Key, Literal, Shown, Table, Values};
 use super::keys::{self, TABLES};
 
-/// What stands before the ranges.
+/// Head of the file, before the ranges.
 const HEAD: &str = r##"# Every key that a configuration can have. A line that ends in "# default" states what holds without it, so that it
 # may be left out.
 #
@@ -25,7 +25,7 @@ const HEAD: &str = r##"# Every key that a configuration can have. A line that en
 #                              rotary axis                       linear axis
 "##;
 
-/// What stands behind them.
+/// End of the head, behind the ranges.
 const TAIL: &str = r#"# A range of positions is a count of the drive at least. A stop from the highest speed takes 10 s at most: this is what a low
 # deceleration or jerk is measured by. The loops of "csv" and "cst" must be stable at the period of their bus, with a damping
 # ratio of 0.3 at least.
@@ -48,7 +48,7 @@ const RANGES: [RangeRow; 10] = [
     ("damping", |ranges| ranges.damping, ["Nm s/rad", "N s/m"]),
 ];
 
-/// The reference as a file.
+/// Returns the text of `configs/reference.toml`: every key of a configuration with its default.
 pub fn reference() -> String {
     let mut text = HEAD.to_owned();
     for (words, range, [rotary, linear]) in RANGES {
@@ -104,7 +104,7 @@ fn write_stops(text: &mut String) {
     stops().iter().for_each(|key| key.write_to(text));
 }
 
-/// The keys for what the data sheet of a drive of bit fields says of one motor.
+/// Returns the keys for numbers from the data sheet of a drive of bit fields.
 pub fn settings() -> Vec<Key> {
     let key = |(name, setting): (&'static str, Setting)| {
         let (sentence, example) =
@@ -114,7 +114,7 @@ pub fn settings() -> Vec<Key> {
     Setting::ALL.into_iter().map(key).collect()
 }
 
-/// The keys of `[stops]`.
+/// Returns the keys of `[stops]`.
 pub fn stops() -> Vec<Key> {
     let rules = Rule::ALL.into_iter().filter(|rule| *rule != Rule::Requested);
     let key = |rule: Rule| Key {
@@ -127,7 +127,7 @@ pub fn stops() -> Vec<Key> {
     rules.map(key).collect()
 }
 
-/// A number in the shorter of its two forms.
+/// Returns a number in the shorter of its two forms.
 fn shortest(number: f64) -> String {
     let (plain, exponential) = (number.to_string(), format!("{number:e}"));
     if plain.len() <= exponential.len() { plain } else { exponential }

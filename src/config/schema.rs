@@ -12,7 +12,7 @@ use super::reference::{settings, stops};
 /// A number with a unit, as in `"137 deg/s"`.
 const WITH_UNIT: &str = "^ *[-+−]?[0-9.][0-9._]*([eE][-+]?[0-9]+)? *(1/)?[^0-9 ].*$";
 
-/// The schema of configurations (JSON Schema, draft 7), for editors that complete and check TOML by one.
+/// Returns a JSON Schema (draft 7) of configurations, by which editors complete and check the keys.
 pub fn schema() -> String {
     let mut root = table(&keys::root::TABLE);
     for table in TABLES.iter().filter(|table| !table.header.is_empty()) {
@@ -21,32 +21,16 @@ pub fn schema() -> String {
     let mut stop_keys = object("categories of IEC 60204-1, by rule");
     add_keys(&mut stop_keys, &stops());
     set(&mut root, "stops", stop_keys);
-    // What belongs to the family of a drive may stand in the defaults and at an axis.
-    let own = at(&mut root, "/properties/defaults/properties/axis").map(Value::take).unwrap_or_default();
-    if let Some(axis) = at(&mut root, "/properties/axis/items") {
-        for (name, value) in own["properties"].as_object().into_iter().flatten() {
-            set(axis, name, value.clone());
-        }
+    // The keys of families may stand at an axis, too.
+    let of_axis = "/properties/axis/items";
+    if let Some(axis) = root.pointer_mut(of_axis) {
+        add_keys(axis, keys::family::TABLE.keys);
         add_keys(axis, &settings());
-        let mut defaults = axis.clone();
-        if let Some(defaults) = defaults.as_object_mut() {
-            defaults.remove("required");
-        }
-        if let Some(required) = axis.get_mut("required").and_then(Value::as_array_mut) {
-            required.clear();
-            required.push("name".into());
-        }
-        let mut holder = object("defaults of the axes");
-        set(&mut holder, "axis", defaults);
-        set(&mut root, "defaults", holder);
     }
+    root["properties"]["defaults"]["properties"]["axis"] = json!({ "$ref": format!("#{of_axis}") });
     root["$schema"] = "http://json-schema.org/draft-07/schema#".into();
     root["title"] = "takt configuration".into();
     format!("{root:#}\n")
-}
-
-fn at<'a>(root: &'a mut Value, pointer: &str) -> Option<&'a mut Value> {
-    root.pointer_mut(pointer)
 }
 
 /// Puts a table where its header says: `[cycle.missed_slots]`, `[[bus]]`, `[axis.limits]`.

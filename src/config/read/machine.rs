@@ -46,7 +46,7 @@ pub fn stream_delay(mut section: Section<'_>) -> StreamDelay {
     fixed.unwrap_or_default()
 }
 
-/// The value, or nothing where the word stands in its place.
+/// Returns the value; `None` for the word of the key.
 fn unless_word<T>(entry: &KeyedEntry<'_>, value: impl FnOnce() -> Option<T>) -> Option<T> {
     if entry.is_the_word() { None } else { value() }
 }
