@@ -64,7 +64,7 @@
 //! ```text
 //! error                               one error for a program that embeds takt
 //! controller                          the engine of a configuration, its life, its ports, the handles
-//! command                             what may be asked of a running controller, and how it is refused
+//! command                             one handle: what may be asked of a running controller, and how it is refused
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! faults                              faults on purpose
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
@@ -120,9 +120,9 @@ pub mod sleep_alignment;
 
 pub use channels::{Consumer, Producer, ring};
 pub use command::{
-    AxisProperties, CommandError, EventSource, LeaseError, LeaseHolder, MotionError, MotionId, MoveOptions,
-    PointRefusal, QuestionError, RecoveryError, Refused, RunningController, Stopped, StreamError,
-    TrajectoryProgress, WaitError,
+    AnyHandle, AxisProperties, Backend, Command, CommandError, EventSource, Events, LeaseError, LeaseHolder,
+    MotionError, MotionId, MoveOptions, PointRefusal, QuestionError, RecoveryError, Refused, Reply, Stopped,
+    StreamError, StreamHandle, TrajectoryProgress, WaitError,
 };
 pub use config::{Config, ConfigError};
 #[cfg(target_os = "linux")]
@@ -133,9 +133,8 @@ pub use controller::realtime_thread::{Begun, Ended};
 #[cfg(target_os = "linux")]
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
-    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, Events, GroupHandle,
-    Handle, Interrupt, LinePort, Outcome, SharedLine, StartFailure, StreamHandle, VirtualClock,
-    VirtualController, VirtualRun,
+    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, Handle, Interrupt,
+    LinePort, Outcome, OwnProcess, SharedLine, StartFailure, VirtualClock, VirtualController, VirtualRun,
 };
 pub use error::{Error, Result};
 pub use family::simulated_bus;

@@ -1,6 +1,6 @@
 //! Fuzzes both sides of the packets between a controller and clients in other processes.
 
-use takt_remote::packets::{Answer, Demand, Reply, Role, StopRequest};
+use takt_remote::packets::{Answer, Demand, Replied, Role, StopRequest};
 
 /// What is decoded is encoded to a packet that is decoded to the same. Nothing asks for more memory than the packet can fill.
 /// Returns whether it was decoded.
@@ -37,9 +37,9 @@ fn reply(packet: &[u8]) -> bool {
     assert_eq!(again.packet(), encoded);
     // Every refusal has words.
     match answer.reply {
-        Reply::Done | Reply::Motion(_) | Reply::Progress(_) | Reply::BringUpFailure(_) => {}
-        Reply::Refused(error) => drop(error.to_string()),
-        Reply::NotTaken(error) => assert!(!error.to_string().is_empty()),
+        Replied::Command(Ok(_)) | Replied::Points(Ok(())) => {}
+        Replied::Command(Err(error)) => assert!(!error.to_string().is_empty()),
+        Replied::Points(Err(error)) => assert!(!error.to_string().is_empty()),
     }
     true
 }

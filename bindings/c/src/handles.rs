@@ -9,11 +9,11 @@
 use std::ops::Deref;
 use std::ptr;
 use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use takt::{CallbackHandle, EventSource, RunningController};
+use takt::{AnyHandle, CallbackHandle, Events};
 
 use crate::errors::{Failure, takt_result};
 use crate::posix;
@@ -46,7 +46,7 @@ pub struct takt_callback {
 /// What a handle stands for.
 pub(crate) enum Entry {
     Scope(Scope),
-    Events(Mutex<Box<dyn EventSource>>, Arc<dyn RunningController>),
+    Events(Mutex<Events>, AnyHandle),
     Callback(CallbackHandle, Vec<usize>),
 }
 
@@ -225,12 +225,12 @@ impl takt_handle {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use takt::Config;
+    use takt::{Config, VirtualController};
 
     fn entry() -> Entry {
         let config = Config::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/first.toml").as_ref());
-        let controller = takt::VirtualController::start(&config.unwrap(), None).unwrap();
-        Entry::Events(Mutex::new(controller.event_source()), Arc::new(controller.handle()))
+        let controller = VirtualController::start(&config.unwrap(), None).unwrap();
+        Entry::Events(Mutex::new(controller.events()), controller.handle().into())
     }
 
     #[test]

@@ -76,8 +76,7 @@ pub unsafe extern "C" fn takt_move_to(
     options: *const takt_move_options,
     motion: *mut takt_motion,
 ) -> takt_result {
-    let act =
-        |scope: &Scope, targets: &[f64], options| scope.controller.begin_move(scope.target, targets, options);
+    let act = |scope: &Scope, targets: &[f64], options| scope.controller.move_with(targets, options);
     // SAFETY: the caller promises it.
     unsafe { move_axes(handle, (targets, axes, "targets"), options, motion, act) }
 }
@@ -94,9 +93,7 @@ pub unsafe extern "C" fn takt_move_by(
     options: *const takt_move_options,
     motion: *mut takt_motion,
 ) -> takt_result {
-    let act = |scope: &Scope, distances: &[f64], options| {
-        scope.controller.begin_move_by(scope.target, distances, options)
-    };
+    let act = |scope: &Scope, distances: &[f64], options| scope.controller.move_by(distances, options);
     // SAFETY: the caller promises it.
     unsafe { move_axes(handle, (distances, axes, "distances"), options, motion, act) }
 }
@@ -182,7 +179,7 @@ pub unsafe extern "C" fn takt_change_mode(
 ) -> takt_result {
     begin(handle, motion, |scope| {
         let mode = operation_mode(mode)?;
-        Ok(scope.controller.begin_mode_change(scope.target, mode))
+        Ok(scope.controller.change_mode(mode))
     })
 }
 

@@ -192,7 +192,7 @@ unsafe fn open(
         Owner::Real(controller) => controller.handle(),
         Owner::Virtual(controller) => controller.handle(),
     };
-    let scope = Scope::all(Arc::new(own.clone()), Some(own), Some(owner));
+    let scope = Scope::all(own.clone().into(), Some(own), Some(owner));
     let number = handles::open(Entry::Scope(scope))?;
     // SAFETY: the caller promises it.
     unsafe { border::put(handle, takt_handle { number }, "handle") }

@@ -1,14 +1,14 @@
 //! The axes that a handle stands for.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 
 use takt::rt::RequestTarget;
-use takt::{Controller, Handle, RunningController, VirtualController};
+use takt::{AnyHandle, Controller, Handle, VirtualController};
 
 /// Axes of a controller.
 pub(crate) struct Scope {
-    /// The controller, of this process or of another one.
-    pub controller: Arc<dyn RunningController>,
+    /// Commands them, in a controller of this process or of another one.
+    pub controller: AnyHandle,
     /// The same, if it is of this process.
     pub own: Option<Handle>,
     /// All axes of the controller, or those of one group.
@@ -21,20 +21,15 @@ pub(crate) struct Scope {
 
 impl Scope {
     /// All axes of a controller, which `own` is a handle of if it is of this process.
-    pub(crate) fn all(
-        controller: Arc<dyn RunningController>,
-        own: Option<Handle>,
-        owner: Option<Owner>,
-    ) -> Self {
-        let target = RequestTarget::All;
-        let axes = controller.axes_of(target);
+    pub(crate) fn all(controller: AnyHandle, own: Option<Handle>, owner: Option<Owner>) -> Self {
+        let (target, axes) = (controller.target(), controller.axis_numbers());
         Self { controller, own, target, axes, owner: Mutex::new(owner) }
     }
 
     /// Those of one of its groups.
     pub(crate) fn group(&self, target: RequestTarget) -> Self {
-        let axes = self.controller.axes_of(target);
-        let (controller, own) = (Arc::clone(&self.controller), self.own.clone());
+        let (controller, own) = (self.controller.of(target), self.own.clone());
+        let axes = controller.axis_numbers();
         Self { controller, own, target, axes, owner: Mutex::new(None) }
     }
 

@@ -225,7 +225,7 @@ pub unsafe extern "C" fn takt_read_state(handle: takt_handle, state: *mut takt_s
     border::carry_out(|| {
         let scope = handle.scope()?;
         let mut put = Ok(());
-        scope.controller.look_at_state(&mut |shown| {
+        scope.controller.look_at_state(|shown| {
             // SAFETY: the caller promises it.
             put = unsafe { put_state(&scope, shown, state) };
         });

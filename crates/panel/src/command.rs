@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use takt_rt::{OperationMode, RequestTarget};
 
 use takt::command::{
-    CommandError, MotionError, MotionId, MoveOptions, RecoveryError, Refused, RunningController, StreamError,
+    AnyHandle, CommandError, MotionError, MotionId, MoveOptions, RecoveryError, Refused, StreamError,
 };
 use takt::telemetry::{self, Machine};
 use takt::words;
@@ -304,18 +304,13 @@ pub fn target_of_axis(axis: usize, machine: &Machine) -> Result<RequestTarget, C
 }
 
 /// The set-points of the axes of a target, with one axis somewhere else.
-pub fn positions_with(
-    controller: &dyn RunningController,
-    target: RequestTarget,
-    axis: usize,
-    position: f64,
-) -> Vec<f64> {
+pub fn positions_with(controller: &AnyHandle, target: RequestTarget, axis: usize, position: f64) -> Vec<f64> {
     let state = controller.state();
     let of = |number: &usize| match *number == axis {
         true => position,
         false => state.axes().get(*number).map_or(0.0, |axis| axis.position_set),
     };
-    controller.axes_of(target).iter().map(of).collect()
+    controller.of(target).axis_numbers().iter().map(of).collect()
 }
 
 /// Begins a move, and waits whether it is refused at once.
@@ -323,12 +318,12 @@ pub fn positions_with(
 /// # Errors
 /// See [`CommandRefusal`]; nothing moves then.
 pub fn begin_move(
-    controller: &dyn RunningController,
+    controller: &AnyHandle,
     target: RequestTarget,
     positions: &[f64],
     options: MoveOptions,
 ) -> Result<MotionId, CommandRefusal> {
-    let motion = controller.begin_move(target, positions, options)?;
+    let motion = controller.of(target).move_with(positions, options)?;
     not_refused(controller, motion)
 }
 
@@ -336,7 +331,7 @@ pub fn begin_move(
 ///
 /// # Errors
 /// [`CommandRefusal::Motion`].
-pub fn not_refused(controller: &dyn RunningController, motion: MotionId) -> Result<MotionId, CommandRefusal> {
+pub fn not_refused(controller: &AnyHandle, motion: MotionId) -> Result<MotionId, CommandRefusal> {
     match controller.wait(motion, REFUSED_WITHIN) {
         Ok(()) | Err(MotionError::NotInTime) => Ok(motion),
         Err(error) => Err(error.into()),
@@ -347,7 +342,7 @@ pub fn not_refused(controller: &dyn RunningController, motion: MotionId) -> Resu
 ///
 /// # Errors
 /// See [`CommandRefusal`].
-pub fn change_mode(controller: &dyn RunningController, axis: usize, mode: i8) -> Result<(), CommandRefusal> {
+pub fn change_mode(controller: &AnyHandle, axis: usize, mode: i8) -> Result<(), CommandRefusal> {
     let mode = OperationMode::from_number(mode).ok_or(CommandRefusal::NoSuchMode { mode })?;
     let change = controller.change_axis_mode(axis, mode)?;
     not_refused(controller, change).map(drop)

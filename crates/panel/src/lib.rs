@@ -9,7 +9,7 @@
 //! ```
 //!
 //! All of them are ordinary threads beside the real-time one, and call the controller as the own program's threads do, by
-//! [`RunningController`](takt::RunningController). A stop is taken on the first thread and waits for nobody.
+//! [`AnyHandle`](takt::AnyHandle). A stop is taken on the first thread and waits for nobody.
 //!
 //! In the order to read: `access` (who may ask), `pages` (who is there, who commands), `command`, `motions` and `motion` (what is asked and
 //! how it ends), `view` (what is shown), `gate` (what both kinds of panel share), `server` (the routes), `connections` (sockets and their bounds).

@@ -15,7 +15,7 @@ use super::bench::{self, Bench, Worker, Workplace};
 use super::connections::{self, Bounds};
 use super::gate::{self, Visited};
 use super::server::{self, FrameSource, Server, TakeLease};
-use takt::command::RunningController;
+use takt::command::AnyHandle;
 
 /// How long pages are given to read that the panel has ended.
 const CLOSING_TIME: Duration = Duration::from_millis(150);
@@ -133,12 +133,11 @@ impl Listening {
     /// [`PanelError::Thread`].
     pub fn show(
         self,
-        controller: impl RunningController + 'static,
+        controller: impl Into<AnyHandle>,
         take_lease: Option<TakeLease>,
         frames: Option<FrameSource>,
     ) -> Result<Panel, PanelError> {
-        let controller = Arc::new(controller);
-        let server = Arc::new(Server::new(controller, self.access, take_lease, frames.is_some()));
+        let server = Arc::new(Server::new(controller.into(), self.access, take_lease, frames.is_some()));
         let mut threads = Threads::new(Arc::<Server>::clone(&server));
         let routes = server::routes(&server);
         let commands = server.commands();

@@ -24,7 +24,7 @@ use super::motions::{Motions, Problem};
 use super::page::{self, File};
 use super::pages::{Asked, PageNumber, PageRefusal};
 use super::view::{EventView, MachineView, Viewer, time_ms};
-use takt::command::{CommandError, RunningController, WaitError};
+use takt::command::{AnyHandle, CommandError, WaitError};
 use takt::telemetry::missed_slots::MissedSlotsSoFar;
 use takt::telemetry::{FrameFeed, OnBus};
 use takt_tools::monitor::BusDecoder;
@@ -50,7 +50,7 @@ pub struct FrameSource {
 /// What the threads of the panel share.
 pub struct Server {
     gate: Gate,
-    controller: Arc<dyn RunningController>,
+    controller: AnyHandle,
     take_lease: Option<TakeLease>,
     motions: Motions,
     viewer: Mutex<Viewer>,
@@ -86,7 +86,7 @@ impl Visited for Server {
             let pages = self.gate.pages();
             (pages.commander(), pages.count())
         };
-        message("state", &locked(&self.viewer).view(&*self.controller, commander, count, time_ms()))
+        message("state", &locked(&self.viewer).view(&self.controller, commander, count, time_ms()))
     }
 
     fn end(&self) {
@@ -108,7 +108,7 @@ enum Errand {
 
 impl Server {
     pub fn new(
-        controller: Arc<dyn RunningController>,
+        controller: AnyHandle,
         access: Access,
         take_lease: Option<TakeLease>,
         has_frames: bool,
@@ -116,7 +116,7 @@ impl Server {
         let (commands, commands_out) = sync_channel(COMMANDS_WAITING);
         Self {
             gate: Gate::new(access),
-            motions: Motions::new(Arc::clone(&controller)),
+            motions: Motions::new(controller.clone()),
             controller,
             take_lease,
             viewer: Mutex::default(),
@@ -136,7 +136,7 @@ impl Server {
 
     /// Keeps the events until the panel or the controller ends.
     pub fn collect_events(&self) {
-        let mut source = self.controller.event_source();
+        let mut source = self.controller.events();
         let (mut missed, mut missed_slots) = (0, MissedSlotsSoFar::default());
         while !self.gate.has_ended() {
             match source.wait(LOOK) {
@@ -241,7 +241,7 @@ pub fn routes(server: &Arc<Server>) -> Router {
 }
 
 async fn machine(State(server): State<Arc<Server>>) -> Response {
-    json_response(StatusCode::OK, &MachineView::of(&*server.controller, server.has_frames))
+    json_response(StatusCode::OK, &MachineView::of(&server.controller, server.has_frames))
 }
 
 async fn frames(State(server): State<Arc<Server>>, request: Request) -> Result<Response, Problematic> {

@@ -8,7 +8,7 @@ use takt_rt::{
 };
 
 use super::pages::PageNumber;
-use takt::command::RunningController;
+use takt::command::AnyHandle;
 use takt::telemetry::{Machine, words};
 use takt::words::Words;
 
@@ -54,7 +54,7 @@ struct BusDescriptionView {
 
 impl MachineView {
     /// Of a controller.
-    pub fn of(controller: &dyn RunningController, has_frames: bool) -> Self {
+    pub fn of(controller: &AnyHandle, has_frames: bool) -> Self {
         let machine = controller.machine();
         let axes = machine.axes.iter().enumerate().map(|(number, axis)| {
             let limits = controller.axis_properties(number).map(|axis| axis.limits);
@@ -71,12 +71,10 @@ impl MachineView {
                 torque: limit(|limits| limits.torque),
             }
         });
-        let all = || {
-            vec![GroupDescriptionView { name: String::new(), axes: controller.axes_of(RequestTarget::All) }]
-        };
+        let all = || vec![GroupDescriptionView { name: String::new(), axes: controller.axis_numbers() }];
         let group = |(number, name): (u8, &String)| GroupDescriptionView {
             name: name.clone(),
-            axes: controller.axes_of(RequestTarget::Group(number)),
+            axes: controller.of(RequestTarget::Group(number)).axis_numbers(),
         };
         let bus = |bus: &takt::telemetry::BusDescription| BusDescriptionView {
             name: bus.name.clone(),
@@ -211,7 +209,7 @@ impl Viewer {
     /// The view of a state, at this time of day.
     pub fn view(
         &mut self,
-        controller: &dyn RunningController,
+        controller: &AnyHandle,
         commander: Option<PageNumber>,
         pages: usize,
         time_ms: u64,

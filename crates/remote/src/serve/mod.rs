@@ -23,7 +23,7 @@ use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use takt::command::RunningController;
+use takt::command::AnyHandle;
 use takt_rt::RequestTarget;
 
 use crate::layout::Description;
@@ -143,7 +143,7 @@ pub struct Server {
 /// # Errors
 /// See [`ServeError`].
 pub fn serve(
-    controller: impl RunningController + 'static,
+    controller: impl Into<AnyHandle>,
     name: &str,
     options: ServeOptions,
 ) -> Result<Server, ServeError> {
@@ -173,12 +173,12 @@ impl Claim {
     }
 
     /// See [`serve()`].
-    pub fn serve(self, controller: impl RunningController + 'static) -> Result<Server, ServeError> {
-        let Self { claimed, options } = self;
+    pub fn serve(self, controller: impl Into<AnyHandle>) -> Result<Server, ServeError> {
+        let (Self { claimed, options }, controller) = (self, controller.into());
         let shown = ShownWriter::new(&description(&controller))?;
         let memory = shown.memory();
         let listener = claimed.listen(options.mode)?;
-        let served = Arc::new(Served::new(Arc::new(controller), options.lease));
+        let served = Arc::new(Served::new(controller, options.lease));
         let (wake, waker) = nix::unistd::pipe().map_err(io::Error::from)?;
         let mut server = Server { served: Arc::clone(&served), waker: Some(waker), threads: vec![] };
         // The first state is there before a client can connect.
@@ -208,11 +208,11 @@ impl Drop for Server {
     }
 }
 
-fn description(controller: &dyn RunningController) -> Description {
+fn description(controller: &AnyHandle) -> Description {
     let machine = controller.machine().clone();
     let groups = (0u8..)
         .zip(&machine.groups)
-        .map(|(group, _)| controller.axes_of(RequestTarget::Group(group)))
+        .map(|(group, _)| controller.of(RequestTarget::Group(group)).axis_numbers())
         .collect();
     let axes = (0..machine.axes.len()).filter_map(|axis| controller.axis_properties(axis)).collect();
     Description { machine, groups, axes }

@@ -1,10 +1,10 @@
 //! What the threads share.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use takt::command::RunningController;
+use takt::command::AnyHandle;
 use takt_rt::{Nanoseconds, RequestTarget};
 
 use super::lease::Lease;
@@ -12,14 +12,14 @@ use crate::layout::STOP_WORDS;
 
 /// A controller and who commands it.
 pub struct Served {
-    pub controller: Arc<dyn RunningController>,
+    pub controller: AnyHandle,
     pub stops: Stops,
     lease: Mutex<Lease>,
     has_ended: AtomicBool,
 }
 
 impl Served {
-    pub fn new(controller: Arc<dyn RunningController>, lease: Duration) -> Self {
+    pub fn new(controller: AnyHandle, lease: Duration) -> Self {
         Self {
             controller,
             stops: Stops::default(),
