@@ -95,10 +95,11 @@ fn a_handle_of_any_controller_commands_a_group_and_names_the_others() {
     assert_eq!((arm.target(), arm.axis_numbers()), (RequestTarget::Group(0), vec![0, 1, 2]));
     let motion = arm.move_to(&[0.1, -0.1, 0.1]).unwrap();
     assert_eq!(arm.wait(motion, LONG), Ok(()));
-    arm.disable().unwrap();
-    arm.wait_for(Phase::Disabled, LONG).unwrap();
     let gripper = arm.group("gripper").unwrap();
-    assert_eq!((gripper.axis_numbers(), gripper.group_state().phase), (vec![3], Phase::Holding));
+    assert_eq!(gripper.axis_numbers(), [3]);
+    gripper.disable().unwrap();
+    gripper.wait_for(Phase::Disabled, LONG).unwrap();
+    assert_eq!(arm.group_state().phase, Phase::Holding);
     assert_eq!(arm.of(RequestTarget::All).axis_numbers(), [0, 1, 2, 3]);
     assert_eq!(controller.finish(), Outcome::Finished);
 }

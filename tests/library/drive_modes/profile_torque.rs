@@ -197,7 +197,7 @@ fn firmware_without_interpolated_position_is_named() {
     let outcome = world.run_to_the_end(|_| ());
     let Outcome::BringUpFailed(error) = outcome else { panic!("{outcome:?}") };
     let text = error.to_string();
-    for part in ["firmware", "interpolated position", "6502", "mode = \"csp\""] {
+    for part in ["firmware", "6061:00 (modes of operation display): expected 7", "6502", "mode = \"csp\""] {
         assert!(text.contains(part), "{part} is not in: {text}");
     }
 }

@@ -171,7 +171,6 @@ fn the_monitor_has_the_frames_of_a_running_controller_with_their_meaning_while_a
     };
     find("181#", &["<", "181#", "joint1", "statusword"]);
     find("joint6", &["joint6"]);
-    find("状态字", &["<", "joint1", "statusword", "状态字"]);
     find("SYNC", &[">", "080#"]);
     let last = frames(&json!({ "after": 0, "filter": "there is no such frame" }));
     assert!(last["frames"].as_array().unwrap().is_empty() && last["last"].as_u64().unwrap() > 0, "{last}");
