@@ -131,7 +131,7 @@ fn a_second_of_drives_made_from_a_data_sheet_takes_no_heap_memory() {
 
 fn live_without_memory(drive: fn(u8) -> Box<dyn Drive>) {
     let before = heap().calls;
-    let drives = [1, 2, 3].map(drive_with_quirks).into();
+    let drives = [1, 2, 3].map(drive).into();
     let mut bus =
         SimulatedBus::with_drives(WireBitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
     let built = heap().calls;

@@ -222,7 +222,7 @@ mod tests {
     #[test]
     fn a_journal_is_not_whole_if_a_chunk_of_the_file_is_damaged() {
         let block = block();
-        let mut file = file_of(recording::JOURNAL_VERSION, &[block.clone()]);
+        let mut file = file_of(recording::JOURNAL_VERSION, std::slice::from_ref(&block));
         assert_eq!(read(&file).defect, None);
         let at = file.windows(block.len()).position(|bytes| bytes == block).unwrap();
         file[at] ^= 1;
