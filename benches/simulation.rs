@@ -3,15 +3,17 @@
 #![allow(missing_docs, reason = "made by the macros of the framework")]
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::config::quirks;
+use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
+use takt::sim::homing_switches::ReferenceSwitches;
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
+use takt_wire::canopen::eds;
 use takt_wire::wire_length::WireLength;
 
 fn drive(node: u8) -> Box<dyn Drive> {
-    Box::new(ErobJoint::new(ErobParameters {
-        node,
+    let axis = Cia402AxisParameters {
         joint: JointParameters {
             inertia: 0.4,
             viscous_friction: 1.5,
@@ -25,13 +27,19 @@ fn drive(node: u8) -> Box<dyn Drive> {
         rated_torque: 31.0,
         peak_torque: 56.0,
         highest_velocity: 4.0,
+        switches: ReferenceSwitches::default(),
+        end_stops: None,
+    };
+    let parameters = Cia402Parameters {
+        sheet: eds::load("configs/eds/erob-canopen.eds".as_ref()).unwrap().dictionary,
+        node,
+        quirks: quirks::load("drives/erob-canopen.toml".as_ref()).unwrap(),
+        axes: vec![axis],
         power_up_ns: 0,
         feedback_delay_ns: 20_000,
-        has_battery: true,
-        has_interpolated_position: false,
-        is_upload_segmented: false,
         seed: 7,
-    }))
+    };
+    Box::new(Cia402Drive::new(parameters).unwrap())
 }
 
 /// A bus at 1 Mbit/s whose drives follow CSP set-points of six bytes.

@@ -31,7 +31,7 @@ pub fn run(arm: &Handle) -> takt::Result {
     arm.set_speed(motion, 0.5)?;
     arm.pause(motion)?;
     arm.advance(200)?;
-    if let Some(progress) = arm.trajectory_progress(motion) {
+    if let Some(progress) = arm.trajectory_progress(motion)? {
         println!("paused near {:.2} s of {:.2} s", progress.path_s, progress.of_s);
     }
     arm.resume(motion)?;

@@ -30,6 +30,7 @@
 //!
 //! - [`config`]: TOML to checked plain data in SI units; what is wrong is shown at its line.
 //! - [`trajectory`]: points with times, checked as a whole before they are carried out.
+//! - [`words`](mod@words): a sentence as a template and its fields, for pages in other languages.
 //! - [`schedule`]: whether everything fits on the buses in the worst case.
 //! - [`telemetry`]: the logger that empties the rings: statistics, recordings, the report.
 //! - [`sim`]: buses and drives that behave like the manuals and the field notes say, quirks included.
@@ -62,8 +63,8 @@
 //!
 //! ```text
 //! error                               one error for a program that embeds takt
-//! //! controller                          the engine of a configuration, its life, its ports, the handles
-//! command                             what may be asked of a running controller, and how it is refused
+//! controller                          the engine of a configuration, its life, its ports, the handles
+//! command                             one handle: what may be asked of a running controller, and how it is refused
 //! telemetry schedule                  what a run leaves behind; whether everything fits on the buses
 //! faults                              faults on purpose
 //! family                              one folder a family of drives: everything that takt knows of it outside the cycle
@@ -72,7 +73,7 @@
 //! config                              TOML to checked plain data in SI units
 //! procedure                           the engine of bring-up, shutdown and commissioning, without I/O
 //! channels                            the lock-free channels to the real-time thread
-//! trajectory packet sleep_alignment monotonic_clock
+//! trajectory sleep_alignment monotonic_clock words
 //! ```
 //!
 //! A controller of another process (`takt-remote`), the tools, the panel and the program `takt` stand on this crate, as crates of their
@@ -96,6 +97,7 @@ pub mod link;
 pub mod schedule;
 pub mod telemetry;
 pub mod trajectory;
+pub mod words;
 
 // What the other crates of this project stand on. It may change in any release.
 #[doc(hidden)]
@@ -112,16 +114,15 @@ pub mod journal;
 pub mod procedure;
 
 mod monotonic_clock;
-mod packet;
 #[cfg(target_os = "linux")]
 #[doc(hidden)]
 pub mod sleep_alignment;
 
 pub use channels::{Consumer, Producer, ring};
 pub use command::{
-    AxisProperties, CommandError, EventSource, LeaseError, LeaseHolder, MotionError, MotionId, MoveOptions,
-    PointRefusal, QuestionError, RecoveryError, Refused, RunningController, Stopped, StreamError,
-    TrajectoryProgress, WaitError,
+    AnyHandle, AxisProperties, Backend, Command, CommandError, EventSource, Events, LeaseError, LeaseHolder,
+    MotionError, MotionId, MoveOptions, PointRefusal, QuestionError, RecoveryError, Refused, Reply, Stopped,
+    StreamError, StreamHandle, TrajectoryProgress, WaitError,
 };
 pub use config::{Config, ConfigError};
 #[cfg(target_os = "linux")]
@@ -132,9 +133,8 @@ pub use controller::realtime_thread::{Begun, Ended};
 #[cfg(target_os = "linux")]
 pub use controller::session::{Session, SessionError, SessionOptions};
 pub use controller::{
-    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, Events, GroupHandle,
-    Handle, Interrupt, LinePort, Outcome, SharedLine, StartFailure, StreamHandle, VirtualClock,
-    VirtualController, VirtualRun,
+    CallbackCommand, CallbackHandle, CallbackOptions, CallbackState, CallbackTimes, Handle, Interrupt,
+    LinePort, Outcome, OwnProcess, SharedLine, StartFailure, VirtualClock, VirtualController, VirtualRun,
 };
 pub use error::{Error, Result};
 pub use family::simulated_bus;

@@ -14,7 +14,7 @@ const read = (...parts) => readFileSync(path.join(...parts), "utf8");
 const panel = path.join(root, "crates/panel/src/page");
 
 const SCRIPTS = {
-  ...Object.fromEntries(["connection", "texts", "frame", "units", "panel", "axes", "motion", "monitor", "plots"].map((name) => [`${name}.js`, read(panel, `${name}.js`)])),
+  ...Object.fromEntries(["connection", "texts", "chinese", "frame", "units", "panel", "axes", "motion", "monitor", "plots"].map((name) => [`${name}.js`, read(panel, `${name}.js`)])),
   "takt.mjs": read(moduleFolder, "takt.mjs"),
   "arm.js": read(here, "arm.js"),
   "demo.js": read(here, "demo.js"),

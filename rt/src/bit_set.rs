@@ -1,6 +1,6 @@
 //! A set of small numbers, one bit each.
 
-use crate::record::{MAX_AXES, MAX_BUSES};
+use crate::capacity::{MAX_AXES, MAX_BUSES};
 
 const _: () = assert!(MAX_AXES <= u32::BITS as usize, "each axis has a bit");
 const _: () = assert!(MAX_BUSES <= u32::BITS as usize, "each bus has a bit");

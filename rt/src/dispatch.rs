@@ -3,9 +3,9 @@
 
 use arrayvec::ArrayVec;
 
-use crate::axis::SenderByte;
+use crate::capacity::MAX_AXES;
 use crate::frame::{Frame, FrameFormat, FrameKind, Id};
-use crate::record::MAX_AXES;
+use crate::sender_byte::SenderByte;
 
 /// What a received frame is to the engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

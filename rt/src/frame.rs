@@ -39,6 +39,14 @@ impl Id {
         Self((function as u32 & 0x780) | (node as u32 & 0x7F))
     }
 
+    /// Returns `true` if one of the constructors can make it. An identifier that was decoded from bytes need not be such.
+    #[cfg(feature = "checkpoint")]
+    pub fn is_valid(self) -> bool {
+        let number = self.value();
+        let made = if self.is_extended() { Self::extended(number) } else { Self::base(number) };
+        made == Ok(self)
+    }
+
     /// The number of the identifier. An 11-bit and a 29-bit identifier can have the same number.
     pub const fn value(self) -> u32 {
         self.0 & EXTENDED_MASK
@@ -226,15 +234,13 @@ impl Frame {
     /// Returns `true` if one of the constructors can make it. A frame that was decoded from bytes of another process need not be such.
     #[cfg(feature = "checkpoint")]
     pub fn is_valid(&self) -> bool {
-        let number = self.id.value();
-        let id = if self.id.is_extended() { Id::extended(number) } else { Id::base(number) };
-        let made = id.and_then(|id| match self.kind {
-            FrameKind::Data => Self::data(id, self.payload()),
-            FrameKind::Remote => Self::remote(id, self.length),
-            FrameKind::Fd => Self::fd(id, self.payload(), false),
-            FrameKind::FdBitRateSwitch => Self::fd(id, self.payload(), true),
-        });
-        made.is_ok_and(|made| made == *self && made.data == self.data)
+        let made = match self.kind {
+            FrameKind::Data => Self::data(self.id, self.payload()),
+            FrameKind::Remote => Self::remote(self.id, self.length),
+            FrameKind::Fd => Self::fd(self.id, self.payload(), false),
+            FrameKind::FdBitRateSwitch => Self::fd(self.id, self.payload(), true),
+        };
+        self.id.is_valid() && made.is_ok_and(|made| made == *self && made.data == self.data)
     }
 
     /// The identifier.

@@ -3,12 +3,13 @@
 
 use crate::answers::Answers;
 use crate::axis::OffCycleReport;
+use crate::capacity::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::cia402;
 use crate::frame::Frame;
 use crate::motion_reports::MotionReports;
 use crate::phase::Phase;
 use crate::port::{BusHealth, Received};
-use crate::record::{CycleRecord, Event, MAX_AXES, MAX_BUSES, MAX_GROUPS};
+use crate::record::{CycleRecord, Event};
 use crate::request::{RequestEnvelope, TrajectoryId};
 use crate::source::{
     AxisTarget, CallbackCycle, CallbackId, CallbackReturn, StreamReport, StreamSample, TrajectorySample,

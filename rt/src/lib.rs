@@ -36,6 +36,7 @@ mod answers;
 mod axis;
 mod bit_fields;
 mod bit_set;
+mod capacity;
 #[cfg(feature = "checkpoint")]
 mod checkpoint;
 mod cia402;
@@ -63,6 +64,7 @@ mod record;
 mod recorded_numbers;
 mod rejection;
 mod request;
+mod sender_byte;
 pub mod slcan;
 mod source;
 mod stop;
@@ -77,8 +79,8 @@ mod wire;
 pub use answers::{Answer, Answers};
 pub use axis::{
     Axis, AxisParameters, AxisParametersError, CommandPdo, Exchange, FeedForward, FeedbackSince, Jump,
-    ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, PositionCounter, SenderByte,
-    Supervision, TorqueLimits,
+    ModeChanges, ModeCondition, NoFeedback, OffCycleReport, Pdo, Pdos, PositionCounter, Supervision,
+    TorqueLimits,
 };
 pub use bit_fields::{
     BesideTarget, BitField, BitRange, ByteOrder, CodeRange, CommandTargets, CommandValue, CommandValues,
@@ -88,6 +90,7 @@ pub use bit_fields::{
     ReplyValue, ReplyValues, RunningMode, SetUpAgain, Setting, StateCodes,
 };
 pub use bit_set::BitSet;
+pub use capacity::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 #[cfg(feature = "checkpoint")]
 pub use checkpoint::CheckpointError;
 pub use cia402::{Command, DriveState, Goal, OperationMode, controlword, statusword};
@@ -112,15 +115,13 @@ pub use pdo::{
 pub use phase::Phase;
 pub use port::{BusHealth, BusPort, BusState, Clock, Outgoing, RECEIVE_BATCH, ReceiveBatch, Received, Wake};
 pub use profile::ProfileTarget;
-pub use record::{
-    AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, MAX_AXES, MAX_BUSES, MAX_GROUPS,
-    RecordedStop,
-};
+pub use record::{AxisRecord, CycleRecord, CycleTiming, Event, EventKind, GroupRecord, RecordedStop};
 pub use rejection::{RejectReason, RequestError};
 pub use request::{
     AxisProcessData, ExecutionStart, MappedPdo, ModeChange, Move, ProfileMove, Request, RequestEnvelope,
     RequestId, RequestKind, RequestTarget, TrajectoryId,
 };
+pub use sender_byte::SenderByte;
 pub use source::{
     AxisPoint, AxisTarget, CallbackCycle, CallbackId, CallbackOutcome, CallbackReturn, CallbackRun, Follow,
     LookAhead, LookAheadParameters, POINTS_AT_MOST, PathTime, PointError, PointRole, Polynomial,

@@ -1,6 +1,6 @@
 //! What became of the motions that were begun last: each motion by the request that began it.
 
-use crate::record::{MAX_AXES, MAX_GROUPS};
+use crate::capacity::{MAX_AXES, MAX_GROUPS};
 use crate::request::RequestId;
 use crate::stop::StopReason;
 

@@ -26,6 +26,7 @@ pub trait Clock {
 
 /// How a wait ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Wake {
     /// The present, at or after the deadline.
     pub now_ns: Nanoseconds,
@@ -64,7 +65,7 @@ pub trait BusPort {
     /// and not kept.
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize;
 
-    /// As [`BusPort::send`] on each of these ports (at most [`MAX_BUSES`](crate::record::MAX_BUSES)), in as few calls of
+    /// As [`BusPort::send`] on each of these ports (at most [`MAX_BUSES`](crate::capacity::MAX_BUSES)), in as few calls of
     /// the system as they can share: then the frames of several buses leave closer together.
     fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>])
     where

@@ -1,5 +1,6 @@
 //! What one cycle leaves behind: a record of fixed size, copied to the logger through a lock-free ring.
 
+use crate::capacity::{MAX_AXES, MAX_GROUPS};
 use crate::cia402::{self, OperationMode};
 use crate::fault::Rule;
 use crate::phase::Phase;
@@ -10,13 +11,6 @@ use crate::stop::StopReason;
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
 use crate::watch::TimingLevel;
-
-/// The most axes one controller moves.
-pub const MAX_AXES: usize = 32;
-/// The most buses one controller owns.
-pub const MAX_BUSES: usize = 16;
-/// The most groups that the axes of one controller are in.
-pub const MAX_GROUPS: usize = 8;
 
 /// The times of one cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! What can be asked of the controller and of its groups. Why it may be rejected is in `rejection`.
 
+use crate::capacity::MAX_AXES;
 use crate::cia402::OperationMode;
 use crate::frame::Id;
 use crate::pdo::{MAX_OBJECTS, MAX_PDOS, MappedObject, TransmissionType};
 use crate::profile::ProfileTarget;
-use crate::record::MAX_AXES;
 use crate::source::CallbackRun;
 use crate::stop_category::StopCategory;
 use crate::time::Nanoseconds;
@@ -16,6 +16,7 @@ pub struct RequestId(pub u64);
 
 /// A request with the number by which whoever asked finds out what came of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct RequestEnvelope<const AXES: usize = MAX_AXES> {
     /// The number.
     pub id: RequestId,
@@ -40,6 +41,7 @@ pub enum RequestTarget {
 
 /// What can be asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 #[expect(clippy::large_enum_variant, reason = "there is no heap to put the large ones on")]
 pub enum Request<const AXES: usize = MAX_AXES> {
     /// Begin to send SYNC (`true`) or cease (`false`).
@@ -151,6 +153,7 @@ pub struct TrajectoryId(pub u64);
 
 /// When a trajectory begins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub enum ExecutionStart {
     /// In this cycle. The group must hold its position, and the trajectory must begin there.
     Now,
@@ -167,6 +170,7 @@ pub enum ExecutionStart {
 
 /// The process data of one axis, to replace what it was set up with.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct AxisProcessData {
     /// The axis.
     pub axis: u8,
@@ -180,6 +184,7 @@ pub struct AxisProcessData {
 
 /// A PDO by its mapping parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct MappedPdo {
     /// The identifier.
     pub id: Id,
@@ -208,6 +213,7 @@ pub struct Move<const AXES: usize = MAX_AXES> {
 
 /// Other modes of operation for the axes of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ModeChange<const AXES: usize = MAX_AXES> {
     /// The mode for each axis, by its number; `None` leaves it as it is. What is there for axes of other groups does not count.
     pub modes: [Option<OperationMode>; AXES],
@@ -215,6 +221,7 @@ pub struct ModeChange<const AXES: usize = MAX_AXES> {
 
 /// A target for one drive in a profile mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct ProfileMove {
     /// The axis.
     pub axis: u8,

@@ -11,7 +11,7 @@ use super::trajectories::NumberedTrajectory;
 const ENTRIES: usize = 1024;
 
 /// Something that the real-time thread has taken from the host.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode)]
 #[expect(clippy::large_enum_variant, reason = "the real-time thread puts nothing on the heap")]
 pub enum HostInput {
     /// A request.
@@ -52,7 +52,7 @@ pub enum HostInput {
 }
 
 /// An input with the cycle that took it, counted from 0.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode)]
 pub struct JournalEntry {
     /// The cycle.
     pub cycle: u64,

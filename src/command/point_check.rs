@@ -3,19 +3,20 @@
 use takt_rt::{AxisPoint, OperationMode};
 
 use crate::config::{Axis, Control};
+use crate::words;
+use crate::words::Words;
 
 /// Why an axis does not take a point. rad and N·m, or m and N.
 #[derive(Clone, Copy, Debug, PartialEq, bitcode::Encode, bitcode::Decode, thiserror::Error)]
+#[error("{}", self.words())]
 #[non_exhaustive]
 pub enum PointRefusal {
     /// A number is infinite or none.
-    #[error("the {} and must be a finite number", not_finite(.value))]
     NotFinite {
         /// What is given.
         value: AxisPoint,
     },
     /// A number is too large to be computed with. Positions and velocities beyond the limits of the axis are led to within them, up to it.
-    #[error("a number is too large: {number}, beyond {largest}")]
     TooLarge {
         /// What is given.
         number: f64,
@@ -23,18 +24,13 @@ pub enum PointRefusal {
         largest: f64,
     },
     /// A torque or an impedance needs a loop that is closed here.
-    #[error("a torque or an impedance needs mode \"cst\", and the axis is in {mode:?}")]
     NoTorqueInMode {
         /// Its mode.
         mode: OperationMode,
     },
     /// The drive closes the loops, and takes no torque beside its target.
-    #[error(
-        "a torque is fed forward, and the drive takes none: that needs feed_forward = \"torque\", or mode \"cst\""
-    )]
     NoFeedForward,
     /// A torque is beyond the limit of the axis.
-    #[error("a torque of {torque} is beyond the limit of {limit}")]
     Torque {
         /// What is given.
         torque: f64,
@@ -42,7 +38,6 @@ pub enum PointRefusal {
         limit: f64,
     },
     /// A stiffness is negative, or more than the axis allows.
-    #[error("a stiffness of {stiffness} is not within 0 to {limit} (stiffness_max)")]
     Stiffness {
         /// What is given.
         stiffness: f64,
@@ -50,13 +45,47 @@ pub enum PointRefusal {
         limit: f64,
     },
     /// A damping is negative, or more than the axis allows.
-    #[error("a damping of {damping} is not within 0 to {limit} (damping_max)")]
     Damping {
         /// What is given.
         damping: f64,
         /// What the axis allows.
         limit: f64,
     },
+}
+
+impl PointRefusal {
+    /// The sentence, for a page in another language.
+    pub fn words(&self) -> Words {
+        match *self {
+            Self::NotFinite { value } => {
+                let first = numbers(&value).find(|(_, number)| !number.is_finite());
+                let (name, number) = first.unwrap_or(("point", f64::NAN));
+                words!("the {name} is {number}, and must be a finite number", name = Words::from(name), number)
+            }
+            Self::TooLarge { number, largest } => {
+                words!("a number is too large: {number}, beyond {largest}", number, largest)
+            }
+            Self::NoTorqueInMode { mode } => words!(
+                "a torque or an impedance needs mode \"cst\", and the axis is in {mode}",
+                mode = format!("{mode:?}")
+            ),
+            Self::NoFeedForward => {
+                "a torque is fed forward, and the drive takes none: that needs feed_forward = \"torque\", or mode \"cst\""
+                    .into()
+            }
+            Self::Torque { torque, limit } => {
+                words!("a torque of {torque} is beyond the limit of {limit}", torque, limit)
+            }
+            Self::Stiffness { stiffness, limit } => words!(
+                "a stiffness of {stiffness} is not within 0 to {limit} (stiffness_max)",
+                stiffness,
+                limit
+            ),
+            Self::Damping { damping, limit } => {
+                words!("a damping of {damping} is not within 0 to {limit} (damping_max)", damping, limit)
+            }
+        }
+    }
 }
 
 /// The largest number of a point. What is computed from numbers up to it stays finite.
@@ -78,12 +107,6 @@ fn numbers(point: &AxisPoint) -> impl Iterator<Item = (&'static str, f64)> {
         [Some(("position", motion.position)), velocity, acceleration].into_iter().flatten()
     });
     of_motion.chain(others)
-}
-
-/// The first number of a point that is infinite or none, in words.
-fn not_finite(point: &AxisPoint) -> String {
-    let first = numbers(point).find(|(_, number)| !number.is_finite());
-    first.map_or_else(|| "point is given".to_owned(), |(name, number)| format!("{name} is {number},"))
 }
 
 /// Checks that an axis takes a point while it is commanded so: in the mode that it starts in, or in one that it has been changed to.

@@ -1,7 +1,9 @@
 //! What quirk files and descriptions of bit fields have in common: how they are read, the drive that they are about, and its errors in
 //! words.
 
+use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use takt_wire::described_drive::{Confirmation, DescribedDrive};
 use takt_wire::printable::printable_path;
@@ -50,29 +52,52 @@ pub(super) fn drive(section: &mut Section<'_>) -> Option<DescribedDrive> {
     })
 }
 
-/// Reads the error codes in words. Their keys are the codes, so this table has no fixed keys. `allowed` says how `code` wants them.
-pub(super) fn errors(
-    entry: Option<Entry<'_>>,
-    problems: &Problems,
-    code: impl Fn(&str) -> Option<u16>,
-    allowed: &str,
-) -> Option<Vec<(u16, String)>> {
+/// Reads the table of this name whose keys are values themselves, such as error codes, so that it has no fixed keys. `allowed` says how
+/// `read_key` wants them.
+pub(super) fn keyed<'a, K: Ord, T>(
+    (name, entry): (&str, Option<Entry<'a>>),
+    problems: &'a Problems,
+    (read_key, allowed): (impl Fn(&str) -> Option<K>, &str),
+    read: impl Fn(&Entry<'a>) -> Option<T>,
+) -> Option<Vec<(K, T)>> {
     let Some(entry) = entry else { return Some(vec![]) };
-    let mut errors = vec![];
+    let mut pairs = vec![];
     let mut are_right = true;
     for (key, value) in entry.table()? {
-        let spot = Entry::new(format!("errors.{}", key.get_ref()), value, problems);
-        let code = code(key.get_ref());
-        if code.is_none() {
+        let spot = Entry::new(format!("{name}.{}", key.get_ref()), value, problems);
+        let key_value = read_key(key.get_ref());
+        if key_value.is_none() {
             spot.report_range(format!("the key {:?}", key.get_ref()), allowed.to_owned());
         }
-        match (code, spot.text()) {
-            (Some(code), Some(words)) => errors.push((code, words.to_owned())),
+        match (key_value, read(&spot)) {
+            (Some(key), Some(value)) => pairs.push((key, value)),
             _ => are_right = false,
         }
     }
-    errors.sort();
-    are_right.then_some(errors)
+    pairs.sort_by(|(one, _), (other, _)| one.cmp(other));
+    are_right.then_some(pairs)
+}
+
+/// Reads the table `[errors]`: error codes in words.
+pub(super) fn errors<'a>(
+    entry: Option<Entry<'a>>,
+    problems: &'a Problems,
+    code: impl Fn(&str) -> Option<u16>,
+    allowed: &str,
+) -> Option<Vec<(u16, String)>> {
+    keyed(("errors", entry), problems, (code, allowed), |entry| entry.text().map(str::to_owned))
+}
+
+/// The same text for the rest of the process: a file is read few times, and its names are compared and shown everywhere.
+pub(super) fn interned(text: &str) -> &'static str {
+    static TEXTS: Mutex<BTreeSet<&'static str>> = Mutex::new(BTreeSet::new());
+    let mut texts = TEXTS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = texts.get(text) {
+        return known;
+    }
+    let text: &'static str = text.to_owned().leak();
+    texts.insert(text);
+    text
 }
 
 /// An entry that may be absent: `Some(None)` then, and `None` when it is wrong.

@@ -25,6 +25,8 @@ enum Facts {
     OfFamily(&'static DriveFacts),
     /// They were read from the description of one drive, which the family keeps beside them.
     OfDrive(Arc<Described>),
+    /// They are read, when they are first needed, from a description that comes with takt.
+    BuiltIn(fn() -> &'static DriveFamily),
 }
 
 struct Described {
@@ -319,6 +321,11 @@ impl DriveFamily {
         Self { facts: Facts::OfFamily(facts) }
     }
 
+    /// A family whose drives are all alike, by a description that comes with takt.
+    pub(crate) const fn built_in(read: fn() -> &'static Self) -> Self {
+        Self { facts: Facts::BuiltIn(read) }
+    }
+
     /// One drive of a family, with the facts that its description gives. The family finds the description again by
     /// [`description`](Self::description).
     pub fn of_drive(facts: DriveFacts, description: impl Any + Send + Sync) -> Self {
@@ -330,6 +337,7 @@ impl DriveFamily {
         match &self.facts {
             Facts::OfFamily(_) => None,
             Facts::OfDrive(drive) => drive.description.downcast_ref(),
+            Facts::BuiltIn(read) => read().description(),
         }
     }
 }
@@ -341,6 +349,7 @@ impl Deref for DriveFamily {
         match &self.facts {
             Facts::OfFamily(facts) => facts,
             Facts::OfDrive(drive) => &drive.facts,
+            Facts::BuiltIn(read) => read(),
         }
     }
 }

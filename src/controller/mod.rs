@@ -29,10 +29,7 @@ mod watchdog;
 pub use crate::channels::{CallbackCommand, CallbackState, CallbackTimes};
 #[cfg(target_os = "linux")]
 pub use handle::Controller;
-pub use handle::{
-    CallbackHandle, CallbackOptions, Events, GroupHandle, Handle, StartFailure, StreamHandle,
-    VirtualController,
-};
+pub use handle::{CallbackHandle, CallbackOptions, Handle, OwnProcess, StartFailure, VirtualController};
 #[cfg(target_os = "linux")]
 #[doc(hidden)]
 pub use last_resort::stop_drives;

@@ -99,7 +99,7 @@ impl Outcome {
             Self::TakenOver { process } => {
                 format!("{process} has taken the buses over; the axes were stopped in control for it")
             }
-            Self::Stopped(stop) => words::stop(stop, machine),
+            Self::Stopped(stop) => words::stop(stop, machine).to_string(),
             Self::BringUpFailed(error) => error.to_string(),
             Self::FaultPersists { axis, code } => {
                 let number = u8::try_from(*axis).unwrap_or(u8::MAX);
@@ -115,7 +115,7 @@ impl Outcome {
                 name(*axis)
             ),
             Self::MoveRefused { number, refusal } => {
-                let why = refusal.map(|refusal| words::rejection(&refusal, machine));
+                let why = refusal.map(|refusal| words::rejection(&refusal, machine).to_string());
                 let why = why.unwrap_or_else(|| "the reason is no longer known".to_owned());
                 format!("move {number} of the program was refused: {why}")
             }

@@ -58,15 +58,22 @@ impl From<FaultyPort<Port>> for Port {
     }
 }
 
+impl Port {
+    /// The port of its kind.
+    fn kind(&mut self) -> &mut dyn Injectable {
+        match self {
+            Self::Simulated(port) => port.as_mut(),
+            Self::Link(port) => port,
+            Self::Line(port) => port.as_mut(),
+            Self::Traced(port) => port.as_mut(),
+            Self::Faulty(port) => port.as_mut(),
+        }
+    }
+}
+
 impl BusPort for Port {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
-        match self {
-            Self::Simulated(port) => port.send(now_ns, frames),
-            Self::Link(port) => port.send(now_ns, frames),
-            Self::Line(port) => port.send(now_ns, frames),
-            Self::Traced(port) => port.send(now_ns, frames),
-            Self::Faulty(port) => port.send(now_ns, frames),
-        }
+        self.kind().send(now_ns, frames)
     }
 
     fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
@@ -76,9 +83,7 @@ impl BusPort for Port {
             match port {
                 Self::Link(port) => links.push(Outgoing { port, frames, taken }),
                 Self::Traced(port) => traced.push(Outgoing { port: port.as_mut(), frames, taken }),
-                Self::Simulated(port) => **taken = port.send(now_ns, frames),
-                Self::Line(port) => **taken = port.send(now_ns, frames),
-                Self::Faulty(port) => **taken = port.send(now_ns, frames),
+                port => **taken = port.send(now_ns, frames),
             }
         }
         if !links.is_empty() {
@@ -90,57 +95,26 @@ impl BusPort for Port {
     }
 
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
-        match self {
-            Self::Simulated(port) => port.receive(now_ns, batch),
-            Self::Link(port) => port.receive(now_ns, batch),
-            Self::Line(port) => port.receive(now_ns, batch),
-            Self::Traced(port) => port.receive(now_ns, batch),
-            Self::Faulty(port) => port.receive(now_ns, batch),
-        }
+        self.kind().receive(now_ns, batch);
     }
 
     fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
-        match self {
-            Self::Simulated(port) => port.unconfirmed(now_ns),
-            Self::Link(port) => port.unconfirmed(now_ns),
-            Self::Line(port) => port.unconfirmed(now_ns),
-            Self::Traced(port) => port.unconfirmed(now_ns),
-            Self::Faulty(port) => port.unconfirmed(now_ns),
-        }
+        self.kind().unconfirmed(now_ns)
     }
 
     fn health(&mut self) -> BusHealth {
-        match self {
-            Self::Simulated(port) => port.health(),
-            Self::Link(port) => port.health(),
-            Self::Line(port) => port.health(),
-            Self::Traced(port) => port.health(),
-            Self::Faulty(port) => port.health(),
-        }
+        self.kind().health()
     }
 }
 
+impl Injectable for LinkPort {}
+
 impl Injectable for Port {
     fn send_foreign(&mut self, now_ns: Nanoseconds, frame: &Frame) -> Delivery {
-        match self {
-            Self::Simulated(port) => Injectable::send_foreign(port.as_mut(), now_ns, frame),
-            Self::Link(port) => {
-                port.send(now_ns, &[*frame]);
-                Delivery::ToOthers
-            }
-            Self::Line(port) => port.send_foreign(now_ns, frame),
-            Self::Traced(port) => port.send_foreign(now_ns, frame),
-            Self::Faulty(port) => port.send_foreign(now_ns, frame),
-        }
+        self.kind().send_foreign(now_ns, frame)
     }
 
     fn inject(&mut self, node: u8, effect: DriveEffect, is_present: bool) -> Result<(), InjectError> {
-        match self {
-            Self::Simulated(port) => port.inject(node, effect, is_present),
-            Self::Link(_) => Err(InjectError::NotSimulated),
-            Self::Line(port) => port.inject(node, effect, is_present),
-            Self::Traced(port) => port.inject(node, effect, is_present),
-            Self::Faulty(port) => port.inject(node, effect, is_present),
-        }
+        self.kind().inject(node, effect, is_present)
     }
 }

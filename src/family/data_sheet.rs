@@ -1,7 +1,8 @@
 //! What the data sheet of one drive says, where the drives of a family differ.
 
 use takt_rt::{Nanoseconds, OperationMode};
-use takt_wire::canopen::object::{DataType, ObjectAddress};
+use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
+use takt_wire::quirks::NamedObject;
 
 /// The data sheet of one drive, as far as its commissioning and its error codes need it.
 pub trait DataSheet {
@@ -24,6 +25,26 @@ pub trait DataSheet {
 
     /// The drive's own error codes in words, where they deviate from the standard.
     fn own_errors(&self) -> &[(u16, String)];
+
+    /// What clears a fault of the drive, where it is known better than by the standard.
+    fn own_cure(&self, _code: u16) -> Option<&'static str> {
+        None
+    }
+
+    /// The objects of the drive that have a name or a unit other than the standard's.
+    fn named(&self) -> &[NamedObject] {
+        &[]
+    }
+
+    /// The object with the temperature of the drive in °C.
+    fn temperature(&self) -> Option<Object> {
+        None
+    }
+
+    /// Returns `true` if the drive has no inputs for the switches of homing.
+    fn lacks_switches(&self) -> bool {
+        false
+    }
 
     /// How long the drive takes to store its parameters, if it is known.
     fn storing_ns(&self) -> Option<Nanoseconds>;

@@ -5,6 +5,8 @@ use takt_wire::canopen::emcy::ErrorCode;
 use super::DataSheet;
 use super::registry::{named, of};
 use crate::config::DriveFamily;
+use crate::words;
+use crate::words::Words;
 
 /// A drive that reports a fault without a code.
 const NO_CODE: &str = "`takt drive … info` reads what the drive knows of it, and `clear-fault` clears it";
@@ -61,17 +63,33 @@ fn standard_cure(code: ErrorCode) -> &'static str {
     }
 }
 
+/// A code with its name.
+pub fn coded(code: u16, name: Words) -> Words {
+    words!("{code} ({name})", code = format!("0x{code:04X}"), name)
+}
+
+/// A code of CiA 301 or CiA 402 with its name.
+pub fn standard_error(code: u16) -> Words {
+    coded(code, Words::bilingual(ErrorCode(code).bilingual()))
+}
+
 /// The code of a drive in words. Recordings of earlier versions do not name the family.
-pub fn error_words(family: Option<&str>, code: u16) -> String {
+pub fn error_words(family: Option<&str>, code: u16) -> Words {
     match family.and_then(named) {
         Some(family) => family.error_words(code),
-        None => ErrorCode(code).to_string(),
+        None => standard_error(code),
     }
 }
 
 /// The code of a drive in words: its own, or else those of its family.
-pub fn drive_error_words(drive: &DriveFamily, code: u16) -> String {
+pub fn drive_error_words(drive: &DriveFamily, code: u16) -> Words {
     own_error_words(own_errors(drive), code).unwrap_or_else(|| of(drive).error_words(code))
+}
+
+/// What clears the fault of a drive and its cause: its own cure, or else that of its family.
+pub fn drive_error_cure(drive: &DriveFamily, code: u16) -> &'static str {
+    let own = of(drive).data_sheet(drive).and_then(|sheet| sheet.own_cure(code));
+    own.unwrap_or_else(|| error_cure(Some(drive.word), code))
 }
 
 /// The error codes that a drive has its own words for.
@@ -80,9 +98,9 @@ pub fn own_errors(drive: &DriveFamily) -> &[(u16, String)] {
 }
 
 /// The code in a drive's own words, if it has some for it.
-pub fn own_error_words(own: &[(u16, String)], code: u16) -> Option<String> {
+pub fn own_error_words(own: &[(u16, String)], code: u16) -> Option<Words> {
     let own = own.iter().find(|(known, _)| *known == code);
-    own.map(|(_, words)| format!("0x{code:04X} ({words})"))
+    own.map(|(_, words)| coded(code, words.clone().into()))
 }
 
 /// What clears the fault and its cause.
@@ -103,11 +121,14 @@ mod tests {
     #[test]
     fn each_family_has_its_own_words_and_cures_for_a_code() {
         let (erob, yz_aim) = (Some("erob-canopen"), Some("yz-aim"));
-        assert_eq!(error_words(erob, 0x730F), "0x730F (battery voltage of the multi-turn encoder low)");
+        assert_eq!(
+            error_words(erob, 0x730F).to_string(),
+            "0x730F (battery voltage of the multi-turn encoder low)"
+        );
         assert!(error_cure(erob, 0x730F).contains("replace the battery"));
-        assert_eq!(error_words(yz_aim, 0x12), "alarm 12h (blocked rotor)");
+        assert_eq!(error_words(yz_aim, 0x12).to_string(), "alarm 12h (blocked rotor)");
         assert!(error_cure(yz_aim, 0x12).contains("free the shaft"));
-        assert_eq!(error_words(None, 0x8611), "0x8611 (following error)");
+        assert_eq!(error_words(None, 0x8611).to_string(), "0x8611 (following error)");
         assert!(error_cure(None, 0x8611).contains("lower its acceleration"));
     }
 

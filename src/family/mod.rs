@@ -15,8 +15,6 @@ pub mod erob;
 #[doc(hidden)]
 pub mod erob_can;
 #[doc(hidden)]
-pub mod erob_canopen;
-#[doc(hidden)]
 pub mod erob_modbus;
 mod error_words;
 #[allow(unnameable_types, reason = "its sessions have no public name")]
@@ -40,8 +38,8 @@ pub use crate::procedure::{
     SdoQuirks,
 };
 pub use data_sheet::DataSheet;
-pub(crate) use error_words::{drive_error_words, own_error_words, own_errors};
-pub use error_words::{error_cure, error_words};
+pub(crate) use error_words::{coded, drive_error_cure, drive_error_words, own_error_words, own_errors};
+pub use error_words::{error_cure, error_words, standard_error};
 pub use off_cycle::{LineCounts, OffCycleBudget, OffCycleDrive, OffCycleLine, OffCycleTarget, OffCycleWish};
 pub use registry::{NameTaken, all, register};
 #[doc(hidden)]
@@ -54,7 +52,6 @@ pub use warning::{Warning, WarningKind, WarningSubject};
 pub(crate) use watchdog::least_shut_down_ns;
 pub use watchdog::{SignOfLife, Unwatched, Watchdog, stops_by_itself_after, unreached_words};
 
-use takt_wire::canopen::emcy::ErrorCode;
 use takt_wire::canopen::object::Object;
 use takt_wire::canopen::objects::PdoDirection;
 use takt_wire::canopen::sdo::SdoTiming;
@@ -66,19 +63,13 @@ use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use crate::family::scan::{FoundDevice, NodeIdentity, OwnProtocol, Recognised, StartingKeys};
 use crate::procedure::ModbusSession;
+use crate::words::Words;
 use takt_sim::{DevicesOnLine, Drive};
 
 /// ZeroErr eRob with CANopen firmware.
-pub const EROB_CANOPEN: DriveFamily = DriveFamily::of_family(&erob_canopen::FACTS);
+pub const EROB_CANOPEN: DriveFamily = DriveFamily::built_in(cia402::erob_canopen);
 /// YZ-AIM integrated servo, CANopen edition.
 pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
-
-/// A sentence of takt in English, and the same in Chinese. `{0}` is a name or a number, which stays as it is; `<1>` is made of words, which have a
-/// phrase of their own. They are numbered in the order of the English sentence.
-pub type ChinesePhrase = (&'static str, &'static str);
-
-/// A name or words in the meaning of a frame, in English and in Chinese.
-pub type ChineseTerm = (&'static str, &'static str);
 
 /// Describes frames in words.
 pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
@@ -111,9 +102,7 @@ pub trait Family: ConfiguredFamily {
 
     /// Whether a CANopen node with this identity is a drive of the family, and how surely.
     fn recognises(&self, identity: &NodeIdentity) -> Option<Recognised> {
-        let own = self.unconfigured()?.identity;
-        let is_it = own.vendor.is_some() && own.vendor == identity.vendor && own.product == identity.product;
-        is_it.then_some(Recognised::ByIdentity)
+        identity.is_of(&self.unconfigured()?.identity).then_some(Recognised::ByIdentity)
     }
 
     /// The protocols of their own by which drives of the family are found on a CAN bus.
@@ -227,7 +216,7 @@ pub trait Family: ConfiguredFamily {
     }
 
     /// The protocol that a drive with this node ID may speak instead, if it can be probed for.
-    fn other_protocol(&self, _node: u8) -> Option<OtherProtocol> {
+    fn other_protocol(&self, _drive: &DriveFamily, _node: u8) -> Option<OtherProtocol> {
         None
     }
 
@@ -236,25 +225,14 @@ pub trait Family: ConfiguredFamily {
         None
     }
 
-    /// An error code of a drive in words. A drive whose data sheet has words of its own has those instead.
-    fn error_words(&self, code: u16) -> String {
-        ErrorCode(code).to_string()
+    /// An error code of a drive in words: its name in English and in Chinese ([`Words::bilingual`]). A drive whose data sheet has words of its own has those instead.
+    fn error_words(&self, code: u16) -> Words {
+        standard_error(code)
     }
 
     /// What clears a fault with this code, where the family knows more than the standard.
     fn error_cure(&self, _code: u16) -> Option<&'static str> {
         None
-    }
-
-    /// What the family says, in Chinese, beside what drives share: its errors and their cures, what fails in commissioning, what a scan
-    /// remarks. A sentence without a phrase stays English.
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        vec![]
-    }
-
-    /// Names and words in the meanings of its frames, in Chinese, beside those of CANopen and CiA 402.
-    fn chinese_terms(&self) -> Vec<ChineseTerm> {
-        vec![]
     }
 
     /// How its node ID and bit rate are set, where its drives have no LSS (CiA 305): a sentence for people.
@@ -393,7 +371,7 @@ pub(crate) fn sdo_quirks(drive: &DriveFamily, mut timing: SdoTiming) -> SdoQuirk
 /// Every identifier between a drive and its master: those of its frames, and those of another protocol that it may speak.
 pub(crate) fn identifiers(family: &DriveFamily, node: u8) -> Vec<Id> {
     let own = family.frame_identifiers(node).into_iter().map(|(id, _)| id);
-    let other = of(family).other_protocol(node);
+    let other = of(family).other_protocol(family, node);
     own.chain(other.into_iter().flat_map(|other| [other.request.id(), other.answer])).collect()
 }
 

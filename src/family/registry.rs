@@ -2,14 +2,14 @@
 
 use std::sync::{PoisonError, RwLock};
 
-use super::{Family, bit_fields, cia402, erob_can, erob_canopen, erob_modbus, hollow, yz_aim};
+use super::{Family, bit_fields, cia402, erob_can, erob_modbus, hollow, yz_aim};
 use crate::config::DriveFamily;
 
 /// The families that come with takt.
 static SHIPPED: [&dyn Family; 11] = [
-    &erob_canopen::ErobCanopen,
+    &cia402::EROB_CANOPEN,
     &yz_aim::YzAim,
-    &cia402::Cia402,
+    &cia402::BY_SHEET,
     &erob_can::ErobCan,
     &erob_modbus::ErobModbus,
     &hollow::CAN,

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use bitcode::{Decode, Encode};
 use takt_rt::{Clock, Nanoseconds, Wake};
 
 use super::pop_front_if;
@@ -11,7 +12,7 @@ use crate::channels::{Consumer, Producer, ring};
 const ANSWERS: usize = 1 << 13;
 
 /// An answer of the clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Encode, Decode)]
 pub enum ClockAnswer {
     /// The start of slot 0. It comes first.
     Epoch(Nanoseconds),

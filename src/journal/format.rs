@@ -1,20 +1,18 @@
-//! The journal as bytes: one entry after another, each a tag and numbers of 7 bits a byte, the lowest first. Times are differences to
-//! the time before.
+//! The journal as bytes: blocks, each of which is a journal by itself, encoded by `bitcode`.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 
-use takt_rt::{BusState, MAX_BUSES, Nanoseconds, Received, TrajectoryId, Wake};
+use bitcode::{Decode, Encode};
+use takt_rt::{MAX_BUSES, Nanoseconds, Received, Request, TrajectoryId};
 
 use super::clock::ClockAnswer;
-use super::host_words::{put_entry, take_entry};
 use super::port::{PortEntry, PortState};
-use crate::channels::{GivenTrajectory, GroupAxes, JournalEntry};
-use crate::link::trace::{PortAnswer, PortMark, Traced};
-use crate::packet::{Malformed, Put, Take};
+use crate::channels::{GivenTrajectory, HostInput, JournalEntry};
+use crate::link::trace::Traced;
 use crate::trajectory::Trajectory;
 
 /// The state of a run between two cycles, so that its journal need not begin with the first one.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Encode, Decode)]
 pub struct Checkpoint {
     /// The slot that comes next.
     pub next_slot: u64,
@@ -28,10 +26,34 @@ pub struct Checkpoint {
     pub engine: Vec<u8>,
     /// The stream of each group: [`takt_rt::LookAhead::checkpoint`].
     pub streams: Vec<Vec<u8>>,
+    /// The [`checksum`](Self::checksum) of both when they were written.
+    pub crc32: u32,
+}
+
+impl Checkpoint {
+    /// The CRC-32 of the engine and of the streams. Damaged bytes may decode to a state that no engine has.
+    pub fn checksum(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        self.streams.iter().chain([&self.engine]).for_each(|bytes| hasher.update(bytes));
+        hasher.finalize()
+    }
+}
+
+/// A trajectory that the real-time thread has been given.
+#[derive(Debug, PartialEq, Encode, Decode)]
+pub struct JournaledTrajectory {
+    /// Its number.
+    pub id: TrajectoryId,
+    /// The group that it was for.
+    pub group: u8,
+    /// The axes of the group, by their numbers in the controller.
+    pub axes: Vec<usize>,
+    /// The trajectory.
+    pub trajectory: Trajectory,
 }
 
 /// A journal, or a part of one.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq, Encode, Decode)]
 pub struct Journal {
     /// Where it begins; `None`: with the first cycle.
     pub checkpoint: Option<Checkpoint>,
@@ -43,224 +65,86 @@ pub struct Journal {
     pub ports: Vec<Vec<PortEntry>>,
     /// The host.
     pub host: VecDeque<JournalEntry>,
-    /// The trajectories by their numbers, each with its group.
-    pub trajectories: HashMap<TrajectoryId, (u8, GivenTrajectory)>,
+    /// The trajectories, in the order in which they were given.
+    pub trajectories: Vec<JournaledTrajectory>,
 }
 
-/// A journal that is none.
+/// Why bytes are no block of a journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the journal is damaged at byte {at} of a block")]
-pub struct JournalDefect {
-    /// Where.
-    pub at: usize,
+#[non_exhaustive]
+pub enum BlockDefect {
+    /// They cannot be decoded.
+    #[error("it cannot be decoded")]
+    Undecodable,
+    /// A time after 292 years, or a wake-up before the machine was started.
+    #[error("it has a time that no machine has")]
+    Time,
+    /// More buses than a controller has.
+    #[error("it has {buses} buses (allowed: {MAX_BUSES})")]
+    Buses {
+        /// How many.
+        buses: usize,
+    },
+    /// A frame or an identifier that no bus carries.
+    #[error("it has a frame that no bus carries")]
+    Frame,
+    /// A trajectory without a polynomial for each axis at each time.
+    #[error("it has a trajectory with a part missing")]
+    Trajectory,
+    /// The state of the engine or of a stream is not what was written.
+    #[error("the checksum of the engine's state is wrong")]
+    Checksum,
 }
 
 /// The latest time of a journal: no machine has run for 292 years. The cycle adds its phases to the times that its clock tells.
 const LATEST_NS: Nanoseconds = i64::MAX as Nanoseconds;
 
-const EPOCH: u8 = 0;
-const NOW: u8 = 1;
-const WOKE: u8 = 2;
-const WOKE_TO_SEND: u8 = 3;
-const FRAME: u8 = 4;
-const MARK: u8 = 5;
-const HOST: u8 = 6;
-const TRAJECTORY: u8 = 7;
-const CYCLE_END: u8 = 8;
-const CHECKPOINT: u8 = 9;
-
-/// Makes bytes of a journal. Each block can be read by itself.
-#[derive(Debug, Default)]
-pub struct Encoder {
-    bytes: Vec<u8>,
-    last_ns: Nanoseconds,
-}
-
-impl Encoder {
-    /// The entries since the last call; nothing if there were none.
-    pub fn take_block(&mut self) -> Option<Vec<u8>> {
-        self.last_ns = 0;
-        (!self.bytes.is_empty()).then(|| std::mem::take(&mut self.bytes))
-    }
-
-    /// Puts an answer of the clock.
-    pub fn clock(&mut self, answer: ClockAnswer) {
-        match answer {
-            ClockAnswer::Epoch(at_ns) => {
-                self.tag(EPOCH);
-                self.time(at_ns);
-            }
-            ClockAnswer::Now(at_ns) => {
-                self.tag(NOW);
-                self.time(at_ns);
-            }
-            ClockAnswer::Woke(wake) => self.wake(WOKE, wake),
-            ClockAnswer::WokeToSend(wake) => self.wake(WOKE_TO_SEND, wake),
-            ClockAnswer::CycleEnd => self.tag(CYCLE_END),
-        }
-    }
-
-    /// Puts what has passed a port. What was sent, the replay sends itself.
-    pub fn port(&mut self, bus: usize, traced: &Traced) {
-        match traced {
-            Traced::Frame(frame) if frame.is_sent => {}
-            Traced::Frame(frame) => {
-                self.tag(FRAME);
-                self.number(bus as u64);
-                self.time(frame.at_ns);
-                let mut words = Put::default();
-                words.frame(&frame.frame);
-                words.0.iter().for_each(|word| self.number(*word));
-            }
-            Traced::Mark(PortMark { at_ns, answer }) => {
-                let (kind, value) = match answer {
-                    PortAnswer::Received => (0, 0),
-                    PortAnswer::Unconfirmed(count) => (1, *count),
-                    PortAnswer::Taken(count) => (2, *count),
-                    PortAnswer::State(state) => (3, *state as u64),
-                };
-                self.tag(MARK);
-                self.number(bus as u64);
-                self.time(*at_ns);
-                self.number(kind);
-                self.number(value);
-            }
-        }
-    }
-
-    /// Puts what the host has given.
-    pub fn host(&mut self, entry: &JournalEntry) {
-        let mut words = Put::default();
-        put_entry(entry, &mut words);
-        self.words(HOST, &words);
-    }
-
-    /// Puts the state of the run.
-    pub fn checkpoint(&mut self, checkpoint: &Checkpoint) {
-        let Checkpoint { next_slot, next_cycle, now_ns, ports, engine, streams } = checkpoint;
-        self.tag(CHECKPOINT);
-        self.number(*next_slot);
-        self.number(*next_cycle);
-        self.time(*now_ns);
-        self.number(ports.len() as u64);
-        for port in ports {
-            self.number(port.state as u64);
-            self.time(port.now_ns);
-        }
-        self.checked_bytes(engine);
-        self.number(streams.len() as u64);
-        streams.iter().for_each(|stream| self.checked_bytes(stream));
-    }
-
-    /// Puts a trajectory that the real-time thread has been given.
-    pub fn trajectory(&mut self, id: TrajectoryId, group: u8, given: &GivenTrajectory) {
-        let mut words = Put::default();
-        words.word(id.0).word(group.into()).index(given.axes().places().len());
-        given.axes().places().iter().for_each(|place| {
-            words.index(*place);
-        });
-        given.trajectory().put(&mut words);
-        self.words(TRAJECTORY, &words);
-    }
-
-    fn wake(&mut self, tag: u8, wake: Wake) {
-        self.tag(tag);
-        self.time(wake.now_ns);
-        self.number(wake.timer_latency_ns);
-        self.number(wake.suspended_ns);
-    }
-
-    fn words(&mut self, tag: u8, words: &Put) {
-        self.tag(tag);
-        self.number(words.0.len() as u64);
-        words.0.iter().for_each(|word| self.number(*word));
-    }
-
-    fn tag(&mut self, tag: u8) {
-        self.bytes.push(tag);
-    }
-
-    /// Bytes behind their count, and their CRC-32.
-    fn checked_bytes(&mut self, bytes: &[u8]) {
-        self.number(bytes.len() as u64);
-        self.bytes.extend_from_slice(bytes);
-        self.number(crc32fast::hash(bytes).into());
-    }
-
-    /// The difference to the time before, with its sign in the lowest bit.
-    fn time(&mut self, at_ns: Nanoseconds) {
-        let difference = at_ns.wrapping_sub(self.last_ns) as i64;
-        self.last_ns = at_ns;
-        self.number((difference << 1 ^ difference >> 63) as u64);
-    }
-
-    fn number(&mut self, mut number: u64) {
-        while number >= 0x80 {
-            self.bytes.push(number as u8 | 0x80);
-            number >>= 7;
-        }
-        self.bytes.push(number as u8);
-    }
-}
-
 impl Journal {
+    /// Adds an answer of the clock.
+    pub fn add_clock(&mut self, answer: ClockAnswer) {
+        match answer {
+            ClockAnswer::Epoch(at_ns) => self.epoch_ns = Some(at_ns),
+            answer => self.clock.push_back(answer),
+        }
+    }
+
+    /// Adds what has passed a port. What was sent, the replay sends itself.
+    pub fn add_port(&mut self, bus: usize, traced: &Traced) {
+        let entry = match traced {
+            Traced::Frame(frame) if frame.is_sent => return,
+            Traced::Frame(frame) => {
+                PortEntry::Received(Received { frame: frame.frame, at_ns: frame.at_ns }.into())
+            }
+            Traced::Mark(mark) => PortEntry::Mark(*mark),
+        };
+        self.port(bus).push(entry);
+    }
+
+    /// Adds a trajectory that the real-time thread has been given.
+    pub fn add_trajectory(&mut self, id: TrajectoryId, group: u8, given: &GivenTrajectory) {
+        let (axes, trajectory) = (given.axes().places().to_vec(), given.trajectory().clone());
+        self.trajectories.push(JournaledTrajectory { id, group, axes, trajectory });
+    }
+
+    /// Takes everything as a block; `None` if there is nothing.
+    pub fn take_block(&mut self) -> Option<Vec<u8>> {
+        let is_empty = *self == Self::default();
+        (!is_empty).then(|| bitcode::encode(&std::mem::take(self)))
+    }
+
     /// Adds a block.
     ///
     /// # Errors
-    /// The block is damaged. The entries before the defect are there.
-    pub fn add_block(&mut self, block: &[u8]) -> Result<(), JournalDefect> {
-        let mut decoder = Decoder { bytes: block, last_ns: 0 };
-        while !decoder.bytes.is_empty() {
-            let at = block.len() - decoder.bytes.len();
-            self.add_entry(&mut decoder).map_err(|Malformed| JournalDefect { at })?;
-        }
-        Ok(())
-    }
-
-    fn add_entry(&mut self, decoder: &mut Decoder<'_>) -> Result<(), Malformed> {
-        match decoder.tag()? {
-            EPOCH => self.epoch_ns = Some(decoder.time()?),
-            NOW => self.clock.push_back(ClockAnswer::Now(decoder.time()?)),
-            WOKE => self.clock.push_back(ClockAnswer::Woke(decoder.wake()?)),
-            WOKE_TO_SEND => self.clock.push_back(ClockAnswer::WokeToSend(decoder.wake()?)),
-            CYCLE_END => self.clock.push_back(ClockAnswer::CycleEnd),
-            CHECKPOINT => self.checkpoint = Some(decoder.checkpoint()?),
-            FRAME => {
-                let (bus, at_ns) = (decoder.bus()?, decoder.time()?);
-                let frame = decoder.frame()?;
-                self.port(bus).push(PortEntry::Received(Received { frame, at_ns }));
-            }
-            MARK => {
-                let (bus, at_ns) = (decoder.bus()?, decoder.time()?);
-                let answer = match (decoder.number()?, decoder.number()?) {
-                    (0, 0) => PortAnswer::Received,
-                    (1, count) => PortAnswer::Unconfirmed(count),
-                    (2, count) => PortAnswer::Taken(count),
-                    (3, state) => PortAnswer::State(bus_state(state)?),
-                    _ => return Err(Malformed),
-                };
-                self.port(bus).push(PortEntry::Mark(PortMark { at_ns, answer }));
-            }
-            HOST => {
-                let words = decoder.words()?;
-                let mut take = Take(&words);
-                self.host.push_back(take_entry(&mut take)?);
-                take.end()?;
-            }
-            TRAJECTORY => {
-                let words = decoder.words()?;
-                let mut take = Take(&words);
-                let (id, group) =
-                    (TrajectoryId(take.word()?), u8::try_from(take.word()?).map_err(|_| Malformed)?);
-                let axes = take.count_of(1)?;
-                let places = (0..axes).map(|_| take.index()).collect::<Result<_, _>>()?;
-                let trajectory = Trajectory::take(&mut take)?;
-                take.end()?;
-                let given = GivenTrajectory::new(trajectory, GroupAxes::new(places));
-                self.trajectories.insert(id, (group, given));
-            }
-            _ => return Err(Malformed),
-        }
+    /// The block is damaged. Nothing of it has been added.
+    pub fn add_block(&mut self, block: &[u8]) -> Result<(), BlockDefect> {
+        let block: Self = bitcode::decode(block).map_err(|_| BlockDefect::Undecodable)?;
+        block.check()?;
+        self.checkpoint = block.checkpoint.or(self.checkpoint.take());
+        self.epoch_ns = block.epoch_ns.or(self.epoch_ns);
+        self.clock.extend(block.clock);
+        block.ports.into_iter().enumerate().for_each(|(bus, entries)| self.port(bus).extend(entries));
+        self.host.extend(block.host);
+        self.trajectories.extend(block.trajectories);
         Ok(())
     }
 
@@ -270,109 +154,61 @@ impl Journal {
         }
         &mut self.ports[bus]
     }
-}
 
-fn bus_state(number: u64) -> Result<BusState, Malformed> {
-    let states = [BusState::ErrorActive, BusState::ErrorPassive, BusState::BusOff, BusState::Down];
-    states.into_iter().find(|state| *state as u64 == number).ok_or(Malformed)
-}
-
-struct Decoder<'a> {
-    bytes: &'a [u8],
-    last_ns: Nanoseconds,
-}
-
-impl Decoder<'_> {
-    fn tag(&mut self) -> Result<u8, Malformed> {
-        let (first, rest) = self.bytes.split_first().ok_or(Malformed)?;
-        self.bytes = rest;
-        Ok(*first)
+    /// Checks what the types do not express.
+    fn check(&self) -> Result<(), BlockDefect> {
+        let ok_or = |is_ok: bool, defect| if is_ok { Ok(()) } else { Err(defect) };
+        ok_or(self.ports.len() <= MAX_BUSES, BlockDefect::Buses { buses: self.ports.len() })?;
+        ok_or(self.has_possible_times(), BlockDefect::Time)?;
+        let received = self.ports.iter().flatten().all(PortEntry::is_valid);
+        ok_or(received && self.host.iter().all(|entry| is_valid(&entry.input)), BlockDefect::Frame)?;
+        ok_or(self.trajectories.iter().all(|given| given.trajectory.is_whole()), BlockDefect::Trajectory)?;
+        let mut states = self.checkpoint.iter();
+        ok_or(states.all(|state| state.crc32 == state.checksum()), BlockDefect::Checksum)
     }
 
-    fn number(&mut self) -> Result<u64, Malformed> {
-        let mut number = 0;
-        for shift in (0..64).step_by(7) {
-            let byte = self.tag()?;
-            number |= u64::from(byte & 0x7F) << shift;
-            if byte & 0x80 == 0 {
-                return Ok(number);
+    fn has_possible_times(&self) -> bool {
+        let is_possible = |at_ns: Nanoseconds| at_ns <= LATEST_NS;
+        let answers = self.clock.iter().all(|answer| match answer {
+            ClockAnswer::Epoch(at_ns) | ClockAnswer::Now(at_ns) => is_possible(*at_ns),
+            ClockAnswer::Woke(wake) | ClockAnswer::WokeToSend(wake) => {
+                is_possible(wake.now_ns) && wake.timer_latency_ns <= wake.now_ns
             }
-        }
-        Err(Malformed)
+            ClockAnswer::CycleEnd => true,
+        });
+        let ports = self.ports.iter().flatten().all(|entry| is_possible(entry.at_ns()));
+        let checkpoint = self.checkpoint.as_ref().is_none_or(|checkpoint| {
+            is_possible(checkpoint.now_ns) && checkpoint.ports.iter().all(|port| is_possible(port.now_ns))
+        });
+        answers && ports && checkpoint && self.epoch_ns.is_none_or(is_possible)
     }
+}
 
-    fn time(&mut self) -> Result<Nanoseconds, Malformed> {
-        let number = self.number()?;
-        let difference = (number >> 1) as i64 ^ -((number & 1) as i64);
-        let at_ns = self.last_ns.checked_add_signed(difference).filter(|at_ns| *at_ns <= LATEST_NS);
-        self.last_ns = at_ns.ok_or(Malformed)?;
-        Ok(self.last_ns)
-    }
-
-    fn wake(&mut self) -> Result<Wake, Malformed> {
-        let (now_ns, timer_latency_ns, suspended_ns) = (self.time()?, self.number()?, self.number()?);
-        if timer_latency_ns > now_ns {
-            return Err(Malformed);
-        }
-        Ok(Wake { now_ns, timer_latency_ns, suspended_ns })
-    }
-
-    fn checkpoint(&mut self) -> Result<Checkpoint, Malformed> {
-        let (next_slot, next_cycle, now_ns) = (self.number()?, self.number()?, self.time()?);
-        let ports = (0..self.count()?)
-            .map(|_| Ok(PortState { state: bus_state(self.number()?)?, now_ns: self.time()? }))
-            .collect::<Result<_, _>>()?;
-        let engine = self.checked_bytes()?;
-        let streams = (0..self.count()?).map(|_| self.checked_bytes()).collect::<Result<_, _>>()?;
-        Ok(Checkpoint { next_slot, next_cycle, now_ns, ports, engine, streams })
-    }
-
-    /// A count of things that have a byte each at least.
-    fn count(&mut self) -> Result<usize, Malformed> {
-        usize::try_from(self.number()?).ok().filter(|count| *count <= self.bytes.len()).ok_or(Malformed)
-    }
-
-    fn checked_bytes(&mut self) -> Result<Vec<u8>, Malformed> {
-        let count = self.count()?;
-        let (bytes, rest) = self.bytes.split_at_checked(count).ok_or(Malformed)?;
-        self.bytes = rest;
-        let is_whole = self.number()? == u64::from(crc32fast::hash(bytes));
-        is_whole.then(|| bytes.to_vec()).ok_or(Malformed)
-    }
-
-    fn bus(&mut self) -> Result<usize, Malformed> {
-        usize::try_from(self.number()?).ok().filter(|bus| *bus < MAX_BUSES).ok_or(Malformed)
-    }
-
-    fn frame(&mut self) -> Result<takt_rt::Frame, Malformed> {
-        let (head, id) = (self.number()?, self.number()?);
-        let is_remote = head & 3 == 1;
-        let bytes = usize::try_from(head >> 3).ok().filter(|bytes| *bytes <= takt_rt::Frame::MAX_BYTES);
-        let payload = if is_remote { 0 } else { bytes.ok_or(Malformed)?.div_ceil(size_of::<u64>()) };
-        let mut words = vec![head, id];
-        for _ in 0..payload {
-            words.push(self.number()?);
-        }
-        Take(&words).frame()
-    }
-
-    /// Words behind their count, each of which has a byte at least.
-    fn words(&mut self) -> Result<Vec<u64>, Malformed> {
-        (0..self.count()?).map(|_| self.number()).collect()
+/// Returns `true` if all frames and identifiers of an input are such as a bus carries.
+fn is_valid(input: &HostInput) -> bool {
+    match input {
+        HostInput::ServiceFrame { frame, .. } => frame.is_valid(),
+        HostInput::Request(envelope) => match &envelope.request {
+            Request::ProcessData(data) => {
+                let mapped = data.commands.iter().chain(&data.feedback).flatten().map(|pdo| pdo.id);
+                mapped.chain(data.unused.into_iter().flatten()).all(|id| id.is_valid())
+            }
+            _ => true,
+        },
+        _ => true,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::channels::HostInput;
-    use crate::link::trace::TracedFrame;
+    use crate::link::trace::{PortAnswer, PortMark, TracedFrame};
     use proptest::prelude::*;
     use takt_rt::plan::State;
     use takt_rt::{
-        AxisLimits, AxisPoint, AxisTarget, CallbackOutcome, CallbackReturn, DriveState, Frame, Id, MAX_AXES,
-        Move, OffCycleReport, PointRole, Request, RequestEnvelope, RequestId, RequestTarget, StopCategory,
-        StreamPoint,
+        AxisLimits, AxisPoint, AxisTarget, BusState, CallbackOutcome, CallbackReturn, DriveState, Frame, Id,
+        MAX_AXES, Move, OffCycleReport, PointRole, RequestEnvelope, RequestId, RequestTarget, StopCategory,
+        StreamPoint, Wake,
     };
 
     fn entries() -> Vec<JournalEntry> {
@@ -439,41 +275,49 @@ mod tests {
             ClockAnswer::Woke(Wake { now_ns: 5_000_550_000, ..wake }),
             ClockAnswer::CycleEnd,
         ];
-        let frame = Frame::fd(Id::extended(0x1234_5678).unwrap(), &[7; 24], true).unwrap();
-        let mark = |answer| Traced::Mark(PortMark { at_ns: 4_999_999_999, answer });
+        let frames = [
+            Frame::fd(Id::extended(0x1234_5678).unwrap(), &[7; 24], true).unwrap(),
+            Frame::fd(Id::base(0x7FF).unwrap(), &[8; 64], false).unwrap(),
+            Frame::of(Id::canopen(0x180, 5), [0, 1, 2]),
+            Frame::remote(Id::canopen(0x700, 5), 1).unwrap(),
+        ];
+        let mark = |answer| PortMark { at_ns: 4_999_999_999, answer };
         let answers = [
             PortAnswer::Received,
             PortAnswer::Unconfirmed(3),
             PortAnswer::Taken(2),
             PortAnswer::State(BusState::BusOff),
         ];
-        let traced = |is_sent| Traced::Frame(TracedFrame { at_ns: 5_000_400_000, is_sent, frame });
-        let mut encoder = Encoder::default();
+        let traced = |is_sent, frame| Traced::Frame(TracedFrame { at_ns: 5_000_400_000, is_sent, frame });
+        let mut written = Journal::default();
         let mut journal = Journal::default();
-        encoder.clock(ClockAnswer::Epoch(4_999_000_000));
+        written.add_clock(ClockAnswer::Epoch(4_999_000_000));
         for answer in clock {
-            encoder.clock(answer);
-            journal.add_block(&encoder.take_block().unwrap()).unwrap();
+            written.add_clock(answer);
+            journal.add_block(&written.take_block().unwrap()).unwrap();
         }
-        answers.into_iter().for_each(|answer| encoder.port(2, &mark(answer)));
-        encoder.port(2, &traced(true));
-        encoder.port(2, &traced(false));
-        entries().iter().for_each(|entry| encoder.host(entry));
-        journal.add_block(&encoder.take_block().unwrap()).unwrap();
-        assert_eq!(encoder.take_block(), None);
+        answers.into_iter().for_each(|answer| written.add_port(2, &Traced::Mark(mark(answer))));
+        written.add_port(2, &traced(true, frames[0]));
+        frames.into_iter().for_each(|frame| written.add_port(2, &traced(false, frame)));
+        written.host.extend(entries());
+        journal.add_block(&written.take_block().unwrap()).unwrap();
+        assert_eq!(written.take_block(), None);
 
         assert_eq!((journal.epoch_ns, journal.ports.len()), (Some(4_999_000_000), 3));
         assert!(journal.clock.iter().eq(&clock));
-        let expected = answers.map(|answer| PortEntry::Mark(PortMark { at_ns: 4_999_999_999, answer }));
-        assert_eq!(journal.ports[2][..4], expected);
-        assert_eq!(journal.ports[2][4..], [PortEntry::Received(Received { frame, at_ns: 5_000_400_000 })]);
+        assert_eq!(journal.ports[2][..4], answers.map(|answer| PortEntry::Mark(mark(answer))));
+        let received = frames.map(|frame| Received { frame, at_ns: 5_000_400_000 });
+        assert_eq!(journal.ports[2][4..], received.map(|received| PortEntry::Received(received.into())));
+        for (entry, received) in journal.ports[2][4..].iter().zip(received) {
+            assert!(matches!(entry, PortEntry::Received(frame) if frame.received() == Ok(received)));
+        }
         assert!(journal.host.iter().eq(&entries()));
     }
 
     #[test]
     fn a_trajectory_comes_out_as_it_went_in() {
+        use crate::channels::GroupAxes;
         use crate::trajectory::{TrajectoryConditions, TrajectoryPoint};
-        use std::sync::Arc;
         let limits = [AxisLimits::NONE; 2];
         let conditions =
             TrajectoryConditions { start: &[State::rest(0.0); 2], limits: &limits, period_s: 0.001 };
@@ -484,13 +328,37 @@ mod tests {
         };
         let trajectory =
             Trajectory::new(&[point(1.0, [0.5, 0.1]), point(2.5, [-0.5, 0.3])], &conditions).unwrap();
-        let given = Arc::new(GivenTrajectory::new(trajectory.clone(), GroupAxes::new(vec![3, 1])));
-        let mut encoder = Encoder::default();
-        encoder.trajectory(TrajectoryId(9), 1, &given);
+        let given = GivenTrajectory::new(trajectory.clone(), GroupAxes::new(vec![3, 1]));
+        let mut written = Journal::default();
+        written.add_trajectory(TrajectoryId(9), 1, &given);
         let mut journal = Journal::default();
-        journal.add_block(&encoder.take_block().unwrap()).unwrap();
-        let (group, read) = &journal.trajectories[&TrajectoryId(9)];
-        assert_eq!((*group, read.trajectory(), read.axes().places()), (1, &trajectory, &[3, 1][..]));
+        journal.add_block(&written.take_block().unwrap()).unwrap();
+        let expected = JournaledTrajectory { id: TrajectoryId(9), group: 1, axes: vec![3, 1], trajectory };
+        assert_eq!(journal.trajectories, [expected]);
+    }
+
+    #[test]
+    fn what_no_run_has_is_refused_with_the_reason_and_nothing_is_added() {
+        let wake = Wake { now_ns: 5, timer_latency_ns: 6, suspended_ns: 0 };
+        let mark = |at_ns| PortEntry::Mark(PortMark { at_ns, answer: PortAnswer::Received });
+        let wrong_checksum = Checkpoint { engine: vec![1, 2, 3], ..Checkpoint::default() };
+        let late = Checkpoint { now_ns: LATEST_NS + 1, ..Checkpoint::default() };
+        let clock = |answer| Journal { clock: [answer].into(), ..Journal::default() };
+        let ports = |ports| Journal { ports, ..Journal::default() };
+        let checkpoint = |state| Journal { checkpoint: Some(state), ..Journal::default() };
+        for (damaged, defect) in [
+            (clock(ClockAnswer::Now(LATEST_NS + 1)), BlockDefect::Time),
+            (clock(ClockAnswer::Woke(wake)), BlockDefect::Time),
+            (Journal { epoch_ns: Some(u64::MAX), ..Journal::default() }, BlockDefect::Time),
+            (ports(vec![vec![mark(LATEST_NS + 1)]]), BlockDefect::Time),
+            (ports(vec![vec![]; MAX_BUSES + 1]), BlockDefect::Buses { buses: MAX_BUSES + 1 }),
+            (checkpoint(late), BlockDefect::Time),
+            (checkpoint(wrong_checksum), BlockDefect::Checksum),
+        ] {
+            let mut journal = Journal::default();
+            assert_eq!(journal.add_block(&bitcode::encode(&damaged)), Err(defect), "{damaged:?}");
+            assert_eq!(journal, Journal::default());
+        }
     }
 
     proptest! {

@@ -8,8 +8,9 @@ use takt_rt::{
     StreamPoint, StreamSample, TrajectoryId, TrajectorySample,
 };
 
+use super::format::JournaledTrajectory;
 use super::pop_front_if;
-use crate::channels::{ChannelSizes, GivenTrajectory, HostInput, JournalEntry, RtSide, channels};
+use crate::channels::{ChannelSizes, GivenTrajectory, GroupAxes, HostInput, JournalEntry, RtSide, channels};
 
 /// A host that gives what it gave, cycle by cycle.
 pub struct ReplayHost {
@@ -53,13 +54,13 @@ impl ReplayHost {
     }
 
     /// Adds what it is to give.
-    pub fn add(
-        &mut self,
-        entries: VecDeque<JournalEntry>,
-        trajectories: HashMap<TrajectoryId, (u8, GivenTrajectory)>,
-    ) {
+    pub fn add(&mut self, entries: VecDeque<JournalEntry>, trajectories: Vec<JournaledTrajectory>) {
         self.entries.extend(entries);
-        self.trajectories.extend(trajectories);
+        self.trajectories.extend(trajectories.into_iter().map(
+            |JournaledTrajectory { id, group, axes, trajectory }| {
+                (id, (group, GivenTrajectory::new(trajectory, GroupAxes::new(axes))))
+            },
+        ));
     }
 
     /// Goes on with this cycle and these streams.

@@ -16,15 +16,14 @@
 mod clock;
 mod format;
 mod host;
-mod host_words;
 mod port;
 mod rerun;
 mod run_journal;
 
 pub use clock::{ClockAnswer, ClockJournal, JournaledClock, ReplayClock, clock_journal};
-pub use format::{Checkpoint, Encoder, Journal, JournalDefect};
+pub use format::{BlockDefect, Checkpoint, Journal, JournaledTrajectory};
 pub use host::ReplayHost;
-pub use port::{PortEntry, PortState, ReplayPort};
+pub use port::{PortEntry, PortState, ReceivedFrame, ReplayPort};
 pub use rerun::{Rerun, RerunParts};
 pub use run_journal::RunJournal;
 

@@ -2,18 +2,73 @@
 
 use std::collections::VecDeque;
 
-use takt_rt::{BusHealth, BusPort, BusState, Frame, Nanoseconds, ReceiveBatch, Received};
+use arrayvec::ArrayVec;
+use bitcode::{Decode, Encode};
+use takt_rt::{
+    BusHealth, BusPort, BusState, Frame, FrameError, FrameKind, Id, Nanoseconds, ReceiveBatch, Received,
+};
 
 use super::pop_front_if;
 use crate::link::trace::{PortAnswer, PortMark};
 
 /// Answer of a port.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq, Encode, Decode)]
 pub enum PortEntry {
     /// A frame that it has handed over.
-    Received(Received),
+    Received(ReceivedFrame),
     /// An answer other than the usual one.
     Mark(PortMark),
+}
+
+/// A frame without the zeros behind its payload.
+#[derive(Clone, Debug, PartialEq, Eq, Encode, Decode)]
+pub struct ReceivedFrame {
+    at_ns: Nanoseconds,
+    id: Id,
+    kind: FrameKind,
+    length: u8,
+    payload: ArrayVec<u8, { Frame::MAX_BYTES }>,
+}
+
+impl From<Received> for ReceivedFrame {
+    fn from(Received { frame, at_ns }: Received) -> Self {
+        let payload = frame.payload().iter().copied().collect();
+        Self { at_ns, id: frame.id(), kind: frame.kind(), length: frame.length() as u8, payload }
+    }
+}
+
+impl ReceivedFrame {
+    /// The frame as it was received.
+    ///
+    /// # Errors
+    /// No bus carries it.
+    pub fn received(&self) -> Result<Received, FrameError> {
+        let frame = match self.kind {
+            FrameKind::Data => Frame::data(self.id, &self.payload),
+            FrameKind::Remote => Frame::remote(self.id, self.length),
+            FrameKind::Fd => Frame::fd(self.id, &self.payload, false),
+            FrameKind::FdBitRateSwitch => Frame::fd(self.id, &self.payload, true),
+        };
+        frame.map(|frame| Received { frame, at_ns: self.at_ns })
+    }
+}
+
+impl PortEntry {
+    /// When the frame was received; for a mark, the time for which the port was asked.
+    pub const fn at_ns(&self) -> Nanoseconds {
+        match self {
+            Self::Received(received) => received.at_ns,
+            Self::Mark(mark) => mark.at_ns,
+        }
+    }
+
+    /// Returns `false` for a frame that no bus carries.
+    pub fn is_valid(&self) -> bool {
+        match self {
+            Self::Received(received) => received.id.is_valid() && received.received().is_ok(),
+            Self::Mark(_) => true,
+        }
+    }
 }
 
 /// A port that answers as it did, found by the time for which it is asked.
@@ -33,7 +88,7 @@ pub struct ReplayPort {
 }
 
 /// What a port has shown, when a replay begins in the middle of a run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Encode, Decode)]
 pub struct PortState {
     /// The state of the bus.
     pub state: BusState,
@@ -43,9 +98,12 @@ pub struct PortState {
 
 impl ReplayPort {
     /// Adds the next entry of the journal.
-    pub fn add(&mut self, entry: PortEntry) {
-        match entry {
-            PortEntry::Received(received) => self.received.push_back((self.handed_over_ns, received)),
+    pub fn add(&mut self, entry: &PortEntry) {
+        match *entry {
+            PortEntry::Received(ref frame) => {
+                let received = frame.received().into_iter();
+                self.received.extend(received.map(|received| (self.handed_over_ns, received)));
+            }
             PortEntry::Mark(PortMark { at_ns, answer }) => match answer {
                 PortAnswer::Received => self.handed_over_ns = at_ns,
                 PortAnswer::Unconfirmed(count) => self.unconfirmed.push_back((at_ns, count as usize)),
@@ -70,7 +128,7 @@ impl ReplayPort {
         let mark = |at_ns, answer| PortEntry::Mark(PortMark { at_ns, answer });
         let mut entries = Vec::new();
         for &(at_ns, received) in &self.received {
-            entries.extend([mark(at_ns, PortAnswer::Received), PortEntry::Received(received)]);
+            entries.extend([mark(at_ns, PortAnswer::Received), PortEntry::Received(received.into())]);
         }
         entries.extend(
             self.unconfirmed.iter().map(|&(at_ns, count)| mark(at_ns, PortAnswer::Unconfirmed(count as u64))),

@@ -2,10 +2,9 @@
 
 use takt_rt::{CheckpointError, Cycle, CycleRecord, Engine, Event, Flow, Grid, Nanoseconds, SlotPlan};
 
-use super::format::{Checkpoint, Encoder, Journal};
-use super::{ClockAnswer, PortEntry, ReplayClock, ReplayHost, ReplayPort};
+use super::format::{Checkpoint, Journal};
+use super::{ReplayClock, ReplayHost, ReplayPort};
 use crate::channels::ChannelSizes;
-use crate::link::trace::{Traced, TracedFrame};
 
 /// What an engine is run again with.
 pub struct RerunParts {
@@ -59,7 +58,7 @@ impl Rerun {
         }
         self.clock.add(journal.clock);
         for (port, entries) in self.ports.iter_mut().zip(journal.ports) {
-            entries.into_iter().for_each(|entry| port.add(entry));
+            entries.iter().for_each(|entry| port.add(entry));
         }
         self.host.add(journal.host, journal.trajectories);
         Ok(())
@@ -105,31 +104,25 @@ impl Rerun {
     /// `None` before the run has begun.
     pub fn checkpoint(&self) -> Option<Vec<u8>> {
         let (epoch_ns, cycle) = self.place.as_ref()?;
-        let mut encoder = Encoder::default();
-        encoder.clock(ClockAnswer::Epoch(*epoch_ns));
-        encoder.checkpoint(&Checkpoint {
+        let mut checkpoint = Checkpoint {
             next_slot: cycle.next_slot(),
             next_cycle: self.host.next_cycle(),
             now_ns: self.clock.told_ns(),
             ports: self.ports.iter().map(ReplayPort::shown).collect(),
             engine: self.engine.checkpoint(),
             streams: self.host.streams(),
-        });
-        self.host.trajectories().for_each(|(id, group, given)| encoder.trajectory(id, group, given));
-        self.clock.unused().for_each(|answer| encoder.clock(answer));
-        self.host.unused().for_each(|entry| encoder.host(entry));
-        for (bus, port) in self.ports.iter().enumerate() {
-            port.unused().into_iter().for_each(|entry| encoder.port(bus, &traced(entry)));
-        }
-        encoder.take_block()
-    }
-}
-
-fn traced(entry: PortEntry) -> Traced {
-    match entry {
-        PortEntry::Received(received) => {
-            Traced::Frame(TracedFrame { at_ns: received.at_ns, is_sent: false, frame: received.frame })
-        }
-        PortEntry::Mark(mark) => Traced::Mark(mark),
+            crc32: 0,
+        };
+        checkpoint.crc32 = checkpoint.checksum();
+        let mut rest = Journal {
+            checkpoint: Some(checkpoint),
+            epoch_ns: Some(*epoch_ns),
+            clock: self.clock.unused().collect(),
+            ports: self.ports.iter().map(ReplayPort::unused).collect(),
+            host: self.host.unused().copied().collect(),
+            trajectories: Vec::new(),
+        };
+        self.host.trajectories().for_each(|(id, group, given)| rest.add_trajectory(id, group, given));
+        rest.take_block()
     }
 }

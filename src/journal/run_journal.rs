@@ -1,7 +1,7 @@
 //! The journal of a run as it is written.
 
 use super::clock::ClockJournal;
-use super::format::Encoder;
+use super::format::Journal;
 use crate::channels::JournalReader;
 
 /// The ends of the journal of a run, but for those of its ports.
@@ -16,19 +16,19 @@ impl RunJournal {
     /// Puts what the clock has answered since the last call. Call it before what the ports and the host have answered is taken: a cycle
     /// whose end is put here then is whole in what has been put by the end of [`RunJournal::drain_host`], however far the run goes on
     /// meanwhile.
-    pub fn drain_clock(&mut self, encoder: &mut Encoder) {
+    pub fn drain_clock(&mut self, block: &mut Journal) {
         while let Some(answer) = self.clock.pop() {
-            encoder.clock(answer);
+            block.add_clock(answer);
         }
     }
 
     /// Puts what the host has answered since the last call.
-    pub fn drain_host(&mut self, encoder: &mut Encoder) {
+    pub fn drain_host(&mut self, block: &mut Journal) {
         for (id, group, given) in self.host.take_trajectories() {
-            encoder.trajectory(id, group, &given);
+            block.add_trajectory(id, group, &given);
         }
         while let Some(entry) = self.host.take() {
-            encoder.host(&entry);
+            block.host.push_back(entry);
         }
     }
 

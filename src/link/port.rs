@@ -28,6 +28,15 @@ impl LinkPort {
 }
 
 impl LinkPort {
+    /// The port of its kind.
+    fn kind(&mut self) -> &mut dyn BusPort {
+        match self {
+            Self::SocketCan(port) => port.as_mut(),
+            Self::Slcan(port) => port.as_mut(),
+            Self::Converter(port) => port.as_mut(),
+        }
+    }
+
     /// This port for simulated drives.
     pub fn into_live(self) -> Box<dyn LivePort> {
         match self {
@@ -40,11 +49,7 @@ impl LinkPort {
 
 impl BusPort for LinkPort {
     fn send(&mut self, now_ns: Nanoseconds, frames: &[Frame]) -> usize {
-        match self {
-            Self::SocketCan(port) => port.send(now_ns, frames),
-            Self::Slcan(port) => port.send(now_ns, frames),
-            Self::Converter(port) => port.send(now_ns, frames),
-        }
+        self.kind().send(now_ns, frames)
     }
 
     fn send_together(now_ns: Nanoseconds, outgoing: &mut [Outgoing<'_, Self>]) {
@@ -52,8 +57,7 @@ impl BusPort for LinkPort {
         for Outgoing { port, frames, taken } in outgoing.iter_mut().take(MAX_BUSES) {
             match port {
                 Self::SocketCan(port) => sockets.push(Outgoing { port: port.as_mut(), frames, taken }),
-                Self::Slcan(port) => **taken = port.send(now_ns, frames),
-                Self::Converter(port) => **taken = port.send(now_ns, frames),
+                port => **taken = port.send(now_ns, frames),
             }
         }
         if !sockets.is_empty() {
@@ -62,26 +66,14 @@ impl BusPort for LinkPort {
     }
 
     fn receive(&mut self, now_ns: Nanoseconds, batch: &mut ReceiveBatch) {
-        match self {
-            Self::SocketCan(port) => port.receive(now_ns, batch),
-            Self::Slcan(port) => port.receive(now_ns, batch),
-            Self::Converter(port) => port.receive(now_ns, batch),
-        }
+        self.kind().receive(now_ns, batch);
     }
 
     fn unconfirmed(&mut self, now_ns: Nanoseconds) -> usize {
-        match self {
-            Self::SocketCan(port) => port.unconfirmed(now_ns),
-            Self::Slcan(port) => port.unconfirmed(now_ns),
-            Self::Converter(port) => port.unconfirmed(now_ns),
-        }
+        self.kind().unconfirmed(now_ns)
     }
 
     fn health(&mut self) -> BusHealth {
-        match self {
-            Self::SocketCan(port) => port.health(),
-            Self::Slcan(port) => port.health(),
-            Self::Converter(port) => port.health(),
-        }
+        self.kind().health()
     }
 }

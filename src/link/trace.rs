@@ -32,7 +32,7 @@ pub struct TracedHealth {
 }
 
 /// What a port has answered beside its frames, as far as it is out of the ordinary. A replay needs it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bitcode::Encode, bitcode::Decode)]
 pub struct PortMark {
     /// The time for which the port was asked.
     pub at_ns: Nanoseconds,
@@ -41,7 +41,7 @@ pub struct PortMark {
 }
 
 /// An answer of a port.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, bitcode::Encode, bitcode::Decode)]
 pub enum PortAnswer {
     /// The frames behind this mark were handed over at this time, up to the next mark.
     Received,

@@ -2,6 +2,9 @@
 
 use takt_wire::canopen::object::Object;
 
+use crate::words;
+use crate::words::Words;
+
 /// An access to an object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
@@ -15,11 +18,18 @@ pub enum Access {
 
 impl Access {
     /// The access in words, for `object`.
-    pub fn words(self, object: &Object) -> String {
+    pub fn words(self, object: &Object) -> Words {
+        let name = object.to_string();
         match self {
-            Self::Read => format!("reading {object}"),
-            Self::Write(value) => format!("writing {} to {object}", object.show(value)),
-            Self::ReadBack(value) => format!("reading {object} back after writing {}", object.show(value)),
+            Self::Read => words!("reading {object}", object = name),
+            Self::Write(value) => {
+                words!("writing {value} to {object}", value = object.show(value), object = name)
+            }
+            Self::ReadBack(value) => words!(
+                "reading {object} back after writing {value}",
+                object = name,
+                value = object.show(value)
+            ),
         }
     }
 }

@@ -8,51 +8,11 @@
 //! the set-points.
 
 use takt_rt::SlotPlan;
-use thiserror::Error;
 
-use super::{BusSchedule, COMPUTE_RESERVE_NS, analyse_bus, remedy, text};
-use crate::config::Config;
+use super::bus_schedule::COMPUTE_RESERVE_NS;
 
 /// The command phase is a whole number of these.
 const STEP_NS: u64 = 1_000;
-
-/// There is no command phase at which feedback and set-points of all buses are in time. `Display` gives the sums of
-/// the buses that are the cause, and what would fit.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[error("{}", text::no_command_phase(.0))]
-pub struct NoCommandPhase(
-    /// The cause: each bus that has no command phase; where each has one, the one whose feedback is the last to
-    /// arrive and the one whose set-points must leave first.
-    pub Vec<BusSchedule>,
-);
-
-/// The command phase that `"auto"` stands for, in ns after the start of the slot, whatever the configuration says now.
-///
-/// # Errors
-/// None is possible.
-pub fn automatic_command_phase(config: &Config) -> Result<u64, NoCommandPhase> {
-    let buses: Vec<_> = (0..config.buses.len()).map(|index| analyse_bus(config, index)).collect();
-    let without: Vec<_> =
-        (0..).zip(&buses).filter(|(_, schedule)| schedule.slot.command_phases_ns.is_none()).collect();
-    if !without.is_empty() {
-        let with_remedies = without.into_iter().map(|(index, schedule)| BusSchedule {
-            remedies: remedy::remedies_at_any_phase(config, index),
-            ..schedule.clone()
-        });
-        return Err(NoCommandPhase(with_remedies.collect()));
-    }
-    let phases = || buses.iter().filter_map(|schedule| Some((schedule, schedule.slot.command_phases_ns?)));
-    let last = phases().max_by_key(|(_, (earliest, _))| *earliest);
-    let first = phases().min_by_key(|(_, (_, latest))| *latest);
-    let (Some((last, (earliest_ns, _))), Some((first, (_, latest_ns)))) = (last, first) else {
-        // Without buses nothing has to be waited for.
-        return Ok(config.cycle.command_phase_ns);
-    };
-    match divide(config.cycle.period_ns, earliest_ns, latest_ns) {
-        Some(command_phase_ns) => Ok(command_phase_ns),
-        None => Err(NoCommandPhase(vec![last.clone(), first.clone()])),
-    }
-}
 
 /// The command phase between these two that leaves both wake-ups the same latency.
 pub(super) fn divide(period_ns: u64, earliest_ns: u64, latest_ns: u64) -> Option<u64> {

@@ -6,7 +6,7 @@ use serde::Serialize;
 use takt_rt::{FrameFormat, FrameKind, Id, TIME_ID, TransmissionType, transparent};
 use takt_wire::bit_fields::{DescribedLifeCycle, FieldDevice, ReplyMoment};
 use takt_wire::canopen::function_code;
-use takt_wire::frame_time::FrameShape;
+use takt_wire::frame_time::{BitRates, FrameShape};
 
 use crate::config::Interface;
 use crate::config::{Axis, Config, Master, Protocol, Supervision};
@@ -182,6 +182,19 @@ pub(super) fn messages(config: &Config, bus_index: usize) -> Vec<BusMessage> {
     messages.retain(|message| message.kind != MessageKind::SetPoint || set_points.insert(message.id));
     messages.sort_by_key(|message| message.id.arbitration_key());
     messages
+}
+
+/// The bit rates of a bus.
+pub(super) fn bit_rates(config: &Config, bus: usize) -> BitRates {
+    let bus = config.buses.get(bus);
+    let nominal = bus.map_or(0, |bus| bus.bit_rate);
+    BitRates { nominal, data: bus.and_then(|bus| bus.data_bit_rate).unwrap_or(nominal) }
+}
+
+/// Those of the messages of a bus that are sent while the axes are enabled.
+pub(super) fn while_enabled<'a>(all: &'a [BusMessage], config: &Config, bus: usize) -> Vec<&'a BusMessage> {
+    let allows_sdo = config.buses.get(bus).is_some_and(|bus| bus.sdo_while_enabled);
+    all.iter().filter(|message| allows_sdo || !message.kind.is_sdo()).collect()
 }
 
 fn message(kind: MessageKind, axis: Option<usize>, id: Id, length: usize, period_ns: u64) -> BusMessage {

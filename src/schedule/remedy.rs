@@ -5,58 +5,10 @@
 //! half of the drives to the odd slots and half to the even ones, and few drives have both. So all of them may answer
 //! the same SYNC, and the worst slot stays as it is; only the load becomes less.
 
-use serde::Serialize;
-
-use super::{BusSchedule, analyse_bus, command_phase};
+use super::analysis::analyse_bus;
+use super::bus_schedule::{BusSchedule, Remedy};
+use super::command_phase;
 use crate::config::{Axis, CommandFrames, Config, Feedback, PhaseChoice};
-
-/// One change that makes a bus fit without any other.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case", tag = "change")]
-#[non_exhaustive]
-pub enum Remedy {
-    /// Another command phase, within this range.
-    CommandPhase {
-        /// The earliest.
-        earliest_ns: u64,
-        /// The latest.
-        latest_ns: u64,
-    },
-    /// Fewer service frames in a cycle.
-    ServiceFrames {
-        /// How many fit.
-        frames: usize,
-    },
-    /// No SDO transfers while the axes are enabled.
-    SdoWhileDisabled,
-    /// No heartbeats of the drives; their feedback shows that they are alive.
-    DriveHeartbeatsOff,
-    /// No time of day.
-    TimeOff,
-    /// Command frames that several axes share.
-    SharedCommandFrames,
-    /// No answers to SYNC: the drives' answers to set-points are feedback enough, a cycle older.
-    NoAnswersToSync,
-    /// Less feedback.
-    SmallerFeedback {
-        /// What to leave out: as few objects as possible, and the smallest of them.
-        without: Vec<Feedback>,
-    },
-    /// No heartbeat of the controller, by which drives notice that it has died.
-    MasterHeartbeatOff,
-    /// Fewer axes on this bus.
-    MoreBuses {
-        /// How many of its axes share a bus then, at the most.
-        axes_per_bus: usize,
-        /// How many buses that makes of this one.
-        buses: usize,
-    },
-    /// A longer cycle.
-    LongerPeriod {
-        /// The period.
-        period_ns: u64,
-    },
-}
 
 /// Multiples of the period that are tried.
 const LONGER_PERIODS: [u64; 4] = [2, 4, 5, 10];

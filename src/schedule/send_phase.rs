@@ -10,7 +10,8 @@
 
 use takt_rt::SlotPlan;
 
-use super::{messages, while_enabled, worst_slot};
+use super::messages::{messages, while_enabled};
+use super::slot::worst_slot;
 use crate::config::{Config, Protocol};
 
 /// What waking up and computing may take with the set-points still at their moment. A longer wait would make them older, and the thread spins
@@ -43,7 +44,7 @@ pub(super) fn held_ns(config: &Config) -> u64 {
 
 /// By how much the set-points of a bus can leave later with everything still in time.
 fn room_ns(config: &Config, bus: usize) -> u64 {
-    let all = messages::messages(config, bus);
+    let all = messages(config, bus);
     let slot = worst_slot(config, bus, &while_enabled(&all, config, bus));
     let cycle = config.bus_cycle(bus);
     if slot.feedback_done_ns > cycle.command_phase_ns {

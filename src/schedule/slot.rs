@@ -19,8 +19,8 @@
 use serde::Serialize;
 use takt_wire::frame_time::{BitRates, worst_case_bits};
 
-use super::messages::{BusMessage, MessageKind};
-use crate::config::Cycle;
+use super::messages::{BusMessage, MessageKind, bit_rates};
+use crate::config::{Axis, Config, Cycle, Protocol};
 
 /// The worst slot of a bus. All times are counted from the start of the slot or are lengths, in ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -180,8 +180,17 @@ impl Replies {
     }
 }
 
+/// The worst slot of a bus with these messages, whose set-points leave as soon as they are made.
+pub(super) fn worst_slot(config: &Config, bus: usize, enabled: &[&BusMessage]) -> Slot {
+    let cycles = config.buses.get(bus).map_or(1, |bus| u64::from(bus.divider.max(1)));
+    let is_timed = |axis: &&Axis| axis.bus == bus && axis.drive.protocol != Protocol::BitFields;
+    let timed = config.axes.iter().filter(is_timed);
+    let feedback_delay_ns = timed.map(|axis| axis.feedback_delay_ns).max().unwrap_or(0);
+    slot_of(enabled, feedback_delay_ns, config.bus_cycle(bus), cycles, bit_rates(config, bus))
+}
+
 /// The worst slot, given the messages that are sent while the axes are enabled. It is so many cycles of the controller long.
-pub(super) fn worst_slot(
+fn slot_of(
     messages: &[&BusMessage],
     feedback_delay_ns: u64,
     cycle: Cycle,

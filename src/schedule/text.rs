@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use super::bus_schedule::{BusSchedule, COMPUTE_RESERVE_NS, Remedy, Shortfall, WAKE_UP_RESERVE_NS};
 use super::messages::MessageKind;
-use super::{BusSchedule, COMPUTE_RESERVE_NS, Remedy, Shortfall, WAKE_UP_RESERVE_NS};
 
 /// A length of time in microseconds.
 pub fn microseconds(ns: u64) -> String {

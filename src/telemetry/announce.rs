@@ -35,7 +35,7 @@ pub(super) fn event(event: &Event, text: &str, machine: &Machine) {
             if code == 0 {
                 info!(target: RUN, slot, group, axis = name, code, register, "{text}");
             } else {
-                let reason = machine.drive_error(axis, code);
+                let reason = machine.drive_error(axis, code).to_string();
                 let cure = machine.drive_cure(axis, code);
                 warn!(target: RUN, slot, group, axis = name, code, register, reason, cure, "{text}");
             }
@@ -67,7 +67,7 @@ fn stop(stop: &StopReason, slot: u64, group: Option<&str>, text: &str, machine: 
     };
     let (axis, bus) = (axis.as_deref(), bus.as_deref());
     let (rule, category) = (words::rule_key(stop.rule()), stop.category as u8);
-    let reason = words::stop(stop, machine);
+    let reason = words::stop(stop, machine).to_string();
     if stop.is_requested() {
         info!(target: RUN, slot, group, axis, bus, rule, category, reason, "{text}");
     } else {

@@ -91,7 +91,7 @@ impl Incident {
     /// A sentence that says what happened.
     pub fn words(&self, machine: &Machine) -> String {
         match self {
-            Self::Stop { stop, .. } => words::stop(stop, machine),
+            Self::Stop { stop, .. } => words::stop(stop, machine).to_string(),
             Self::Drive { axis, code, slot, phase } => {
                 let as_stop = StopReason {
                     category: StopCategory::Zero,
@@ -441,7 +441,7 @@ impl BlackBox {
 fn write_history(history: &History, recording: &mut Recording, machine: &Machine) -> McapResult<()> {
     history.visit(|entry| match entry {
         Entry::Cycle(record) => recording.cycle(record),
-        Entry::Event(event) => recording.event(event, &words::event(event, machine)),
+        Entry::Event(event) => recording.event(event, &words::event(event, machine).to_string()),
         Entry::Frame(frame) => recording.frame(&frame),
         Entry::Health(health) => recording.health(health),
     })

@@ -1,35 +1,35 @@
 //! Keeps the journal of a run: makes blocks of it for the recording.
 
-use crate::journal::{Encoder, RunJournal};
+use crate::journal::{Journal, RunJournal};
 use crate::link::trace::Traced;
 
 /// The journal of a run on its way into the recording.
 pub struct JournalKeeper {
     journal: RunJournal,
-    encoder: Encoder,
+    block: Journal,
 }
 
 impl JournalKeeper {
     /// Keeps this journal.
     pub fn new(journal: RunJournal) -> Self {
-        Self { journal, encoder: Encoder::default() }
+        Self { journal, block: Journal::default() }
     }
 
     /// A block begins. Whatever belongs to a cycle whose end is known by now is in the block, if what has passed the ports is taken
     /// after this call.
     pub fn begin_block(&mut self) {
-        self.journal.drain_clock(&mut self.encoder);
+        self.journal.drain_clock(&mut self.block);
     }
 
     /// Takes what has passed the port of a bus.
     pub fn port(&mut self, bus: usize, traced: &Traced) {
-        self.encoder.port(bus, traced);
+        self.block.add_port(bus, traced);
     }
 
     /// The block, up to what the host has answered by now; nothing if that is nothing.
     pub fn end_block(&mut self) -> Option<Vec<u8>> {
-        self.journal.drain_host(&mut self.encoder);
-        self.encoder.take_block()
+        self.journal.drain_host(&mut self.block);
+        self.block.take_block()
     }
 
     /// Entries that found no room.
@@ -45,7 +45,7 @@ mod tests {
     use super::*;
     use crate::channels::{ChannelSizes, channels, journal};
     use crate::config::Config;
-    use crate::journal::{ClockAnswer, Journal, clock_journal};
+    use crate::journal::{ClockAnswer, clock_journal};
     use crate::link::trace::TracedFrame;
     use takt_rt::{Frame, Id};
 

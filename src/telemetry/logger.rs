@@ -288,9 +288,9 @@ impl Logger {
         let mut incidents = Vec::new();
         while let Some(event) = self.source.take_event() {
             taken += 1;
-            let text = words::event(&event, &self.machine);
+            let text = words::event(&event, &self.machine).to_string();
             if let Some(told) = self.missed_slots.told(event) {
-                announce::event(&told, &words::event(&told, &self.machine), &self.machine);
+                announce::event(&told, &words::event(&told, &self.machine).to_string(), &self.machine);
             }
             let written = self.recording.as_mut().map(|recording| recording.event(&event, &text));
             if let Some(Err(error)) = written {

@@ -7,6 +7,8 @@ use takt_rt::ControlLaw;
 
 use crate::config::{Axis, Config, Travel};
 use crate::family;
+use crate::words;
+use crate::words::Words;
 
 /// Names and units of a controller.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, bitcode::Encode, bitcode::Decode)]
@@ -156,7 +158,7 @@ impl Machine {
     }
 
     /// An error code of the drive of an axis, in words.
-    pub fn drive_error(&self, axis: u8, code: u16) -> String {
+    pub fn drive_error(&self, axis: u8, code: u16) -> Words {
         let own = self.axes.get(usize::from(axis)).map_or(&[][..], |axis| &axis.own_errors);
         family::own_error_words(own, code).unwrap_or_else(|| family::error_words(self.family(axis), code))
     }
@@ -167,11 +169,11 @@ impl Machine {
     }
 
     /// The statusword of an axis in words, with a space before it; nothing where its drive has none: takt makes one of what the drive says.
-    pub(crate) fn statusword(&self, axis: Option<u8>, statusword: u16) -> String {
+    pub(crate) fn statusword(&self, axis: Option<u8>, statusword: u16) -> Words {
         let family = axis.and_then(|axis| self.family(axis)).and_then(family::named);
         match family.is_none_or(|family| family.has_statusword()) {
-            true => format!(" (statusword 0x{statusword:04X})"),
-            false => String::new(),
+            true => words!(" (statusword {word})", word = format!("0x{statusword:04X}")),
+            false => "".into(),
         }
     }
 

@@ -37,7 +37,7 @@ pub fn counted_once(events: &[RecordedEvent]) -> Vec<RecordedEvent> {
     let told = events.iter().filter_map(|event| match missed(event) {
         None => Some(event.clone()),
         Some(_) if std::mem::replace(&mut is_told, true) => None,
-        Some(_) => Some(RecordedEvent { text: words::missed_slots(total), ..event.clone() }),
+        Some(_) => Some(RecordedEvent { text: words::missed_slots(total).to_string(), ..event.clone() }),
     });
     told.collect()
 }

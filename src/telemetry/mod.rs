@@ -73,7 +73,8 @@ pub use recorded::{
 };
 #[doc(hidden)]
 pub use recorded::{
-    RecordedJournal, journal as recorded_journal, journal_in_memory as recorded_journal_in_memory,
+    JournalDefect, RecordedJournal, journal as recorded_journal,
+    journal_in_memory as recorded_journal_in_memory,
 };
 pub use recording_report::{
     AxisCycle, AxisCycles, AxisSummary, BusChange, BusLoadSummary, GroupSummary, RecordingReport,

@@ -51,7 +51,7 @@ pub const PART_NUMBER: &str = "number";
 pub const METADATA: &str = "takt";
 
 /// The version of the format of the journal, in the metadata of its channel.
-pub const JOURNAL_VERSION: &str = "2";
+pub const JOURNAL_VERSION: &str = "3";
 /// The metadata record at the end of a journal.
 pub const JOURNAL_END: &str = "journal end";
 /// The metadata record that names the file of the configuration, and the interfaces that replace those of the file.
@@ -355,7 +355,7 @@ impl Recording {
         self.write(self.event_channel, event.slot, event.at_ns)?;
         let Some(told) = self.missed_slots.told(*event) else { return Ok(()) };
         let so_far = match told.kind {
-            EventKind::MissedSlots { count } => Some(words::missed_slots(count)),
+            EventKind::MissedSlots { count } => Some(words::missed_slots(count).to_string()),
             _ => None,
         };
         let text = so_far.as_deref().unwrap_or(text);

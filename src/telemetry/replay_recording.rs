@@ -58,7 +58,8 @@ impl ReplayRecording {
         let Ok(recording) = &mut self.recording else { return };
         let mut written = recording.cycle(record);
         for event in events {
-            written = written.and_then(|()| recording.event(event, &words::event(event, machine)));
+            written =
+                written.and_then(|()| recording.event(event, &words::event(event, machine).to_string()));
         }
         if let Err(error) = written {
             self.recording = Err(error);

@@ -443,7 +443,7 @@ impl StopReport {
         Self {
             group: several.zip(group).and_then(|(groups, group)| groups.get(group)).cloned(),
             category: stop.category as u8,
-            reason: words::stop_cause(stop, machine),
+            reason: words::stop_cause(stop, machine).to_string(),
             rule: words::rule_key(stop.rule()),
             axis: stop.axis().map(|axis| machine.axis_name(axis)),
             bus: stop.origin.bus().map(|bus| machine.bus_name(bus)),

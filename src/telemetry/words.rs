@@ -6,6 +6,8 @@ use takt_rt::{
 };
 
 use super::machine::Machine;
+use crate::words;
+use crate::words::Words;
 
 mod rejection;
 mod stop;
@@ -44,69 +46,75 @@ pub const fn category(category: StopCategory) -> &'static str {
 }
 
 /// The name of a mode of operation, with its number (object 6060).
-fn mode(number: f64) -> String {
-    match OperationMode::from_number(number as i8) {
-        Some(mode) => format!("mode {number:.0} ({})", mode.name()),
-        None => format!("mode {number:.0}"),
+fn mode(number: i8) -> Words {
+    match OperationMode::from_number(number) {
+        Some(mode) => words!("mode {number} ({name})", number, name = Words::from(mode.name())),
+        None => words!("mode {number}", number),
     }
 }
 
 /// How many slots were missed.
-pub(super) fn missed_slots(count: u64) -> String {
+pub(super) fn missed_slots(count: u64) -> Words {
     match count {
-        1 => "1 slot was missed: the thread was late".to_owned(),
-        _ => format!("{count} slots were missed: the thread was late"),
+        1 => "1 slot was missed: the thread was late".into(),
+        _ => words!("{count} slots were missed: the thread was late", count),
     }
 }
 
 /// An event as one line, without its time. Where there are several groups, the line begins with the one that it concerns, unless
 /// it concerns an axis that it names.
-pub fn event(event: &Event, machine: &Machine) -> String {
+pub fn event(event: &Event, machine: &Machine) -> Words {
     let is_of_axis = matches!(
         event.kind,
         EventKind::DriveState { .. } | EventKind::Mode { .. } | EventKind::Emergency { .. }
     );
+    let what = what_happened(event, machine);
     match event.group.filter(|_| machine.groups.len() > 1 && !is_of_axis) {
-        Some(group) => format!("{}: {}", machine.group_name(group), what_happened(event, machine)),
-        None => what_happened(event, machine),
+        Some(group) => words!("{name}: {what}", name = machine.group_name(group), what),
+        None => what,
     }
 }
 
-fn what_happened(event: &Event, machine: &Machine) -> String {
+fn what_happened(event: &Event, machine: &Machine) -> Words {
     match event.kind {
-        EventKind::PhaseChanged { from, to } => format!("{} → {}", phase(from), phase(to)),
-        EventKind::Stop(reason) => format!("stop: {}", stop(&reason, machine)),
-        EventKind::MotionFinished { request } => format!("motion {} finished", request.0),
-        EventKind::Stream { state: StreamState::Idle } => "stream: over".to_owned(),
-        EventKind::Stream { state: StreamState::Awaited } => "stream: awaited".to_owned(),
-        EventKind::Stream { state: StreamState::Following } => "stream: followed".to_owned(),
+        EventKind::PhaseChanged { from, to } => {
+            words!("{from} → {to}", from = Words::from(phase(from)), to = Words::from(phase(to)))
+        }
+        EventKind::Stop(reason) => words!("stop: {stop}", stop = stop(&reason, machine)),
+        EventKind::MotionFinished { request } => words!("motion {number} finished", number = request.0),
+        EventKind::Stream { state: StreamState::Idle } => "stream: over".into(),
+        EventKind::Stream { state: StreamState::Awaited } => "stream: awaited".into(),
+        EventKind::Stream { state: StreamState::Following } => "stream: followed".into(),
         EventKind::Stream { state: StreamState::Dry } => {
-            "stream: the points have run out, the axes come to rest".to_owned()
+            "stream: the points have run out, the axes come to rest".into()
         }
-        EventKind::Stream { state: StreamState::Callback } => "a callback leads the axes".to_owned(),
-        EventKind::DriveState { axis, state: to, statusword } => {
-            let statusword = machine.statusword(Some(axis), statusword);
-            format!("{}: {}{statusword}", machine.axis_name(axis), to.name())
-        }
+        EventKind::Stream { state: StreamState::Callback } => "a callback leads the axes".into(),
+        EventKind::DriveState { axis, state, statusword } => words!(
+            "{axis}: {state}{statusword}",
+            axis = machine.axis_name(axis),
+            state = Words::from(state.name()),
+            statusword = machine.statusword(Some(axis), statusword)
+        ),
         EventKind::Mode { axis, mode: new } => {
-            format!("{}: changed to {}", machine.axis_name(axis), mode((new as i8).into()))
+            words!("{axis}: changed to {mode}", axis = machine.axis_name(axis), mode = mode(new as i8))
         }
         EventKind::Emergency { axis, code: 0, .. } => {
-            format!("{}: emergency message: no error any more", machine.axis_name(axis))
+            words!("{axis}: emergency message: no error any more", axis = machine.axis_name(axis))
         }
-        EventKind::Emergency { axis, code, register, manufacturer: [a, b, c, d, e] } => format!(
-            "{}: emergency message: error {}, register 0x{register:02X}, \
-             manufacturer {a:02X} {b:02X} {c:02X} {d:02X} {e:02X}; try: {}",
-            machine.axis_name(axis),
-            machine.drive_error(axis, code),
-            machine.drive_cure(axis, code)
+        EventKind::Emergency { axis, code, register, manufacturer: [a, b, c, d, e] } => words!(
+            "{axis}: emergency message: error {error}, register {register}, manufacturer {bytes}; try: {cure}",
+            axis = machine.axis_name(axis),
+            error = machine.drive_error(axis, code),
+            register = format!("0x{register:02X}"),
+            bytes = format!("{a:02X} {b:02X} {c:02X} {d:02X} {e:02X}"),
+            cure = Words::from(machine.drive_cure(axis, code))
         ),
-        EventKind::Timing { level: TimingLevel::Normal } => "missed slots: normal again".to_owned(),
-        EventKind::Timing { level: TimingLevel::Warning } => "missed slots: many".to_owned(),
+        EventKind::Timing { level: TimingLevel::Normal } => "missed slots: normal again".into(),
+        EventKind::Timing { level: TimingLevel::Warning } => "missed slots: many".into(),
         EventKind::Timing { level: TimingLevel::Degraded } => {
-            "missed slots: too many to begin a stream".to_owned()
+            "missed slots: too many to begin a stream".into()
         }
-        EventKind::Timing { level: TimingLevel::Unfit } => "missed slots: too many to go on".to_owned(),
+        EventKind::Timing { level: TimingLevel::Unfit } => "missed slots: too many to go on".into(),
         EventKind::MissedSlots { count } => missed_slots(count),
         EventKind::Rejected(rejected) => rejection(&rejected, machine),
     }
@@ -169,12 +177,12 @@ mod tests {
         damiao.axes[0].family = Some("bit-fields".to_owned());
         let kind = EventKind::DriveState { axis: 0, state: DriveState::OperationEnabled, statusword: 0x0007 };
         let text = event(&Event { slot: 1, at_ns: 2, group: Some(0), kind }, &damiao);
-        assert_eq!(text, "shoulder: operation enabled");
+        assert_eq!(text.to_string(), "shoulder: operation enabled");
     }
 
     #[test]
     fn events_read_as_sentences() {
-        let words = |kind| event(&Event { slot: 1, at_ns: 2, group: Some(0), kind }, &machine());
+        let words = |kind| event(&Event { slot: 1, at_ns: 2, group: Some(0), kind }, &machine()).to_string();
         assert_eq!(
             words(EventKind::PhaseChanged { from: Phase::Enabling, to: Phase::Holding }),
             "enabling → holding"

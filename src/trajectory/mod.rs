@@ -30,7 +30,6 @@ mod point;
 mod tests;
 mod time_law;
 mod waypoints;
-mod words;
 
 use std::sync::Arc;
 
@@ -68,7 +67,7 @@ pub struct TrajectoryConditions<'a> {
 }
 
 /// The way of every axis from point to point. It goes on behind the last one at the velocity there.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, bitcode::Encode, bitcode::Decode)]
 struct Path {
     axes: usize,
     times_s: Vec<f64>,
@@ -79,7 +78,7 @@ struct Path {
 }
 
 /// A trajectory that keeps every limit.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, bitcode::Encode, bitcode::Decode)]
 pub struct Trajectory {
     path: Arc<Path>,
     law: Vec<TimeLawPhase>,
@@ -204,6 +203,12 @@ impl Trajectory {
     /// Where the axes are to be so long after the beginning.
     pub fn sample(&self, at_s: f64) -> TrajectorySample {
         self.view().sample(at_s)
+    }
+
+    /// Returns `true` if there is a polynomial for each axis at each time. A trajectory that was decoded from bytes need not be such.
+    pub(crate) fn is_whole(&self) -> bool {
+        let Path { axes, times_s, polynomials, .. } = &*self.path;
+        times_s.len().checked_mul(*axes) == Some(polynomials.len())
     }
 }
 

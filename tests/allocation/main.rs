@@ -2,6 +2,7 @@
 #![allow(unsafe_code, reason = "a global allocator that counts cannot be written without")]
 
 mod callback;
+mod journal;
 mod memory;
 mod realtime_loop;
 mod simulated_bus;
@@ -16,15 +17,25 @@ struct Heap {
     calls: u64,
     /// Bytes allocated less those freed.
     held_bytes: i64,
+    /// The most of them at a time since [`most_held_by`] was called.
+    highest_bytes: i64,
 }
 
 thread_local! {
-    static HEAP: Cell<Heap> = const { Cell::new(Heap { calls: 0, held_bytes: 0 }) };
+    static HEAP: Cell<Heap> = const { Cell::new(Heap { calls: 0, held_bytes: 0, highest_bytes: 0 }) };
 }
 
 /// Returns what the calling thread has done with the heap so far.
 fn heap() -> Heap {
     HEAP.with(Cell::get)
+}
+
+/// Returns the most bytes that the calling thread holds at a time while it does something, less those that it holds now.
+fn most_held_by(something: impl FnOnce()) -> i64 {
+    let before = heap().held_bytes;
+    HEAP.with(|heap| heap.set(Heap { highest_bytes: before, ..heap.get() }));
+    something();
+    heap().highest_bytes - before
 }
 
 /// The system's allocator with a count for each thread.
@@ -34,8 +45,9 @@ impl Counting {
     fn count(bytes: i64) {
         // A thread that ends frees after its counts are gone.
         let _ = HEAP.try_with(|heap| {
-            let Heap { calls, held_bytes } = heap.get();
-            heap.set(Heap { calls: calls + 1, held_bytes: held_bytes + bytes });
+            let Heap { calls, held_bytes, highest_bytes } = heap.get();
+            let held_bytes = held_bytes + bytes;
+            heap.set(Heap { calls: calls + 1, held_bytes, highest_bytes: highest_bytes.max(held_bytes) });
         });
     }
 }

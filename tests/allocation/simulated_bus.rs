@@ -10,7 +10,6 @@ use takt::faults::{
     Part, ScenarioFault, Selection, Trigger, Window,
 };
 use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
-use takt::sim::erob::{ErobJoint, ErobParameters};
 use takt::sim::homing_switches::ReferenceSwitches;
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
@@ -27,25 +26,6 @@ const JOINT: JointParameters = JointParameters {
     friction_shape: takt::config::FrictionShape::Constant,
     brake_torque: 110.0,
 };
-
-fn drive(node: u8) -> Box<dyn Drive> {
-    Box::new(ErobJoint::new(ErobParameters {
-        node,
-        joint: JOINT,
-        encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
-        counts_per_turn: 524_288.0,
-        initial_position: 0.0,
-        rated_torque: 31.0,
-        peak_torque: 56.0,
-        highest_velocity: 4.0,
-        power_up_ns: 5_000_000,
-        feedback_delay_ns: 20_000,
-        has_battery: true,
-        has_interpolated_position: false,
-        is_upload_segmented: false,
-        seed: 7,
-    }))
-}
 
 /// A second of a master's life: bring-up by SDO, SYNC, set-points, requests in between, a fault, a power cycle, and
 /// more frames than the queues hold.
@@ -103,8 +83,18 @@ fn live<P: BusPort>(bus: &mut P, received: &mut usize, mut breaks: impl FnMut(&m
     }
 }
 
-/// A drive made from the data sheet of the eRob.
+/// An eRob: a drive made from a data sheet and a quirk file.
+fn drive_with_quirks(node: u8) -> Box<dyn Drive> {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("drives/erob-canopen.toml");
+    drive(node, takt::config::quirks::load(&path).unwrap())
+}
+
+/// A drive made from a data sheet alone.
 fn drive_of_a_sheet(node: u8) -> Box<dyn Drive> {
+    drive(node, Quirks::default())
+}
+
+fn drive(node: u8, quirks: Quirks) -> Box<dyn Drive> {
     let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/eds/erob-canopen.eds");
     let axis = Cia402AxisParameters {
         joint: JOINT,
@@ -120,7 +110,7 @@ fn drive_of_a_sheet(node: u8) -> Box<dyn Drive> {
     let parameters = Cia402Parameters {
         sheet: eds::load(&path).unwrap().dictionary,
         node,
-        quirks: Quirks::default(),
+        quirks,
         axes: vec![axis],
         power_up_ns: 5_000_000,
         feedback_delay_ns: 20_000,
@@ -131,7 +121,7 @@ fn drive_of_a_sheet(node: u8) -> Box<dyn Drive> {
 
 #[test]
 fn a_second_on_the_simulated_bus_takes_no_heap_memory() {
-    live_without_memory(drive);
+    live_without_memory(drive_with_quirks);
 }
 
 #[test]
@@ -245,7 +235,7 @@ fn every_effect() -> Vec<Effect> {
 
 #[test]
 fn a_second_with_faults_of_every_kind_takes_no_heap_memory() {
-    let drives = [1, 2, 3].map(drive).into();
+    let drives = [1, 2, 3].map(drive_with_quirks).into();
     let bus = SimulatedBus::with_drives(WireBitRates { nominal: 1_000_000, data: None }, 5_000_000, drives);
     let mut port = Port::Simulated(Box::new(bus));
     let mut all_progress = vec![];

@@ -7,8 +7,8 @@ use std::time::Duration;
 use takt::faults::{DriveEffect, Injectable};
 use takt::rt::RequestTarget;
 use takt::{
-    CommandError, Config, Handle, Outcome, Phase, RecoveryError, RejectReason, Rule, RunningController,
-    Snapshot, StopCategory, VirtualController,
+    CommandError, Config, Handle, Outcome, Phase, RecoveryError, RejectReason, Rule, Snapshot, StopCategory,
+    VirtualController,
 };
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -43,9 +43,9 @@ fn reboot(arm: &VirtualController, axis: usize) {
     does(arm, axis, DriveEffect::Reboot, true);
     let group = arm.groups().iter().position(|group| group.axes.contains(&axis)).unwrap_or(0);
     let is_disabled = |state: &Snapshot| state.groups()[group].phase == Phase::Disabled;
-    if arm.wait_until_seen(Duration::from_secs(10), &mut |state| is_disabled(state)).is_err() {
+    if arm.wait_until(Duration::from_secs(10), |state| is_disabled(state).then_some(())).is_err() {
         arm.disable().unwrap();
-        arm.wait_until_seen(PATIENCE, &mut |state| is_disabled(state)).unwrap();
+        arm.wait_until(PATIENCE, |state| is_disabled(state).then_some(())).unwrap();
     }
 }
 
@@ -88,10 +88,10 @@ fn one_group_is_brought_up_again_while_the_other_moves() {
     let motion = arm.move_to(&[2.0, 1.0, -1.0]).unwrap();
     arm.wait_for(Phase::Moving, PATIENCE).unwrap();
     gripper.bring_up(PATIENCE).unwrap();
-    let state = gripper.state();
+    let state = gripper.group_state();
     let rule = state.stop.map(|stop| stop.rule());
     assert_eq!((state.phase, rule.is_some()), (Phase::Disabled, true), "the fault stays: {state:?}");
-    assert_eq!(arm.state().phase, Phase::Moving, "it took no notice");
+    assert_eq!(arm.group_state().phase, Phase::Moving, "it took no notice");
     gripper.reset_faults().unwrap();
     gripper.enable().unwrap();
     gripper.wait_for(Phase::Holding, PATIENCE).unwrap();
@@ -103,7 +103,7 @@ fn one_group_is_brought_up_again_while_the_other_moves() {
 fn all_groups_recover_though_only_one_of_them_has_stopped() {
     let controller = start("arm-and-gripper.toml");
     reboot(&controller, 3);
-    assert_eq!(controller.group("arm").unwrap().state().phase, Phase::Holding);
+    assert_eq!(controller.group("arm").unwrap().group_state().phase, Phase::Holding);
     controller.recover(PATIENCE).unwrap();
     assert!(controller.state().groups().iter().all(|group| group.phase == Phase::Holding));
     assert_eq!(controller.finish(), Outcome::Finished);
@@ -152,7 +152,7 @@ fn a_group_whose_bring_up_has_failed_is_enabled_only_after_one_that_succeeds() {
     does(&controller, 1, DriveEffect::Silent, false);
     controller.pass(Duration::from_secs(1));
     assert_needs_bring_up(arm.enable());
-    assert_eq!((arm.state().phase, controller.fault()), (Phase::Disabled, None));
+    assert_eq!((arm.group_state().phase, controller.fault()), (Phase::Disabled, None));
     controller.pass(Duration::from_secs(10));
     // The others confirmed that they are disabled before their bring-up.
     let unconfirmed = arm.fault().unwrap().reason;
@@ -246,7 +246,7 @@ fn a_stop_during_a_recovery_leaves_the_arm_disabled() {
 fn a_run_that_ends_while_a_group_is_brought_up_disables_the_others_and_shuts_all_down() {
     let controller = start("arm-and-gripper.toml");
     reboot(&controller, 3);
-    controller.begin_bring_up(RequestTarget::Group(1)).unwrap();
+    controller.of(RequestTarget::Group(1)).begin_bring_up().unwrap();
     assert_eq!(controller.state().groups[1].phase, Phase::Passive);
     controller.disable().unwrap();
     controller.group("arm").unwrap().wait_for(Phase::Disabled, PATIENCE).unwrap();

@@ -140,7 +140,8 @@ fn each_group_is_led_by_a_function_of_its_own() {
     let refused = controller.in_loop(|_, _, _| {}).err();
     let Some(CommandError::Refused(refused)) = refused else { panic!("{refused:?}") };
     assert!(matches!(refused.refusal.unwrap().reason, RejectReason::GroupNotNamed { groups: 2 }));
-    let home: Vec<f64> = arm.axes().iter().map(|axis| controller.state().axes[*axis].position_set).collect();
+    let home: Vec<f64> =
+        arm.axis_numbers().iter().map(|axis| controller.state().axes[*axis].position_set).collect();
     let target = home.clone();
     let mut calls = 0;
     let leading = arm.in_loop(move |state, _, command| {
@@ -154,13 +155,13 @@ fn each_group_is_led_by_a_function_of_its_own() {
     // The gripper is in profile torque: a function can watch it, and it keeps what it was given.
     let gripper = controller.group("gripper").unwrap();
     let watching = gripper.in_loop(|state, _, _| assert_eq!(state.axes().len(), 1)).unwrap();
-    assert_eq!((arm.state().phase, gripper.state().phase), (Phase::Streaming, Phase::Streaming));
+    assert_eq!((arm.group_state().phase, gripper.group_state().phase), (Phase::Streaming, Phase::Streaming));
     assert_eq!(leading.unwrap().wait(PATIENCE), Ok(()));
-    for (axis, home) in arm.axes().iter().zip(&home) {
+    for (axis, home) in arm.axis_numbers().iter().zip(&home) {
         let set = controller.state().axes[*axis].position_set;
         assert!((set - home - 0.05).abs() < 1e-3, "{set} from {home}");
     }
-    assert_eq!((gripper.state().phase, watching.result()), (Phase::Streaming, None));
+    assert_eq!((gripper.group_state().phase, watching.result()), (Phase::Streaming, None));
 }
 
 /// The budget of the calls in virtual time.

@@ -169,6 +169,22 @@ fn a_drive_that_has_them_runs_its_program_in_every_mode_of_positions() {
 }
 
 #[test]
+fn an_erob_by_its_data_sheet_and_quirk_file_moves_as_one_of_its_own_family_in_every_mode() {
+    let file = |name: &str| repository().join(name).display().to_string();
+    let drive = format!(
+        "drive = \"cia402\"\neds = {:?}\nquirks = {:?}",
+        file("configs/eds/erob-canopen.eds"),
+        file("drives/erob-canopen.toml")
+    );
+    for mode in ["csp", "csv", "cst", "ip", "pp", "pv", "pt"] {
+        let text = std::fs::read_to_string(file(&format!("configs/erob-modes/erob-{mode}.toml"))).unwrap();
+        let ends = [text.clone(), text.replace("drive = \"erob-canopen\"", &drive)]
+            .map(|text| run(&Config::parse(mode, &text).unwrap())[0]);
+        assert!((ends[0] - ends[1]).abs() < 0.01, "{mode}: {ends:?}");
+    }
+}
+
+#[test]
 fn what_a_drive_lacks_is_said_and_not_demanded() {
     let sheet = repository().join("tests/eds/vendors/schunk-lwa4p.eds");
     let text = configuration(&format!("eds = {:?}\ncounts_per_turn = 65536", sheet.display().to_string()));

@@ -4,9 +4,10 @@ use std::path::Path;
 use std::time::Duration;
 
 use takt::{
-    AxisPoint, CommandError, Config, MotionError, Outcome, TrajectoryPoint, VirtualController, VirtualRun,
+    AnyHandle, AxisPoint, CommandError, Config, MotionError, Outcome, TrajectoryPoint, VirtualController,
+    VirtualRun,
 };
-use takt_rt::{ControlLaw, EventKind, OperationMode, Phase, Rule, StopCategory, StreamState};
+use takt_rt::{ControlLaw, EventKind, OperationMode, Phase, RequestTarget, Rule, StopCategory, StreamState};
 
 const LONG: Duration = Duration::from_secs(20);
 
@@ -37,9 +38,9 @@ fn a_torque_that_expires_stops_the_gripper_and_the_arm_arrives() {
     let motion = arm.move_to(&[0.6, -0.3, 0.4]).unwrap();
     controller.torque(3, 1.0, Duration::from_millis(50)).unwrap();
     gripper.wait_for(Phase::Disabled, LONG).unwrap();
-    assert_eq!(gripper.state().stop.unwrap().rule(), Rule::StaleCommand);
+    assert_eq!(gripper.group_state().stop.unwrap().rule(), Rule::StaleCommand);
     controller.wait(motion, LONG).unwrap();
-    assert_eq!((arm.state().phase, arm.state().stop), (Phase::Holding, None));
+    assert_eq!((arm.group_state().phase, arm.group_state().stop), (Phase::Holding, None));
     let mut stops = Vec::new();
     for event in &mut events {
         if matches!(event.kind, EventKind::Stop(_)) {
@@ -63,7 +64,7 @@ fn a_stop_of_the_arm_stops_the_gripper_too_and_not_the_other_way_round() {
     let motion = arm.move_to(&[1.0, -0.5, 0.5]).unwrap();
     gripper.stop(StopCategory::One).unwrap();
     gripper.wait_for(Phase::Disabled, LONG).unwrap();
-    assert_eq!(arm.state().phase, Phase::Moving);
+    assert_eq!(arm.group_state().phase, Phase::Moving);
     gripper.enable().unwrap();
     gripper.wait_for(Phase::Holding, LONG).unwrap();
     arm.stop(StopCategory::One).unwrap();
@@ -83,7 +84,23 @@ fn what_is_meant_for_one_group_says_so_where_it_cannot_be_for_all() {
     assert!(refused.contains("must name it: arm, gripper"), "{refused}");
     let arm = controller.group("arm").unwrap();
     assert!(matches!(arm.move_to(&[0.1; 4]), Err(CommandError::Count { given: 4, axes: 3 })));
-    assert_eq!(arm.axes(), [0, 1, 2]);
+    assert_eq!(arm.axis_numbers(), [0, 1, 2]);
+    assert_eq!(controller.finish(), Outcome::Finished);
+}
+
+#[test]
+fn a_handle_of_any_controller_commands_a_group_and_names_the_others() {
+    let controller = VirtualController::start(&config(), None).unwrap();
+    let arm: AnyHandle = controller.group("arm").unwrap().into();
+    assert_eq!((arm.target(), arm.axis_numbers()), (RequestTarget::Group(0), vec![0, 1, 2]));
+    let motion = arm.move_to(&[0.1, -0.1, 0.1]).unwrap();
+    assert_eq!(arm.wait(motion, LONG), Ok(()));
+    let gripper = arm.group("gripper").unwrap();
+    assert_eq!(gripper.axis_numbers(), [3]);
+    gripper.disable().unwrap();
+    gripper.wait_for(Phase::Disabled, LONG).unwrap();
+    assert_eq!(arm.group_state().phase, Phase::Holding);
+    assert_eq!(arm.of(RequestTarget::All).axis_numbers(), [0, 1, 2, 3]);
     assert_eq!(controller.finish(), Outcome::Finished);
 }
 
@@ -112,7 +129,7 @@ fn the_mode_of_one_group_is_changed_while_the_other_moves() {
     gripper.wait_for(Phase::Disabled, LONG).unwrap();
     let change = gripper.change_mode(csv).unwrap();
     controller.wait(change, LONG).unwrap();
-    assert_eq!(arm.state().phase, Phase::Moving);
+    assert_eq!(arm.group_state().phase, Phase::Moving);
     gripper.enable().unwrap();
     gripper.wait_for(Phase::Holding, LONG).unwrap();
     let closing = gripper.move_to(&[0.2]).unwrap();
@@ -164,7 +181,7 @@ fn a_group_is_carried_along_a_trajectory_while_the_other_one_streams() {
     let point = TrajectoryPoint { time_s: 0.8, positions: vec![0.2], ..TrajectoryPoint::default() };
     let motion = gripper.execute(&[point]).unwrap();
     controller.set_speed(motion, 0.8).unwrap();
-    assert!(controller.trajectory_progress(motion).unwrap().of_s == 0.8);
+    assert!(controller.trajectory_progress(motion).unwrap().unwrap().of_s == 0.8);
     controller.wait(motion, LONG).unwrap();
     let state = controller.state();
     assert!((state.axes[3].position_set - 0.2).abs() < 1e-9);

@@ -34,11 +34,12 @@ fn a_trajectory_is_carried_out_paused_slowed_down_resumed_and_replaced() {
     let points = [point(&arm, 0.5, 0.1), point(&arm, 2.0, 0.3)];
     let motion = arm.execute(&points).unwrap();
     arm.pause(motion).unwrap();
-    let at_rest = |arm: &Handle| arm.trajectory_progress(motion).is_some_and(|progress| progress.rate == 0.0);
+    let at_rest =
+        |arm: &Handle| arm.trajectory_progress(motion).unwrap().is_some_and(|progress| progress.rate == 0.0);
     arm.wait_until(PATIENCE, |_| at_rest(&arm).then_some(())).unwrap();
     let paused = arm.state();
     assert_eq!(paused.groups[0].phase, Phase::Moving);
-    let progress = arm.trajectory_progress(motion).unwrap();
+    let progress = arm.trajectory_progress(motion).unwrap().unwrap();
     assert!(progress.path_s > 0.0 && progress.path_s < progress.of_s);
     assert_eq!(progress.of_s, 2.0);
     arm.set_speed(motion, 0.5).unwrap();

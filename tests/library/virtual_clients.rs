@@ -9,8 +9,8 @@ use std::time::Duration;
 use takt::config::Interface;
 use takt::rt::RequestTarget;
 use takt::{
-    Config, MotionError, MoveOptions, Outcome, Phase, RunningController, Snapshot, StartFailure,
-    StopCategory, StreamState, TrajectoryPoint, VirtualController, WaitError,
+    Config, MotionError, MoveOptions, Outcome, Phase, Snapshot, StartFailure, StopCategory, StreamState,
+    TrajectoryPoint, VirtualController, WaitError,
 };
 
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -149,11 +149,11 @@ fn a_group_is_moved_by_a_distance_alone() {
     let controller = VirtualController::start(&config, None).unwrap();
     let arm = controller.group("arm").unwrap();
     let before = set_points(&controller.state());
-    let distance: Vec<f64> = arm.axes().iter().map(|_| 0.05).collect();
+    let distance: Vec<f64> = arm.axis_numbers().iter().map(|_| 0.05).collect();
     let motion = arm.move_by(&distance, MoveOptions::default()).unwrap();
     controller.wait(motion, PATIENCE).unwrap();
     for (axis, (now, before)) in set_points(&controller.state()).iter().zip(&before).enumerate() {
-        let expected = if arm.axes().contains(&axis) { 0.05 } else { 0.0 };
+        let expected = if arm.axis_numbers().contains(&axis) { 0.05 } else { 0.0 };
         assert!((now - before - expected).abs() < 1e-9, "axis {axis}");
     }
 }
@@ -162,11 +162,11 @@ fn a_group_is_moved_by_a_distance_alone() {
 fn a_stop_of_the_only_group_by_its_number_stops_it() {
     let arm = simulated("first.toml");
     let only = RequestTarget::Group(0);
-    let motion = arm.begin_move(only, &[0.5], MoveOptions::default()).unwrap();
+    let motion = arm.of(only).move_with(&[0.5], MoveOptions::default()).unwrap();
     arm.step(200);
-    let before = arm.newest_stop(only);
-    arm.request_stop(only, StopCategory::Two).unwrap();
-    assert_eq!(arm.wait_until_still(only, before, PATIENCE), Ok(()));
+    let before = arm.of(only).newest_stop();
+    arm.of(only).stop(StopCategory::Two).unwrap();
+    assert_eq!(arm.of(only).wait_until_still(before, PATIENCE), Ok(()));
     assert!(matches!(arm.wait(motion, PATIENCE), Err(MotionError::Stopped(_))));
     assert_eq!(arm.state().groups()[0].phase, Phase::Holding);
 }

@@ -103,7 +103,7 @@ fn only_its_own_folder_and_the_simulation_name_a_family() {
     let crates = ["src", "rt/src", "crates/wire/src", "crates/remote/src", "crates/tools/src"];
     let files = crates.into_iter().chain(FRONTS).flat_map(rust_files);
     let is_of_family = |name: &str| {
-        let folders = ["erob", "erob_can", "erob_canopen", "erob_modbus", "yz_aim", "cia402", "hollow"]
+        let folders = ["erob", "erob_can", "erob_modbus", "yz_aim", "cia402", "hollow"]
             .map(|family| format!("src/family/{family}/"));
         name.starts_with("crates/wire/src/erob_can/")
             || name.starts_with("crates/wire/src/hollow_lines/")

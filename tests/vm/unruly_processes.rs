@@ -93,7 +93,7 @@ fn beside(name: &str, takt: &mut Child, lasting: Duration) -> Result {
         watching.state().axes().iter().map(|axis| axis.position_set.to_string()).collect();
     watching.begin_stream()?;
     watching.release()?;
-    let (begun, begun_ns) = (Instant::now(), takt_remote::ClientStream::now_ns().to_string());
+    let (begun, begun_ns) = (Instant::now(), takt_remote::now_ns().to_string());
     let spawn = |role: &str| {
         Command::new(std::env::current_exe()?).args(["client", role, name, &begun_ns]).args(&home).spawn()
     };
@@ -148,7 +148,7 @@ fn client(arguments: &[String]) -> Result {
     let motion =
         Motion { home: home.iter().map(|home| home.parse()).collect::<std::result::Result<_, _>>()? };
     let begun_ns: u64 = begun_ns.parse()?;
-    let since = || Duration::from_nanos(takt_remote::ClientStream::now_ns().saturating_sub(begun_ns));
+    let since = || Duration::from_nanos(takt_remote::now_ns().saturating_sub(begun_ns));
     let client = connect(name)?;
     match role.as_str() {
         "stream" => stream(&client, &motion, since),
@@ -176,7 +176,7 @@ fn stream(client: &Client, motion: &Motion, since: impl Fn() -> Duration) -> Res
 fn flood(client: &Client, motion: &Motion, since: impl Fn() -> Duration) -> Result {
     loop {
         let chunk = motion.chunk(since());
-        let pushed = client.stream().push_chunk(takt_remote::ClientStream::now_ns(), INTERVAL, &chunk);
+        let pushed = client.stream().push_chunk(takt_remote::now_ns(), INTERVAL, &chunk);
         if let Err(StreamError::Lease(_)) = pushed {
             let _ = client.take_over();
         }

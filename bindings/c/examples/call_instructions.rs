@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::mem::MaybeUninit;
 use std::ptr;
 
-use takt::{Config, MoveOptions, RunningController, StopCategory, VirtualController};
+use takt::{Config, MoveOptions, StopCategory, VirtualController};
 use takt_c::errors::takt_result::{self, TAKT_OK};
 use takt_c::handles::takt_handle;
 use takt_c::life::{takt_now_ns, takt_stop};
@@ -77,7 +77,7 @@ fn in_rust(work: &str, repetitions: u64) -> bool {
             assert_eq!(arm.stream().push(stamp_ns, &positions), Ok(()));
         }),
         "rust-look-at-state-6" => (0..repetitions).for_each(|_| {
-            arm.look_at_state(&mut |shown| assert!(black_box(shown).slot > 0));
+            arm.look_at_state(|shown| assert!(black_box(shown).slot > 0));
         }),
         "rust-stop" => (0..repetitions).for_each(|_| assert_eq!(arm.stop(StopCategory::Two), Ok(()))),
         "simulate-6" => assert_eq!(arm.step(repetitions), repetitions),

@@ -485,22 +485,6 @@ typedef struct {
   char name[TAKT_NAME_LENGTH];
 } takt_group;
 
-// The last failure of a call in this thread. Set `size` to `sizeof(takt_error)`.
-typedef struct {
-  // `sizeof(takt_error)`
-  uint32_t size;
-  // What the call returned.
-  takt_result result;
-  // The point of a trajectory or of a chunk that it concerns, from 0 on; -1 where it is none.
-  int32_t point;
-  // The axis that it concerns, from 0 on, as the call counts the axes; -1 where it is none.
-  int32_t axis;
-  // The value that is beyond a limit: rad, rad/s, rad/s^2, rad/s^3, N·m (m, N); NAN where there is none.
-  double value;
-  // The limit that it is beyond; NAN where there is none.
-  double limit;
-} takt_error;
-
 // A place among the events of a controller. `{0}` is the null handle.
 typedef struct {
   // Not for you.
@@ -528,6 +512,22 @@ typedef struct {
   // It as a sentence, with the names of axes and buses. UTF-8.
   char words[TAKT_WORDS_LENGTH];
 } takt_event;
+
+// The last failure of a call in this thread. Set `size` to `sizeof(takt_error)`.
+typedef struct {
+  // `sizeof(takt_error)`
+  uint32_t size;
+  // What the call returned.
+  takt_result result;
+  // The point of a trajectory or of a chunk that it concerns, from 0 on; -1 where it is none.
+  int32_t point;
+  // The axis that it concerns, from 0 on, as the call counts the axes; -1 where it is none.
+  int32_t axis;
+  // The value that is beyond a limit: rad, rad/s, rad/s^2, rad/s^3, N·m (m, N); NAN where there is none.
+  double value;
+  // The limit that it is beyond; NAN where there is none.
+  double limit;
+} takt_error;
 
 // One group after a cycle.
 typedef struct {
@@ -803,17 +803,6 @@ takt_result takt_open_group(takt_handle handle,
                             const char *name,
                             takt_handle *group);
 
-// The last failure of a call in this thread, as a sentence that names what and where, and the cure where one is known; empty before the
-// first failure. UTF-8. It stays valid until the next failure of a call in this thread. Any thread; does not block.
-const char *takt_last_error_text(void);
-
-// The last failure of a call in this thread, as numbers: which point, axis and limit. Any thread; does not block.
-//
-// Errors: TAKT_ERROR_ARGUMENT.
-//
-// Pointers: `error` is null, or points to a structure of the size that it says.
-takt_result takt_last_error(takt_error *error);
-
 // Opens a place among the events of a controller, from now on. Each has its own. Of a group, they are those of its controller.
 //
 // Any thread, not in a callback; does not block. takt_close_events() closes it.
@@ -842,6 +831,17 @@ takt_result takt_next_event(takt_events events,
 //
 // Errors: TAKT_ERROR_HANDLE.
 takt_result takt_close_events(takt_events events);
+
+// The last failure of a call in this thread, as a sentence that names what and where, and the cure where one is known; empty before the
+// first failure. UTF-8. It stays valid until the next failure of a call in this thread. Any thread; does not block.
+const char *takt_last_error_text(void);
+
+// The last failure of a call in this thread, as numbers: which point, axis and limit. Any thread; does not block.
+//
+// Errors: TAKT_ERROR_ARGUMENT.
+//
+// Pointers: `error` is null, or points to a structure of the size that it says.
+takt_result takt_last_error(takt_error *error);
 
 // The version of the library: "0.1.0". Any thread; does not block.
 const char *takt_version(void);

@@ -190,7 +190,7 @@ mod tests {
 
     fn text() -> String {
         // SAFETY: it is a text until the next failure of this thread.
-        unsafe { CStr::from_ptr(errors::takt_last_error_text()) }.to_string_lossy().into_owned()
+        unsafe { CStr::from_ptr(errors::last_words()) }.to_string_lossy().into_owned()
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! A controller of another process: connecting to it, and who commands it.
 
 use std::ffi::c_char;
-use std::sync::Arc;
 
 use crate::border::{self, Growing};
 use crate::errors::takt_result;
-use crate::handles::{self, Entry, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
 use crate::life::command;
+use crate::scope::Scope;
 
 /// Who commands a controller that is served to other processes. Set `size` to `sizeof(takt_lease)`.
 #[derive(Clone, Copy, Debug)]
@@ -47,7 +47,7 @@ pub unsafe extern "C" fn takt_connect(name: *const c_char, handle: *mut takt_han
         border::check_pointer(handle, "handle")?;
         // SAFETY: the caller promises it.
         let name = unsafe { border::text(name, "name") }?;
-        let scope = Scope::all(Arc::new(takt_remote::connect(name)?), None, None);
+        let scope = Scope::all(takt_remote::connect(name)?.into(), None, None);
         let number = handles::open(Entry::Scope(scope))?;
         // SAFETY: the caller promises it.
         unsafe { border::put(handle, takt_handle { number }, "handle") }

@@ -7,7 +7,8 @@ use takt::telemetry::Unit;
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{self, Entry, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
+use crate::scope::Scope;
 
 /// Room for a name, with the zero at its end.
 pub const TAKT_NAME_LENGTH: usize = 64;
@@ -220,7 +221,7 @@ pub unsafe extern "C" fn takt_open_group(
         // SAFETY: the caller promises it.
         let name = unsafe { border::text(name, "name") }?;
         let refused = |error| Failure::of_command(&error, &scope);
-        let found = scope.controller.group_named(name).map_err(refused)?;
+        let found = scope.controller.group(name).map_err(refused)?.target();
         let number = handles::open(Entry::Scope(scope.group(found)))?;
         // SAFETY: the caller promises it.
         unsafe { border::put(group, takt_handle { number }, "group") }

@@ -7,8 +7,7 @@ use takt::trajectory::{RateError, TrajectoryError};
 use takt::{CommandError, Error, MotionError, PointRefusal, Refused, RejectReason, StreamError, WaitError};
 use takt_remote::ConnectError;
 
-use crate::border::{self, Growing};
-use crate::handles::Scope;
+use crate::scope::Scope;
 
 /// What a call has come to. Below 0 is a failure: then takt_last_error() and takt_last_error_text() say more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,11 +76,6 @@ pub struct takt_error {
     pub limit: f64,
 }
 
-// SAFETY: it begins with its size; it is only written for the caller, so no pattern of bits is ever taken for a value.
-unsafe impl Growing for takt_error {
-    const FIRST_SIZE: usize = size_of::<Self>();
-}
-
 /// Why a call has failed.
 #[derive(Debug)]
 pub(crate) struct Failure {
@@ -123,26 +117,14 @@ pub(crate) fn keep(failure: Failure) -> takt_result {
     result
 }
 
-/// The last failure of a call in this thread, as a sentence that names what and where, and the cure where one is known; empty before the
-/// first failure. UTF-8. It stays valid until the next failure of a call in this thread. Any thread; does not block.
-#[unsafe(no_mangle)]
-pub extern "C" fn takt_last_error_text() -> *const c_char {
-    LAST.try_with(|last| last.borrow().words.as_ptr()).unwrap_or(c"".as_ptr())
+/// The last error of this thread.
+pub(crate) fn last() -> takt_error {
+    LAST.try_with(|last| last.borrow().error).unwrap_or(NONE)
 }
 
-/// The last failure of a call in this thread, as numbers: which point, axis and limit. Any thread; does not block.
-///
-/// Errors: TAKT_ERROR_ARGUMENT.
-///
-/// # Safety
-/// `error` is null, or points to a structure of the size that it says.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn takt_last_error(error: *mut takt_error) -> takt_result {
-    border::carry_out(|| {
-        let last = LAST.try_with(|last| last.borrow().error).unwrap_or(NONE);
-        // SAFETY: the caller promises it.
-        unsafe { border::put_growing(error, &last, "error") }
-    })
+/// The words of the last error of this thread. They stay until the next one.
+pub(crate) fn last_words() -> *const c_char {
+    LAST.try_with(|last| last.borrow().words.as_ptr()).unwrap_or(c"".as_ptr())
 }
 
 impl Failure {

@@ -1,10 +1,10 @@
 //! What happens in a controller, polled or waited for, with its words.
 
 use std::ffi::c_char;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use takt::telemetry::{Machine, event_words};
-use takt::{Event, EventKind, EventSource};
+use takt::{Event, EventKind, Events};
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::takt_result;
@@ -84,8 +84,8 @@ pub unsafe extern "C" fn takt_open_events(handle: takt_handle, events: *mut takt
     border::carry_out(|| {
         border::check_pointer(events, "events")?;
         let scope = handle.scope()?;
-        let source = Mutex::new(scope.controller.event_source());
-        let number = handles::open(Entry::Events(source, Arc::clone(&scope.controller)))?;
+        let source = Mutex::new(scope.controller.events());
+        let number = handles::open(Entry::Events(source, scope.controller.clone()))?;
         // SAFETY: the caller promises it.
         unsafe { border::put(events, takt_events { number }, "events") }
     })
@@ -113,7 +113,7 @@ pub unsafe extern "C-unwind" fn takt_next_event(
         border::check_pointer(event, "event")?;
         let mut reader = reader.lock().unwrap_or_else(PoisonError::into_inner);
         let taken = reader.wait(timeout)?;
-        let shown = takt_event::of(&taken, &**reader, controller.machine());
+        let shown = takt_event::of(&taken, &reader, controller.machine());
         // SAFETY: the caller promises it.
         unsafe { border::put_growing(event, &shown, "event") }
     });
@@ -132,7 +132,7 @@ pub extern "C" fn takt_close_events(events: takt_events) -> takt_result {
 }
 
 impl takt_event {
-    fn of(event: &Event, events: &dyn EventSource, machine: &Machine) -> Self {
+    fn of(event: &Event, events: &Events, machine: &Machine) -> Self {
         let (kind, axis, code) = meaning(&event.kind);
         Self {
             size: size_of::<Self>() as u32,
@@ -143,7 +143,7 @@ impl takt_event {
             axis: axis.map_or(-1, i32::from),
             code,
             missed: events.missed(),
-            words: put_text(&event_words(event, machine)),
+            words: put_text(&event_words(event, machine).to_string()),
         }
     }
 }

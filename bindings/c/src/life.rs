@@ -7,8 +7,9 @@ use takt::{CommandError, Outcome, Phase, StopCategory};
 
 use crate::border;
 use crate::errors::{self, Failure, takt_result};
-use crate::handles::{self, Entry, Owner, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
 use crate::posix;
+use crate::scope::{Owner, Scope};
 use crate::state::{put_state, takt_phase, takt_state};
 
 /// How a stop is made (IEC 60204-1, 9.2.2). It is not safety-rated: for that the drives have STO, in hardware.
@@ -97,7 +98,7 @@ pub extern "C" fn takt_stop(handle: takt_handle, category: i32) -> takt_result {
             Ok(scope) => scope,
             Err(why) => return why.result(),
         };
-        let stopped = scope.controller.request_stop(scope.target, category);
+        let stopped = scope.controller.stop(category);
         stopped.map_or_else(|error| errors::result_of(&error), |()| takt_result::TAKT_OK)
     })
 }
@@ -110,7 +111,7 @@ pub extern "C" fn takt_stop(handle: takt_handle, category: i32) -> takt_result {
 /// Errors: TAKT_ERROR_REFUSED, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_disable(handle: takt_handle) -> takt_result {
-    command(handle, |scope| scope.controller.begin_disable(scope.target))
+    command(handle, |scope| scope.controller.disable())
 }
 
 /// Begins to enable the drives again: after takt_disable(), or after a fault and takt_clear_faults(). takt_wait_phase() with
@@ -121,7 +122,7 @@ pub extern "C" fn takt_disable(handle: takt_handle) -> takt_result {
 /// Errors: TAKT_ERROR_REFUSED unless the axes are disabled and no fault is left, TAKT_ERROR_FULL, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_enable(handle: takt_handle) -> takt_result {
-    command(handle, |scope| scope.controller.begin_enable(scope.target))
+    command(handle, |scope| scope.controller.enable())
 }
 
 /// Clears the faults that have stopped the axes. Look at the machine first: takt does not know whether the cause is gone.
@@ -131,7 +132,7 @@ pub extern "C" fn takt_enable(handle: takt_handle) -> takt_result {
 /// Errors: TAKT_ERROR_REFUSED in motion, TAKT_ERROR_FULL, TAKT_ERROR_ENDED, TAKT_ERROR_HANDLE.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_clear_faults(handle: takt_handle) -> takt_result {
-    command(handle, |scope| scope.controller.clear_faults(scope.target))
+    command(handle, |scope| scope.controller.reset_faults())
 }
 
 pub(crate) fn command(
@@ -193,7 +194,7 @@ pub extern "C-unwind" fn takt_wait_phase(handle: takt_handle, phase: i32, timeou
         let wanted = Phase::ALL.into_iter().find(|known| *known as i32 == phase);
         let wanted =
             wanted.ok_or_else(|| Failure::argument(format!("phase is {phase}, which is no takt_phase")))?;
-        Ok(scope.controller.wait_for_phase(scope.target, wanted, timeout)?)
+        Ok(scope.controller.wait_for(wanted, timeout)?)
     });
     posix::cancellation_point();
     result

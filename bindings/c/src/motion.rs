@@ -6,8 +6,9 @@ use takt::{CommandError, MotionId, MoveOptions, OperationMode};
 
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
 use crate::posix;
+use crate::scope::Scope;
 
 /// A motion that was begun, for takt_wait(). It needs not be closed. A copy of it is as good.
 #[derive(Clone, Copy, Debug)]
@@ -75,8 +76,7 @@ pub unsafe extern "C" fn takt_move_to(
     options: *const takt_move_options,
     motion: *mut takt_motion,
 ) -> takt_result {
-    let act =
-        |scope: &Scope, targets: &[f64], options| scope.controller.begin_move(scope.target, targets, options);
+    let act = |scope: &Scope, targets: &[f64], options| scope.controller.move_with(targets, options);
     // SAFETY: the caller promises it.
     unsafe { move_axes(handle, (targets, axes, "targets"), options, motion, act) }
 }
@@ -93,9 +93,7 @@ pub unsafe extern "C" fn takt_move_by(
     options: *const takt_move_options,
     motion: *mut takt_motion,
 ) -> takt_result {
-    let act = |scope: &Scope, distances: &[f64], options| {
-        scope.controller.begin_move_by(scope.target, distances, options)
-    };
+    let act = |scope: &Scope, distances: &[f64], options| scope.controller.move_by(distances, options);
     // SAFETY: the caller promises it.
     unsafe { move_axes(handle, (distances, axes, "distances"), options, motion, act) }
 }
@@ -181,7 +179,7 @@ pub unsafe extern "C" fn takt_change_mode(
 ) -> takt_result {
     begin(handle, motion, |scope| {
         let mode = operation_mode(mode)?;
-        Ok(scope.controller.begin_mode_change(scope.target, mode))
+        Ok(scope.controller.change_mode(mode))
     })
 }
 

@@ -12,7 +12,8 @@ use takt::{
 
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{self, Entry, Owner, Scope, takt_handle};
+use crate::handles::{self, Entry, takt_handle};
+use crate::scope::{Owner, Scope};
 
 /// Where the drives of a controller are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -191,7 +192,7 @@ unsafe fn open(
         Owner::Real(controller) => controller.handle(),
         Owner::Virtual(controller) => controller.handle(),
     };
-    let scope = Scope::all(Arc::new(own.clone()), Some(own), Some(owner));
+    let scope = Scope::all(own.clone().into(), Some(own), Some(owner));
     let number = handles::open(Entry::Scope(scope))?;
     // SAFETY: the caller promises it.
     unsafe { border::put(handle, takt_handle { number }, "handle") }

@@ -7,7 +7,8 @@ use takt::{AxisSnapshot, BusHealth, Snapshot, StopReason, TimingLevel};
 
 use crate::border::{self, Growing, put_text};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
+use crate::scope::Scope;
 
 /// The most axes of a controller.
 pub const TAKT_MAX_AXES: usize = 32;
@@ -224,7 +225,7 @@ pub unsafe extern "C" fn takt_read_state(handle: takt_handle, state: *mut takt_s
     border::carry_out(|| {
         let scope = handle.scope()?;
         let mut put = Ok(());
-        scope.controller.look_at_state(&mut |shown| {
+        scope.controller.look_at_state(|shown| {
             // SAFETY: the caller promises it.
             put = unsafe { put_state(&scope, shown, state) };
         });

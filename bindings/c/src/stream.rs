@@ -7,7 +7,8 @@ use takt::rt::{MAX_AXES, PositionPoint};
 
 use crate::border;
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
+use crate::scope::Scope;
 use crate::trajectory::{check_axes, values};
 
 /// What is wanted of an axis.
@@ -97,7 +98,7 @@ impl takt_target {
 pub extern "C" fn takt_begin_stream(handle: takt_handle) -> takt_result {
     border::carry_out(|| {
         let scope = handle.scope()?;
-        let begun = scope.controller.begin_streaming(scope.target);
+        let begun = scope.controller.begin_stream();
         begun.map_err(|error| Failure::of_command(&error, &scope))
     })
 }
@@ -239,14 +240,14 @@ pub unsafe extern "C" fn takt_push_positions_chunk(
 }
 
 fn push(scope: &Scope, at_ns: u64, entries: &[AxisPoint]) -> Result<(), Failure> {
-    let pushed = scope.controller.push_point(scope.target, at_ns, entries);
+    let pushed = scope.controller.stream().push(at_ns, entries);
     pushed.map_err(|error| Failure::of_stream(error, scope))
 }
 
 fn push_chunk(scope: &Scope, from_ns: u64, interval_ns: u64, entries: &[AxisPoint]) -> Result<(), Failure> {
     let rows: Vec<Vec<AxisPoint>> = entries.chunks(scope.axes.len().max(1)).map(<[_]>::to_vec).collect();
     let interval = Duration::from_nanos(interval_ns);
-    let pushed = scope.controller.push_chunk(scope.target, from_ns, interval, &rows);
+    let pushed = scope.controller.stream().push_chunk(from_ns, interval, &rows);
     pushed.map_err(|error| Failure::of_stream(error, scope))
 }
 

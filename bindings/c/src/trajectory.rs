@@ -4,8 +4,9 @@ use takt::TrajectoryPoint;
 
 use crate::border::{self, Growing};
 use crate::errors::{Failure, takt_result};
-use crate::handles::{Scope, takt_handle};
+use crate::handles::takt_handle;
 use crate::motion::{begin, takt_motion};
+use crate::scope::Scope;
 
 /// How far a trajectory is. Set `size` to `sizeof(takt_progress)`.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +76,7 @@ pub unsafe extern "C" fn takt_execute(
             accelerations: row(accelerations, point),
         };
         let points: Vec<TrajectoryPoint> = times_s.iter().enumerate().map(point).collect();
-        Ok(scope.controller.begin_trajectory(scope.target, &points))
+        Ok(scope.controller.execute(&points))
     })
 }
 
@@ -102,7 +103,7 @@ pub unsafe extern "C" fn takt_move_through(
         // SAFETY: the caller promises it.
         let all = unsafe { border::array(waypoints, values(points, axes)?, "waypoints") }?;
         let waypoints: Vec<Vec<f64>> = all.chunks(axes).map(<[f64]>::to_vec).collect();
-        Ok(scope.controller.begin_through(scope.target, &waypoints))
+        Ok(scope.controller.move_through(&waypoints))
     })
 }
 

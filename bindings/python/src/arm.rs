@@ -10,8 +10,7 @@ use pyo3::types::{PyBool, PyDict, PyTuple};
 use takt::config::Interface;
 use takt::telemetry::RealtimeReport;
 use takt::{
-    Controller, Handle, IfOwned, Phase, RecordingDestination, RunningController, SessionOptions, WaitError,
-    schedule,
+    AnyHandle, Controller, Handle, IfOwned, Phase, RecordingDestination, SessionOptions, WaitError, schedule,
 };
 
 use crate::config::config;
@@ -43,7 +42,7 @@ impl Arm {
         let (link, group) = match &owned {
             Owned::Real(controller) => of_own(controller),
             Owned::Virtual(controller) => of_own(controller),
-            Owned::Served(client) => with_all(Link::to_served(client.clone()), client),
+            Owned::Served(client) => with_all(Link::to_served(client.clone()), client.clone().into()),
         };
         let axes = link.axis_names().len();
         let arm = Self { owner: Owner::new(owned, link.clone()), link, recorder, axes };
@@ -52,11 +51,11 @@ impl Arm {
 }
 
 fn of_own(handle: &Handle) -> (Link, Group) {
-    with_all(Link::to_own(handle.clone()), handle)
+    with_all(Link::to_own(handle.clone()), handle.clone().into())
 }
 
-fn with_all(link: Link, controller: &dyn RunningController) -> (Link, Group) {
-    let group = Group::all(link.clone(), controller);
+fn with_all(link: Link, controller: AnyHandle) -> (Link, Group) {
+    let group = Group::all(link.clone(), &controller);
     (link, group)
 }
 
@@ -168,7 +167,7 @@ impl Arm {
 
     /// The events from now on.
     fn events(&self, py: Python<'_>) -> PyResult<Events> {
-        Ok(Events::new(self.link.clone(), self.link.controller(py)?.event_source()))
+        Ok(Events::new(self.link.clone(), self.link.controller(py)?.events()))
     }
 
     /// Records every cycle from now on, for no more than so many seconds.

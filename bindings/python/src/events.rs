@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use pyo3::prelude::*;
 use takt::telemetry::{Machine, event_words};
-use takt::{EventKind, EventSource, WaitError};
+use takt::{EventKind, WaitError};
 
 use crate::error::raise_ended;
 use crate::link::{Link, seconds};
@@ -66,7 +66,7 @@ impl Event {
             },
             axis: axis.and_then(|axis| machine.axes.get(usize::from(axis))).map(|axis| axis.name.clone()),
             group: group.cloned(),
-            words: event_words(event, machine),
+            words: event_words(event, machine).to_string(),
         }
     }
 }
@@ -75,11 +75,11 @@ impl Event {
 #[pyclass(module = "takt", frozen)]
 pub struct Events {
     link: Link,
-    events: Mutex<Box<dyn EventSource>>,
+    events: Mutex<takt::Events>,
 }
 
 impl Events {
-    pub fn new(link: Link, events: Box<dyn EventSource>) -> Self {
+    pub fn new(link: Link, events: takt::Events) -> Self {
         Self { link, events: Mutex::new(events) }
     }
 

@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use takt::config::{MODES, mode_word};
 use takt::rt::RequestTarget;
 use takt::{
-    CommandError, MotionId, MoveOptions, OperationMode, Phase, RunningController, StopCategory,
-    TrajectoryPoint, WaitError,
+    AnyHandle, CommandError, MotionId, MoveOptions, OperationMode, Phase, StopCategory, TrajectoryPoint,
+    WaitError,
 };
 
 use crate::array;
@@ -54,22 +54,22 @@ pub struct Group {
 
 impl Group {
     /// All axes of a controller.
-    pub fn all(link: Link, controller: &dyn RunningController) -> Self {
+    pub fn all(link: Link, controller: &AnyHandle) -> Self {
         let target = RequestTarget::All;
-        let (name, axes) = (controller.machine().name.clone(), controller.axes_of(target).into());
+        let (name, axes) = (controller.machine().name.clone(), controller.of(target).axis_numbers().into());
         Self { link, target, name, axes }
     }
 
     /// The group with this name.
     pub fn named(&self, py: Python<'_>, name: &str) -> PyResult<Self> {
         let controller = self.link.controller(py)?;
-        let target = controller.group_named(name).map_err(|error| self.command_error(py, &error))?;
-        let axes = controller.axes_of(target).into();
+        let target = controller.group(name).map_err(|error| self.command_error(py, &error))?.target();
+        let axes = controller.of(target).axis_numbers().into();
         Ok(Self { link: self.link.clone(), target, name: name.to_owned(), axes })
     }
 
     /// Its name, and what its axes are doing, for the text of an object.
-    pub fn shown(&self, controller: &dyn RunningController) -> (&str, &'static str) {
+    pub fn shown(&self, controller: &AnyHandle) -> (&str, &'static str) {
         (&self.name, State::of(&self.link, controller, &self.axes, self.target).phase())
     }
 
@@ -85,7 +85,7 @@ impl Group {
     fn command<T: Send>(
         &self,
         py: Python<'_>,
-        command: impl FnOnce(&dyn RunningController, RequestTarget) -> Result<T, CommandError> + Send,
+        command: impl FnOnce(&AnyHandle, RequestTarget) -> Result<T, CommandError> + Send,
     ) -> PyResult<T> {
         let controller = self.link.controller(py)?;
         let commanded = py.detach(|| command(controller, self.target));
@@ -110,9 +110,9 @@ impl Group {
         words: &str,
     ) -> PyResult<()> {
         let reached = until(py, &self.link, timeout, words, |controller, at_most| {
-            match controller.wait_for_phase(self.target, phase, at_most) {
+            match controller.of(self.target).wait_for(phase, at_most) {
                 Err(WaitError::NotInTime) => {
-                    controller.fault_in(self.target).map(|stopped| Err(Some(stopped)))
+                    controller.of(self.target).fault().map(|stopped| Err(Some(stopped)))
                 }
                 Ok(()) => Some(Ok(())),
                 Err(WaitError::Ended) => Some(Err(None)),
@@ -195,7 +195,7 @@ impl Group {
             acceleration_scale: acceleration,
             minimum_duration_s: duration,
         };
-        let id = self.command(py, |arm, whose| arm.begin_move(whose, &target, options))?;
+        let id = self.command(py, |arm, whose| arm.of(whose).move_with(&target, options))?;
         self.begun(py, id, wait, timeout)
     }
 
@@ -211,7 +211,7 @@ impl Group {
         longest(py, timeout)?;
         let waypoints: Vec<Vec<f64>> =
             array::table("waypoints", waypoints)?.rows().map(<[f64]>::to_vec).collect();
-        let id = self.command(py, |arm, whose| arm.begin_through(whose, &waypoints))?;
+        let id = self.command(py, |arm, whose| arm.of(whose).move_through(&waypoints))?;
         self.begun(py, id, wait, timeout)
     }
 
@@ -253,13 +253,13 @@ impl Group {
         for (point, qdd) in points.iter_mut().zip(accelerations.iter().flat_map(array::Table::rows)) {
             point.accelerations = qdd.to_vec();
         }
-        let id = self.command(py, |arm, whose| arm.begin_trajectory(whose, &points))?;
+        let id = self.command(py, |arm, whose| arm.of(whose).execute(&points))?;
         self.begun(py, id, wait, timeout)
     }
 
     /// Begins to follow a stream of points, until the stream is closed.
     fn follow(&self, py: Python<'_>) -> PyResult<Stream> {
-        self.command(py, |arm, whose| arm.begin_streaming(whose))?;
+        self.command(py, |arm, whose| arm.of(whose).begin_stream())?;
         Ok(Stream::new(self.link.clone(), self.target, Arc::clone(&self.axes)))
     }
 
@@ -283,7 +283,7 @@ impl Group {
         };
         let stopped = match wait {
             true => stop_and_wait(py, &self.link, self.target, category, timeout)?,
-            false => self.link.controller(py)?.request_stop(self.target, category),
+            false => self.link.controller(py)?.of(self.target).stop(category),
         };
         stopped.map_err(|error| self.command_error(py, &error))
     }
@@ -293,11 +293,11 @@ impl Group {
     fn enable(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
         let controller = self.link.controller(py)?;
         longest(py, timeout)?;
-        let is_enabled = controller.wait_for_phase(self.target, Phase::Holding, Duration::ZERO).is_ok();
-        if is_enabled && controller.fault_in(self.target).is_none() {
+        let is_enabled = controller.of(self.target).wait_for(Phase::Holding, Duration::ZERO).is_ok();
+        if is_enabled && controller.of(self.target).fault().is_none() {
             return Ok(());
         }
-        self.command(py, |arm, whose| arm.begin_enable(whose))?;
+        self.command(py, |arm, whose| arm.of(whose).enable())?;
         self.wait_for_phase(py, Phase::Holding, timeout, "the axes have not been enabled in time")
     }
 
@@ -305,13 +305,13 @@ impl Group {
     #[pyo3(signature = (timeout=30.0))]
     fn disable(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
         longest(py, timeout)?;
-        self.command(py, |arm, whose| arm.begin_disable(whose))?;
+        self.command(py, |arm, whose| arm.of(whose).disable())?;
         self.wait_for_phase(py, Phase::Disabled, timeout, "the axes have not been disabled in time")
     }
 
     /// Clears the fault that has stopped the axes. They stay disabled.
     fn clear_fault(&self, py: Python<'_>) -> PyResult<()> {
-        self.command(py, |arm, whose| arm.clear_faults(whose))
+        self.command(py, |arm, whose| arm.of(whose).reset_faults())
     }
 
     /// Changes the mode of operation of every axis, or of one.
@@ -326,7 +326,7 @@ impl Group {
         longest(py, timeout)?;
         let mode = operation_mode(py, mode)?;
         let id = match axis {
-            None => self.command(py, |arm, whose| arm.begin_mode_change(whose, mode))?,
+            None => self.command(py, |arm, whose| arm.of(whose).change_mode(mode))?,
             Some(axis) => {
                 let axis = self.axis_number(py, axis)?;
                 self.command(py, |arm, _| arm.change_axis_mode(axis, mode))?
@@ -370,7 +370,7 @@ impl Group {
         py: Python<'_>,
         axis: &Bound<'_, PyAny>,
         valid_for: f64,
-        drive: impl FnOnce(&dyn RunningController, usize, Duration) -> Result<MotionId, CommandError> + Send,
+        drive: impl FnOnce(&AnyHandle, usize, Duration) -> Result<MotionId, CommandError> + Send,
     ) -> PyResult<Motion> {
         let axis = self.axis_number(py, axis)?;
         let valid_for = duration(py, "valid_for", valid_for)?;

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use takt::{Handle, RunningController};
+use takt::{AnyHandle, Handle};
 use takt_remote::Client;
 
 use crate::error::{raise, raise_argument};
@@ -24,7 +24,7 @@ pub fn after_fork() {
 /// A controller, and the process that may use it.
 #[derive(Clone)]
 pub struct Link {
-    controller: Arc<dyn RunningController>,
+    controller: AnyHandle,
     /// The same, if this program owns it.
     own: Option<Handle>,
     process: u32,
@@ -36,21 +36,21 @@ pub struct Link {
 impl Link {
     /// To a controller of this process.
     pub fn to_own(handle: Handle) -> Self {
-        Self { own: Some(handle.clone()), ..Self::to(Arc::new(handle)) }
+        Self { own: Some(handle.clone()), ..Self::to(handle.into()) }
     }
 
     /// To one of another process.
     pub fn to_served(client: Client) -> Self {
-        Self::to(Arc::new(client))
+        Self::to(client.into())
     }
 
-    fn to(controller: Arc<dyn RunningController>) -> Self {
+    fn to(controller: AnyHandle) -> Self {
         let forks = FORKS.load(Ordering::Relaxed);
         Self { controller, own: None, process: process::id(), forks, is_closed: Arc::default() }
     }
 
     /// The controller, in the process that has it or has connected to it. A fork has a copy of the memory, and none of the threads.
-    pub fn controller(&self, py: Python<'_>) -> PyResult<&dyn RunningController> {
+    pub fn controller(&self, py: Python<'_>) -> PyResult<&AnyHandle> {
         if !self.is_of_this_process() {
             let words = format!(
                 "the controller is in process {}, and this is a fork of it; command it from there, or start workers by \
@@ -62,19 +62,19 @@ impl Link {
         if self.is_closed.load(Ordering::Acquire) {
             return Err(raise(py, "EndedError", "the connection to the controller is closed", &[]));
         }
-        Ok(&*self.controller)
+        Ok(&self.controller)
     }
 
     /// The controller, for what says nothing where there is none: the text of an object.
-    pub fn usable(&self) -> Option<&dyn RunningController> {
+    pub fn usable(&self) -> Option<&AnyHandle> {
         let is_usable = self.is_of_this_process() && !self.is_closed.load(Ordering::Acquire);
-        is_usable.then_some(&*self.controller)
+        is_usable.then_some(&self.controller)
     }
 
     /// The same, for a thread of its own.
-    pub fn shared(&self, py: Python<'_>) -> PyResult<Arc<dyn RunningController>> {
+    pub fn shared(&self, py: Python<'_>) -> PyResult<AnyHandle> {
         self.controller(py)?;
-        Ok(Arc::clone(&self.controller))
+        Ok(self.controller.clone())
     }
 
     /// The controller, for what only the program that runs it can do.

@@ -1,7 +1,7 @@
 //! A motion under way.
 
 use pyo3::prelude::*;
-use takt::{MotionError, MotionId, RunningController};
+use takt::{AnyHandle, MotionError, MotionId};
 
 use crate::error::{raise_command, raise_motion};
 use crate::link::Link;
@@ -22,7 +22,7 @@ impl Motion {
     fn command(
         &self,
         py: Python<'_>,
-        command: impl FnOnce(&dyn RunningController, MotionId) -> Result<(), takt::CommandError> + Send,
+        command: impl FnOnce(&AnyHandle, MotionId) -> Result<(), takt::CommandError> + Send,
     ) -> PyResult<()> {
         let controller = self.link.controller(py)?;
         let commanded = py.detach(|| command(controller, self.id));

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use takt::rt::{AxisRecord, CycleRecord};
 use takt::telemetry::EachCycle;
-use takt::{AxisSnapshot, RunningController, Snapshot, WaitError};
+use takt::{AnyHandle, AxisSnapshot, Snapshot, WaitError};
 
 use crate::array::{array, array_of_rows};
 use crate::link::{Link, seconds};
@@ -76,7 +76,7 @@ impl Recorder {
         if !link.is_own() {
             let watched = link.shared(py)?;
             let (recorder, of) = (self.clone(), Arc::downgrade(&tape));
-            let watch = move || recorder.watch(&*watched, &of, after);
+            let watch = move || recorder.watch(&watched, &of, after);
             thread::Builder::new().name("takt-record".into()).spawn(watch)?;
         }
         Ok(Recording { link, tape, after, recorder: self.clone() })
@@ -84,7 +84,7 @@ impl Recorder {
 
     /// Writes each cycle of a controller that hands over no records, until the recording ends. A cycle that this thread sleeps through is
     /// not in it.
-    fn watch(&self, controller: &dyn RunningController, tape: &Weak<Tape>, mut after: u64) {
+    fn watch(&self, controller: &AnyHandle, tape: &Weak<Tape>, mut after: u64) {
         while lock(&self.0.tapes).iter().any(|own| own.ptr_eq(tape)) {
             match controller.cycle_after(after, SILENCE) {
                 Ok(state) => {

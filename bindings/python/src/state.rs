@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use takt::config::mode_word;
 use takt::rt::RequestTarget;
 use takt::telemetry::phase_words;
-use takt::{AxisSnapshot, OperationMode, Phase, RunningController};
+use takt::{AnyHandle, AxisSnapshot, OperationMode, Phase};
 
 use crate::array::{array, array_of_bools};
 use crate::link::{Link, seconds};
@@ -31,12 +31,7 @@ pub struct State {
 
 impl State {
     /// The state of the axes with these numbers, which are those of the target.
-    pub fn of(
-        link: &Link,
-        controller: &dyn RunningController,
-        numbers: &Arc<[usize]>,
-        target: RequestTarget,
-    ) -> Self {
+    pub fn of(link: &Link, controller: &AnyHandle, numbers: &Arc<[usize]>, target: RequestTarget) -> Self {
         let mut state = Self {
             link: link.clone(),
             numbers: Arc::clone(numbers),
@@ -49,7 +44,7 @@ impl State {
             missed_slots: 0,
         };
         let mut is_faulty = false;
-        controller.look_at_state(&mut |snapshot| {
+        controller.look_at_state(|snapshot| {
             state.axes.extend(numbers.iter().filter_map(|number| snapshot.axes().get(*number)));
             let is_meant = |number: usize| match target {
                 RequestTarget::All => true,
@@ -66,7 +61,7 @@ impl State {
         });
         state.now_ns = controller.now_ns();
         if is_faulty {
-            state.fault = controller.fault_in(target).map(|fault| fault.to_string());
+            state.fault = controller.of(target).fault().map(|fault| fault.to_string());
         }
         state
     }

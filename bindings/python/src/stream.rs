@@ -7,8 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use takt::rt::{PositionPoint, RequestTarget};
 use takt::{
-    AxisPoint, CommandError, MotionError, RunningController, Snapshot, StopCategory, StreamError,
-    StreamState, WaitError,
+    AnyHandle, AxisPoint, CommandError, MotionError, Snapshot, StopCategory, StreamError, StreamState,
+    WaitError,
 };
 
 use crate::array::{self, Table};
@@ -131,13 +131,7 @@ impl Stream {
     }
 
     /// A stamp in nanoseconds of the controller's clock.
-    fn stamp(
-        &self,
-        py: Python<'_>,
-        controller: &dyn RunningController,
-        what: &str,
-        t: Option<f64>,
-    ) -> PyResult<u64> {
+    fn stamp(&self, py: Python<'_>, controller: &AnyHandle, what: &str, t: Option<f64>) -> PyResult<u64> {
         match t {
             None => Ok(controller.now_ns()),
             Some(t) => Ok(u64::try_from(duration(py, what, t)?.as_nanos()).unwrap_or(u64::MAX)),
@@ -148,10 +142,10 @@ impl Stream {
     fn handed(
         &self,
         py: Python<'_>,
-        controller: &dyn RunningController,
+        controller: &AnyHandle,
         result: Result<(), StreamError>,
     ) -> PyResult<()> {
-        result.map_err(|error| match (error, controller.fault_in(self.target)) {
+        result.map_err(|error| match (error, controller.of(self.target).fault()) {
             (StreamError::NotStreaming, Some(stopped)) => {
                 raise_stopped(py, &self.link.axis_names(), &stopped)
             }
@@ -193,7 +187,7 @@ impl Stream {
         let parts = Given { q, qd, qdd, torque, kp, kd }.read(py, self.axes.len(), row)?;
         let point = parts.row(py, 0, self.axes.len())?;
         let at_ns = self.stamp(py, controller, "t", t)?;
-        let handed = py.detach(|| controller.push_point(self.target, at_ns, &point));
+        let handed = py.detach(|| controller.of(self.target).stream().push(at_ns, &point));
         self.handed(py, controller, handed)
     }
 
@@ -220,26 +214,26 @@ impl Stream {
         let rows = 0..parts.rows.max(1);
         let points = rows.map(|row| parts.row(py, row, self.axes.len())).collect::<PyResult<Vec<_>>>()?;
         let from_ns = self.stamp(py, controller, "t0", t0)?;
-        let handed = py.detach(|| controller.push_chunk(self.target, from_ns, interval, &points));
+        let handed = py.detach(|| controller.of(self.target).stream().push_chunk(from_ns, interval, &points));
         self.handed(py, controller, handed)
     }
 
     /// What it is doing: "awaited", "following", "dry", "idle".
     #[getter]
     fn state(&self, py: Python<'_>) -> PyResult<&'static str> {
-        Ok(self.link.controller(py)?.stream_report(self.target).state.name())
+        Ok(self.link.controller(py)?.of(self.target).stream().report().state.name())
     }
 
     /// How far the set-points are behind the stamps now, in seconds.
     #[getter]
     fn lag(&self, py: Python<'_>) -> PyResult<f64> {
-        Ok(seconds(self.link.controller(py)?.stream_report(self.target).counts.lag_ns))
+        Ok(seconds(self.link.controller(py)?.of(self.target).stream().report().counts.lag_ns))
     }
 
     /// The points that have come, that came too late for their time, and that were lost.
     #[getter]
     fn counts(&self, py: Python<'_>) -> PyResult<(u64, u64, u64)> {
-        let counts = self.link.controller(py)?.stream_report(self.target).counts;
+        let counts = self.link.controller(py)?.of(self.target).stream().report().counts;
         Ok((counts.points, counts.late_points, counts.lost_points))
     }
 
@@ -252,13 +246,13 @@ impl Stream {
             axes.all(|axis| axis.velocity_set.abs() < AT_REST)
         };
         let is_over = until(py, &self.link, timeout, late, |controller, at_most| {
-            let over = controller.wait_until_seen(at_most, &mut |state| match controller
-                .stream_report(self.target)
-                .state
-            {
-                StreamState::Following => false,
-                StreamState::Dry => is_at_rest(state),
-                StreamState::Idle | StreamState::Awaited | StreamState::Callback => true,
+            let over = controller.wait_until(at_most, |state| {
+                let is_over = match controller.of(self.target).stream().report().state {
+                    StreamState::Following => false,
+                    StreamState::Dry => is_at_rest(state),
+                    StreamState::Idle | StreamState::Awaited | StreamState::Callback => true,
+                };
+                is_over.then_some(())
             });
             match over {
                 Err(WaitError::NotInTime) => None,
@@ -266,13 +260,13 @@ impl Stream {
             }
         })?;
         let controller = self.link.controller(py)?;
-        if let Some(stopped) = controller.fault_in(self.target) {
+        if let Some(stopped) = controller.of(self.target).fault() {
             return Err(raise_stopped(py, &self.link.axis_names(), &stopped));
         }
         if is_over.is_err() {
             return Err(raise_motion(py, &self.names(), &MotionError::Ended));
         }
-        match controller.stream_report(self.target).state {
+        match controller.of(self.target).stream().report().state {
             StreamState::Idle => Ok(()),
             _ => self.stop(py),
         }
@@ -296,7 +290,7 @@ impl Stream {
 
     fn __repr__(&self) -> String {
         let Some(controller) = self.link.usable() else { return "<stream of a closed arm>".to_owned() };
-        let report = controller.stream_report(self.target);
+        let report = controller.of(self.target).stream().report();
         let lag = Duration::from_nanos(report.counts.lag_ns);
         format!("<stream {}, {lag:?} behind the stamps>", report.state.name())
     }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use pyo3::prelude::*;
 use takt::rt::RequestTarget;
-use takt::{CommandError, RunningController, StopCategory, WaitError};
+use takt::{AnyHandle, CommandError, StopCategory, WaitError};
 
 use crate::error::raise_timeout;
 use crate::link::{Link, duration};
@@ -35,7 +35,7 @@ pub fn until<T: Send>(
     link: &Link,
     timeout: Option<f64>,
     words: &str,
-    attempt: impl FnMut(&dyn RunningController, Duration) -> Option<T> + Send,
+    attempt: impl FnMut(&AnyHandle, Duration) -> Option<T> + Send,
 ) -> PyResult<T> {
     until_interrupted(py, link, timeout, words, Interrupted::Stop, attempt)
 }
@@ -47,7 +47,7 @@ pub fn until_interrupted<T: Send>(
     timeout: Option<f64>,
     words: &str,
     interrupted: Interrupted,
-    mut attempt: impl FnMut(&dyn RunningController, Duration) -> Option<T> + Send,
+    mut attempt: impl FnMut(&AnyHandle, Duration) -> Option<T> + Send,
 ) -> PyResult<T> {
     let controller = link.controller(py)?;
     let timeout = longest(py, timeout)?;
@@ -70,10 +70,10 @@ pub fn until_interrupted<T: Send>(
 }
 
 /// Runs the handlers of signals that have come. If one raises, the axes stop.
-pub fn look_for_signals(py: Python<'_>, controller: &dyn RunningController) -> PyResult<()> {
+pub fn look_for_signals(py: Python<'_>, controller: &AnyHandle) -> PyResult<()> {
     py.check_signals().inspect_err(|_| {
         // It is refused only after the end.
-        let _ = controller.request_stop(RequestTarget::All, StopCategory::Two);
+        let _ = controller.stop(StopCategory::Two);
     })
 }
 
@@ -86,12 +86,12 @@ pub fn stop_and_wait(
     timeout: Option<f64>,
 ) -> PyResult<Result<(), CommandError>> {
     let controller = link.controller(py)?;
-    let before = controller.newest_stop(target);
-    if let Err(error) = controller.request_stop(target, category) {
+    let before = controller.of(target).newest_stop();
+    if let Err(error) = controller.of(target).stop(category) {
         return Ok(Err(error));
     }
     until(py, link, timeout, "the axes have not come to rest in time", |controller, at_most| {
-        let still = controller.wait_until_still(target, before, at_most);
+        let still = controller.of(target).wait_until_still(before, at_most);
         (still != Err(WaitError::NotInTime)).then_some(())
     })?;
     Ok(Ok(()))

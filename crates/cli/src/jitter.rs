@@ -1,5 +1,7 @@
 //! `takt jitter`: how evenly this machine paces the loop.
 
+mod histograms;
+
 use std::fs;
 use std::io::{IsTerminal, stderr};
 use std::path::PathBuf;
@@ -132,7 +134,7 @@ fn progress_bar(cycles: u64, pacing: Pacing) -> ProgressBar {
 fn draw(path: &PathBuf, options: &JitterOptions, measurements: &[Measurement]) -> bool {
     let bus = options.interface.as_ref().map_or_else(String::new, |bus| format!(", SYNC on {bus}"));
     let title = format!("{} cycles of {} µs{bus}", options.cycles, options.period_ns / 1_000);
-    let written = fs::write(path, jitter::svg(&title, measurements));
+    let written = fs::write(path, histograms::draw(&title, measurements));
     if let Err(error) = &written {
         say!("takt: {} cannot be written: {error}", path.display());
     }

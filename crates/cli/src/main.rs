@@ -33,6 +33,7 @@ mod scan;
 mod send;
 mod service;
 mod sim;
+mod svg;
 mod table;
 mod top;
 mod usage_error;

@@ -375,9 +375,9 @@ fn ending(
 fn failure(error: PlayError, machine: &Machine) -> String {
     match error {
         PlayError::Ended => "the run has ended".to_owned(),
-        PlayError::Stopped(stop) => words::stop(&stop, machine),
+        PlayError::Stopped(stop) => words::stop(&stop, machine).to_string(),
         PlayError::Replaced => "another client has moved the arm".to_owned(),
-        PlayError::Refused(Some(refusal)) => words::rejection(&refusal, machine),
+        PlayError::Refused(Some(refusal)) => words::rejection(&refusal, machine).to_string(),
         PlayError::Refused(None) => "a request was refused; the reason is no longer known".to_owned(),
         PlayError::Command(words) => words,
     }

@@ -8,6 +8,8 @@ use std::net::{IpAddr, SocketAddr};
 
 use axum::http::HeaderMap;
 use axum::http::header::{AUTHORIZATION, HOST, ORIGIN};
+use takt::words;
+use takt::words::Words;
 
 /// The shortest token, in characters.
 pub const TOKEN_AT_LEAST: usize = 16;
@@ -20,28 +22,42 @@ pub struct Access {
 }
 
 /// Why a request is refused.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Denied {
     /// The `Host` header names another server.
-    #[error(
-        "{host:?} is not an address of this panel; open it by its address or by localhost, or start takt with --panel-origin"
-    )]
     Host {
         /// What it names.
         host: String,
     },
     /// The request comes from a page of another site.
-    #[error("the request comes from a page of another site, {origin:?}")]
     Origin {
         /// The site.
         origin: String,
     },
     /// The token is missing.
-    #[error("the panel needs its token")]
     NoToken,
     /// It is another token.
-    #[error("this is not the token of the panel")]
     WrongToken,
+}
+
+impl Denied {
+    /// The sentence.
+    pub fn words(&self) -> Words {
+        match self {
+            Self::Host { host } => words!(
+                "{host} is not an address of this panel; open it by its address or by localhost, or start takt with --panel-origin",
+                host = format!("{host:?}")
+            ),
+            Self::Origin { origin } => {
+                words!(
+                    "the request comes from a page of another site, {origin}",
+                    origin = format!("{origin:?}")
+                )
+            }
+            Self::NoToken => "the panel needs its token".into(),
+            Self::WrongToken => "this is not the token of the panel".into(),
+        }
+    }
 }
 
 /// Why a token, or an origin, cannot be one.

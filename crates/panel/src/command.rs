@@ -5,9 +5,12 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 use takt_rt::{OperationMode, RequestTarget};
 
-use super::chinese::Words;
-use takt::command::{CommandError, MotionError, MotionId, MoveOptions, RecoveryError, RunningController};
-use takt::telemetry::Machine;
+use takt::command::{
+    AnyHandle, CommandError, MotionError, MotionId, MoveOptions, RecoveryError, Refused, StreamError,
+};
+use takt::telemetry::{self, Machine};
+use takt::words;
+use takt::words::Words;
 
 /// How long a command waits to learn that its motion was refused. A cycle takes a few milliseconds at most.
 const REFUSED_WITHIN: Duration = Duration::from_millis(60);
@@ -141,19 +144,15 @@ pub enum Lasts {
 }
 
 /// Why a command was not carried out.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum CommandRefusal {
     /// The controller refuses it.
-    #[error(transparent)]
-    Controller(#[from] CommandError),
+    Controller(CommandError),
     /// The motion that it began has ended at once.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
+    Motion(MotionError),
     /// Drives were not brought up again.
-    #[error(transparent)]
-    BringUp(#[from] RecoveryError),
+    BringUp(RecoveryError),
     /// There is no such group.
-    #[error("there is no group {group}: there are {groups}, counted from 0")]
     NoSuchGroup {
         /// What was named.
         group: u8,
@@ -161,13 +160,11 @@ pub enum CommandRefusal {
         groups: usize,
     },
     /// There is no such mode.
-    #[error("there is no mode {mode}")]
     NoSuchMode {
         /// What was named.
         mode: i8,
     },
     /// The mode of the axis does not take it.
-    #[error("{axis} is in {mode}, which takes no {quantity} from here")]
     WrongMode {
         /// The axis.
         axis: String,
@@ -177,21 +174,28 @@ pub enum CommandRefusal {
         quantity: &'static str,
     },
     /// Nothing is to be renewed or released.
-    #[error("the motion has ended; begin it again")]
     NothingToRenew,
     /// A stop has come in between.
-    #[error("a stop has discarded the command before it began")]
     Discarded,
     /// Too many commands wait.
-    #[error("too many commands wait for the controller")]
     Busy,
     /// Something is done with a drive already.
-    #[error("something is done with a drive already: wait for its end, or end it")]
     BusyWithDrive,
     /// The stream of points is refused.
-    #[error(transparent)]
-    Stream(#[from] takt::command::StreamError),
+    Stream(StreamError),
 }
+
+macro_rules! from_errors {
+    ($($refusal:ident($error:ty),)*) => {$(
+        impl From<$error> for CommandRefusal {
+            fn from(error: $error) -> Self {
+                Self::$refusal(error)
+            }
+        }
+    )*};
+}
+
+from_errors!(Controller(CommandError), Motion(MotionError), BringUp(RecoveryError), Stream(StreamError),);
 
 impl CommandRefusal {
     /// Its word for programs.
@@ -207,9 +211,51 @@ impl CommandRefusal {
         }
     }
 
-    /// As pages are told it.
-    pub fn view(&self) -> ProblemView {
-        ProblemView::of(self.key(), self.to_string())
+    /// The sentence about a machine.
+    fn words_about(&self, machine: &Machine) -> Words {
+        match self {
+            Self::Controller(CommandError::Refused(Refused { refusal: Some(refusal), .. }))
+            | Self::Motion(MotionError::Refused(Refused { refusal: Some(refusal), .. }))
+            | Self::BringUp(RecoveryError::Command(CommandError::Refused(Refused {
+                refusal: Some(refusal),
+                ..
+            }))) => telemetry::words::rejection(refusal, machine),
+            Self::Motion(MotionError::Stopped(stopped)) | Self::BringUp(RecoveryError::Stopped(stopped)) => {
+                let stop = telemetry::words::stop(&stopped.reason, machine);
+                words!("the group has stopped: {stop}", stop)
+            }
+            _ => self.words(),
+        }
+    }
+
+    fn words(&self) -> Words {
+        match self {
+            Self::Controller(error) => error.words(),
+            Self::Motion(error) => error.words(),
+            Self::BringUp(error) => error.words(),
+            Self::Stream(error) => error.words(),
+            Self::NoSuchGroup { group, groups } => {
+                words!("there is no group {group}: there are {groups}, counted from 0", group, groups)
+            }
+            Self::NoSuchMode { mode } => words!("there is no mode {mode}", mode),
+            Self::WrongMode { axis, mode, quantity } => words!(
+                "{axis} is in {mode}, which takes no {quantity} from here",
+                axis,
+                mode = Words::from(*mode),
+                quantity = Words::from(*quantity)
+            ),
+            Self::NothingToRenew => "the motion has ended; begin it again".into(),
+            Self::Discarded => "a stop has discarded the command before it began".into(),
+            Self::Busy => "too many commands wait for the controller".into(),
+            Self::BusyWithDrive => {
+                "something is done with a drive already: wait for its end, or end it".into()
+            }
+        }
+    }
+
+    /// As pages are told it. A rejection and a stop are worded with the names of the machine; without it, in English.
+    pub fn view(&self, machine: Option<&Machine>) -> ProblemView {
+        ProblemView::of(self.key(), machine.map_or_else(|| self.words(), |machine| self.words_about(machine)))
     }
 }
 
@@ -222,9 +268,9 @@ pub struct ProblemView {
 }
 
 impl ProblemView {
-    /// A problem in the words of takt.
-    pub fn of(error: &'static str, words: String) -> Self {
-        Self { error, words: Words::of(words) }
+    /// A problem in words.
+    pub fn of(error: &'static str, words: impl Into<Words>) -> Self {
+        Self { error, words: words.into() }
     }
 }
 
@@ -258,18 +304,13 @@ pub fn target_of_axis(axis: usize, machine: &Machine) -> Result<RequestTarget, C
 }
 
 /// The set-points of the axes of a target, with one axis somewhere else.
-pub fn positions_with(
-    controller: &dyn RunningController,
-    target: RequestTarget,
-    axis: usize,
-    position: f64,
-) -> Vec<f64> {
+pub fn positions_with(controller: &AnyHandle, target: RequestTarget, axis: usize, position: f64) -> Vec<f64> {
     let state = controller.state();
     let of = |number: &usize| match *number == axis {
         true => position,
         false => state.axes().get(*number).map_or(0.0, |axis| axis.position_set),
     };
-    controller.axes_of(target).iter().map(of).collect()
+    controller.of(target).axis_numbers().iter().map(of).collect()
 }
 
 /// Begins a move, and waits whether it is refused at once.
@@ -277,12 +318,12 @@ pub fn positions_with(
 /// # Errors
 /// See [`CommandRefusal`]; nothing moves then.
 pub fn begin_move(
-    controller: &dyn RunningController,
+    controller: &AnyHandle,
     target: RequestTarget,
     positions: &[f64],
     options: MoveOptions,
 ) -> Result<MotionId, CommandRefusal> {
-    let motion = controller.begin_move(target, positions, options)?;
+    let motion = controller.of(target).move_with(positions, options)?;
     not_refused(controller, motion)
 }
 
@@ -290,7 +331,7 @@ pub fn begin_move(
 ///
 /// # Errors
 /// [`CommandRefusal::Motion`].
-pub fn not_refused(controller: &dyn RunningController, motion: MotionId) -> Result<MotionId, CommandRefusal> {
+pub fn not_refused(controller: &AnyHandle, motion: MotionId) -> Result<MotionId, CommandRefusal> {
     match controller.wait(motion, REFUSED_WITHIN) {
         Ok(()) | Err(MotionError::NotInTime) => Ok(motion),
         Err(error) => Err(error.into()),
@@ -301,7 +342,7 @@ pub fn not_refused(controller: &dyn RunningController, motion: MotionId) -> Resu
 ///
 /// # Errors
 /// See [`CommandRefusal`].
-pub fn change_mode(controller: &dyn RunningController, axis: usize, mode: i8) -> Result<(), CommandRefusal> {
+pub fn change_mode(controller: &AnyHandle, axis: usize, mode: i8) -> Result<(), CommandRefusal> {
     let mode = OperationMode::from_number(mode).ok_or(CommandRefusal::NoSuchMode { mode })?;
     let change = controller.change_axis_mode(axis, mode)?;
     not_refused(controller, change).map(drop)

@@ -5,6 +5,7 @@
 //! for each request, and gives its place to a newer one when there are too many. So strangers, silent or not, keep nobody with the token out.
 
 use std::collections::VecDeque;
+use std::io;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -15,6 +16,7 @@ use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
+use tokio::runtime::Runtime;
 use tokio::sync::Notify;
 use tokio::time::sleep;
 
@@ -22,10 +24,20 @@ use super::lock::locked;
 
 /// Connections with the token that may be open at the same time: a browser opens six for a page at most.
 const ADMITTED_AT_MOST: usize = 320;
-/// Connections that have not shown the token.
-const STRANGERS_AT_MOST: usize = 256;
-/// Time for each request of a connection that has not shown the token.
-const SHOWN_WITHIN: Duration = Duration::from_secs(1);
+/// Bounds of connections that have not shown the token.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// How many may be open at the same time.
+    pub count: usize,
+    /// Time for each request.
+    pub request_within: Duration,
+}
+
+impl Bounds {
+    /// Those of a panel.
+    pub const PANEL: Self = Self { count: 256, request_within: Duration::from_secs(1) };
+}
+
 /// The head of a request must have come after so long, and a connection without a request is closed then.
 const HEAD_WITHIN: Duration = Duration::from_secs(10);
 /// The largest head of a request, in bytes.
@@ -38,6 +50,7 @@ pub struct Connection {
     /// Closes it.
     pub closer: Arc<Notify>,
     number: u64,
+    request_within: Duration,
     requests: Arc<AtomicU64>,
     places: Arc<Places>,
 }
@@ -52,7 +65,7 @@ impl Connection {
     async fn is_silent(&self) {
         loop {
             let requests = self.requests.load(Ordering::Relaxed);
-            sleep(SHOWN_WITHIN).await;
+            sleep(self.request_within).await;
             if requests == self.requests.load(Ordering::Relaxed) && !self.places.is_admitted(self.number) {
                 return;
             }
@@ -85,9 +98,9 @@ struct Place {
 
 impl Places {
     /// A new connection has not shown the token. One too many of these takes the place of the oldest.
-    fn enter(self: &Arc<Self>, number: u64, closer: Arc<Notify>) -> Place {
+    fn enter(self: &Arc<Self>, number: u64, closer: Arc<Notify>, strangers_at_most: usize) -> Place {
         let mut entries = locked(&self.0);
-        if entries.iter().filter(|entry| !entry.is_admitted).count() >= STRANGERS_AT_MOST
+        if entries.iter().filter(|entry| !entry.is_admitted).count() >= strangers_at_most
             && let Some(oldest) = entries.iter().position(|entry| !entry.is_admitted)
             && let Some(oldest) = entries.remove(oldest)
         {
@@ -110,8 +123,22 @@ impl Places {
     }
 }
 
+/// What runs the server of a listener on one thread.
+///
+/// # Errors
+/// The operating system refuses it.
+pub fn runtime(listener: std::net::TcpListener) -> io::Result<(Runtime, TcpListener)> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
+    listener.set_nonblocking(true)?;
+    let listener = {
+        let _guard = runtime.enter();
+        TcpListener::from_std(listener)?
+    };
+    Ok((runtime, listener))
+}
+
 /// Accepts connections, and serves pages on each.
-pub async fn accept(routes: axum::Router, listener: TcpListener) {
+pub async fn accept(routes: axum::Router, listener: TcpListener, bounds: Bounds) {
     let places = Arc::<Places>::default();
     let routes = TowerToHyperService::new(routes);
     for number in 0.. {
@@ -122,8 +149,10 @@ pub async fn accept(routes: axum::Router, listener: TcpListener) {
         };
         let Ok(local) = stream.local_addr() else { continue };
         let (closer, requests) = (Arc::<Notify>::default(), Arc::default());
-        let place = places.enter(number, Arc::clone(&closer));
-        let connection = Connection { local, closer, number, requests, places: Arc::clone(&places) };
+        let Bounds { count, request_within } = bounds;
+        let place = places.enter(number, Arc::clone(&closer), count);
+        let places = Arc::clone(&places);
+        let connection = Connection { local, closer, number, request_within, requests, places };
         let routes = routes.clone();
         tokio::spawn(async move {
             converse(stream, connection, routes).await;

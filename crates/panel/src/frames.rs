@@ -4,8 +4,6 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::chinese::Words;
-
 /// Frames that are kept: those of more than half a second of two busy buses. A page asks four times a second.
 const KEPT: usize = 16_384;
 /// Frames that a page is given at once.
@@ -24,8 +22,8 @@ pub struct FrameView {
     pub direction: char,
     /// As in a candump log: `181#3712`.
     pub frame: String,
-    /// What it means.
-    pub words: Words,
+    /// What it means, in English.
+    pub words: String,
 }
 
 /// Which frames a page wants.
@@ -34,7 +32,7 @@ pub struct FrameView {
 pub struct Wanted {
     /// Those after the one with this number.
     after: u64,
-    /// A part of the frame, of its meaning in either language, or of both with a space between them, in any case; empty for all.
+    /// A part of the frame, of its meaning, or of both with a space between them, in any case; empty for all.
     #[serde(default)]
     filter: String,
 }
@@ -80,7 +78,9 @@ impl Frames {
     pub fn wanted(&self, wanted: &Wanted) -> FramesView {
         let number = wanted.after;
         let filter = wanted.filter.trim().to_lowercase();
-        let is_wanted = |frame: &&FrameView| filter.is_empty() || frame.words.contain(&frame.frame, &filter);
+        let is_wanted = |frame: &&FrameView| {
+            filter.is_empty() || format!("{} {}", frame.frame, frame.words).to_lowercase().contains(&filter)
+        };
         let begin = self.kept.partition_point(|frame| frame.number <= number);
         let kept = (self.kept.len() - begin) as u64;
         let new: Vec<&FrameView> = self.kept.range(begin..).filter(is_wanted).collect();
@@ -106,7 +106,7 @@ mod tests {
             bus: 0,
             direction: '<',
             frame: "181#3712".to_owned(),
-            words: Words::none(),
+            words: String::new(),
         };
         (0..3).for_each(|time| frames.push(frame(f64::from(time))));
         let after = |after| Wanted { after, ..Wanted::default() };
@@ -133,10 +133,10 @@ mod tests {
                 bus: 0,
                 direction: '<',
                 frame: frame.to_owned(),
-                words: Words::of(words),
+                words: words.to_owned(),
             });
         }
-        for filter in ["alarm", "报警", " 081#1043 ALARM", "81#"] {
+        for filter in ["alarm", " 081#1043 ALARM", "81#"] {
             let view = frames.wanted(&Wanted { after: 0, filter: filter.to_owned() });
             assert_eq!((view.frames.len(), view.lost, view.last), (1, 0, 10_000), "{filter}");
         }

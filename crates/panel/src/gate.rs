@@ -29,6 +29,9 @@ use super::connections::Connection;
 use super::lock::locked;
 use super::page::File;
 use super::pages::{PageNumber, PageRefusal, Pages};
+use takt::telemetry::Machine;
+use takt::words;
+use takt::words::Words;
 
 /// Between two states.
 const STATE_EVERY: Duration = Duration::from_millis(50);
@@ -184,11 +187,11 @@ pub enum Problematic {
     Denied(Denied),
     NoHeader,
     Page(PageRefusal),
-    Command(CommandRefusal),
+    Command(StatusCode, ProblemView),
     MediaType,
     TooLarge,
     TooSlow,
-    Malformed(String),
+    Malformed(Words),
 }
 
 impl From<Denied> for Problematic {
@@ -205,19 +208,30 @@ impl From<PageRefusal> for Problematic {
 
 impl From<CommandRefusal> for Problematic {
     fn from(refusal: CommandRefusal) -> Self {
-        Self::Command(refusal)
+        Self::command(&refusal, None)
     }
 }
 
 impl Problematic {
-    /// Its status, its word for programs, and its words.
-    pub fn told(&self) -> (StatusCode, &'static str, String) {
-        match self {
+    /// A command that is refused, on a machine if there is one.
+    pub fn command(refusal: &CommandRefusal, machine: Option<&Machine>) -> Self {
+        let status = match refusal {
+            CommandRefusal::Busy => StatusCode::SERVICE_UNAVAILABLE,
+            _ => StatusCode::CONFLICT,
+        };
+        Self::Command(status, refusal.view(machine))
+    }
+
+    /// Its status and what pages are told.
+    pub fn told(self) -> (StatusCode, ProblemView) {
+        let (status, error, words) = match self {
             Self::Denied(denied @ (Denied::NoToken | Denied::WrongToken)) => {
-                (StatusCode::UNAUTHORIZED, "token", denied.to_string())
+                (StatusCode::UNAUTHORIZED, "token", denied.words())
             }
-            Self::Denied(denied) => (StatusCode::FORBIDDEN, "site", denied.to_string()),
-            Self::NoHeader => (StatusCode::FORBIDDEN, "header", format!("the header {OWN} is missing")),
+            Self::Denied(denied) => (StatusCode::FORBIDDEN, "site", denied.words()),
+            Self::NoHeader => {
+                (StatusCode::FORBIDDEN, "header", words!("the header {header} is missing", header = OWN))
+            }
             Self::Page(refusal) => {
                 let status = match refusal {
                     PageRefusal::TooManyPages => StatusCode::SERVICE_UNAVAILABLE,
@@ -225,37 +239,30 @@ impl Problematic {
                     PageRefusal::TooOften { .. } => StatusCode::TOO_MANY_REQUESTS,
                     _ => StatusCode::CONFLICT,
                 };
-                (status, refusal.key(), refusal.to_string())
+                (status, refusal.key(), refusal.words())
             }
-            Self::Command(refusal) => {
-                let status = match refusal {
-                    CommandRefusal::Busy => StatusCode::SERVICE_UNAVAILABLE,
-                    _ => StatusCode::CONFLICT,
-                };
-                (status, refusal.key(), refusal.to_string())
-            }
+            Self::Command(status, view) => return (status, view),
             Self::MediaType => {
-                (StatusCode::UNSUPPORTED_MEDIA_TYPE, "media_type", "a command is application/json".to_owned())
+                (StatusCode::UNSUPPORTED_MEDIA_TYPE, "media_type", "a command is application/json".into())
             }
             Self::TooLarge => (
                 StatusCode::PAYLOAD_TOO_LARGE,
                 "too_large",
-                format!("a command has at most {BODY_AT_MOST} bytes"),
+                words!("a command has at most {bytes} bytes", bytes = BODY_AT_MOST),
             ),
-            Self::TooSlow => {
-                (StatusCode::REQUEST_TIMEOUT, "too_slow", "the command came too slowly".to_owned())
+            Self::TooSlow => (StatusCode::REQUEST_TIMEOUT, "too_slow", "the command came too slowly".into()),
+            Self::Malformed(problem) => {
+                (StatusCode::BAD_REQUEST, "malformed", words!("this is no command: {problem}", problem))
             }
-            Self::Malformed(words) => {
-                (StatusCode::BAD_REQUEST, "malformed", format!("this is no command: {words}"))
-            }
-        }
+        };
+        (status, ProblemView::of(error, words))
     }
 }
 
 impl IntoResponse for Problematic {
     fn into_response(self) -> Response {
-        let (status, key, words) = self.told();
-        let mut response = json_response(status, &ProblemView::of(key, words));
+        let (status, problem) = self.told();
+        let mut response = json_response(status, &problem);
         if status == StatusCode::UNAUTHORIZED {
             response.headers_mut().insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
         }
@@ -383,7 +390,7 @@ async fn states<P: Visited>(
     State(panel): State<Arc<P>>,
     Extension(connection): Extension<Connection>,
 ) -> Result<Response, Problematic> {
-    let key = key().map_err(|error| Problematic::Malformed(error.to_string()))?;
+    let key = key().map_err(|error| Problematic::Malformed(error.to_string().into()))?;
     let number = panel.gate().pages().open(key.clone(), Instant::now())?;
     let page = OpenPage { panel: Arc::clone(&panel), number };
     locked(&panel.gate().closers).insert(number, connection.closer);
@@ -409,7 +416,8 @@ pub async fn body<T: DeserializeOwned>(request: Request) -> Result<(HeaderMap, T
     }
     let bytes = timeout(BODY_WITHIN, to_bytes(body, BODY_AT_MOST)).await;
     let bytes = bytes.map_err(|_| Problematic::TooSlow)?.map_err(|_| Problematic::TooLarge)?;
-    let value = serde_json::from_slice(&bytes).map_err(|error| Problematic::Malformed(error.to_string()))?;
+    let value =
+        serde_json::from_slice(&bytes).map_err(|error| Problematic::Malformed(error.to_string().into()))?;
     Ok((parts.headers, value))
 }
 

@@ -9,11 +9,12 @@
 //! ```
 //!
 //! All of them are ordinary threads beside the real-time one, and call the controller as the own program's threads do, by
-//! [`RunningController`](takt::RunningController). A stop is taken on the first thread and waits for nobody.
+//! [`AnyHandle`](takt::AnyHandle). A stop is taken on the first thread and waits for nobody.
 //!
 //! In the order to read: `access` (who may ask), `pages` (who is there, who commands), `command`, `motions` and `motion` (what is asked and
 //! how it ends), `view` (what is shown), `gate` (what both kinds of panel share), `server` (the routes), `connections` (sockets and their bounds).
 //! Commissioning is `bench`: one thread more, `takt-bench`, which owns the buses.
+//! `metrics` serves the numbers of a run to Prometheus, within the same bounds.
 //! Without a server, `command`, `motions` and `view` serve a page of the simulated arm (the folder `browser`).
 #![deny(unsafe_code)]
 #![cfg_attr(not(feature = "server"), allow(dead_code, reason = "the pages of others need a server"))]
@@ -28,6 +29,7 @@ mod access;
 #[cfg(feature = "server")]
 mod bench;
 pub mod browser;
+#[cfg(all(test, feature = "server"))]
 mod chinese;
 pub(crate) mod command;
 #[cfg(feature = "server")]
@@ -40,6 +42,8 @@ mod gate;
 mod listening;
 #[cfg(feature = "server")]
 mod lock;
+#[cfg(feature = "server")]
+mod metrics;
 mod motion;
 pub(crate) mod motions;
 #[cfg(feature = "server")]
@@ -55,6 +59,8 @@ pub use access::TOKEN_AT_LEAST;
 pub use bench::{BenchBus, BenchDrive, BenchLink, Workplace};
 #[cfg(feature = "server")]
 pub use listening::{Listening, Panel, PanelError, PanelOptions, PanelToken, address};
+#[cfg(feature = "server")]
+pub use metrics::MetricsServer;
 pub use motions::HELD_FOR;
 pub use pages::{PAGES_AT_MOST, PRESENT_FOR};
 #[cfg(feature = "server")]

@@ -12,10 +12,10 @@ use tokio::time::sleep;
 
 use super::access::{Access, AccessError};
 use super::bench::{self, Bench, Worker, Workplace};
-use super::connections;
+use super::connections::{self, Bounds};
 use super::gate::{self, Visited};
 use super::server::{self, FrameSource, Server, TakeLease};
-use takt::command::RunningController;
+use takt::command::AnyHandle;
 
 /// How long pages are given to read that the panel has ended.
 const CLOSING_TIME: Duration = Duration::from_millis(150);
@@ -121,7 +121,6 @@ impl Listening {
         let access = Access::new(token.clone(), &options.origins)?;
         let failed = |error| PanelError::Listen { address, error };
         let listener = TcpListener::bind(address).map_err(failed)?;
-        listener.set_nonblocking(true).map_err(failed)?;
         let address = listener.local_addr().map_err(failed)?;
         // Browsers send no fragment: the token comes into no log.
         let fragment = token.filter(|_| is_in_url).map_or(String::new(), |token| format!("#token={token}"));
@@ -134,12 +133,11 @@ impl Listening {
     /// [`PanelError::Thread`].
     pub fn show(
         self,
-        controller: impl RunningController + 'static,
+        controller: impl Into<AnyHandle>,
         take_lease: Option<TakeLease>,
         frames: Option<FrameSource>,
     ) -> Result<Panel, PanelError> {
-        let controller = Arc::new(controller);
-        let server = Arc::new(Server::new(controller, self.access, take_lease, frames.is_some()));
+        let server = Arc::new(Server::new(controller.into(), self.access, take_lease, frames.is_some()));
         let mut threads = Threads::new(Arc::<Server>::clone(&server));
         let routes = server::routes(&server);
         let commands = server.commands();
@@ -211,11 +209,7 @@ impl Threads {
 
     /// Serves pages on a thread of its own.
     fn serve<P: Visited>(&mut self, panel: Arc<P>, routes: Router, listener: TcpListener) -> io::Result<()> {
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_io().enable_time().build()?;
-        let listener = {
-            let _guard = runtime.enter();
-            tokio::net::TcpListener::from_std(listener)?
-        };
+        let (runtime, listener) = connections::runtime(listener)?;
         self.spawn("takt-panel", move || runtime.block_on(serve(&*panel, routes, listener)))
     }
 
@@ -238,7 +232,7 @@ impl Drop for Threads {
 /// Serves pages until the panel ends.
 async fn serve(panel: &impl Visited, routes: Router, listener: tokio::net::TcpListener) {
     tokio::select! {
-        () = connections::accept(routes, listener) => {}
+        () = connections::accept(routes, listener, Bounds::PANEL) => {}
         () = gate::show_states(panel) => sleep(CLOSING_TIME).await,
     }
 }

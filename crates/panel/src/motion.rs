@@ -6,7 +6,7 @@ use takt_rt::{AxisPoint, Nanoseconds, OperationMode, Phase, RequestId, RequestTa
 
 use super::command::{CommandRefusal, Quantity, not_refused};
 use super::pages::PageNumber;
-use takt::command::{MotionError, MotionId, MoveOptions, RunningController, StreamError};
+use takt::command::{AnyHandle, MotionError, MotionId, MoveOptions, StreamError};
 
 /// The real-time thread stops a drive in a profile mode whose value is not renewed for so long.
 const VALID_FOR: Duration = Duration::from_millis(300);
@@ -70,7 +70,7 @@ impl Motion {
     }
 
     /// Lets the value of a profile mode go to zero, where the drive holds or has no torque; `None` for other motions, which are stopped.
-    pub fn zero(&self, controller: &dyn RunningController) -> Option<Result<MotionId, CommandRefusal>> {
+    pub fn zero(&self, controller: &AnyHandle) -> Option<Result<MotionId, CommandRefusal>> {
         let Kind::Drive { axis, by: Route::Profile { quantity, .. }, .. } = &self.kind else { return None };
         let zero = match quantity {
             Quantity::Velocity => controller.velocity(*axis, 0.0, VALID_FOR),
@@ -80,8 +80,8 @@ impl Motion {
     }
 
     /// Goes on with it.
-    pub fn step(&mut self, controller: &dyn RunningController) -> Step {
-        if controller.newest_stop(self.target) != self.newest_stop {
+    pub fn step(&mut self, controller: &AnyHandle) -> Step {
+        if controller.of(self.target).newest_stop() != self.newest_stop {
             // Of another process' stop one hears late: what was renewed since then must end as well.
             return if self.repeated_axis().is_some() { Step::Rest } else { Step::Over };
         }
@@ -92,7 +92,7 @@ impl Motion {
             },
             Kind::Reciprocate { ends, options, next, motion, .. } => match controller.result_of(*motion) {
                 None => Step::GoesOn,
-                Some(Ok(())) => match controller.begin_move(self.target, &ends[*next % 2], *options) {
+                Some(Ok(())) => match controller.of(self.target).move_with(&ends[*next % 2], *options) {
                     Ok(begun) => {
                         (*motion, *next) = (begun, *next + 1);
                         Step::GoesOn
@@ -106,7 +106,7 @@ impl Motion {
         };
         // A stop that came in between must not be followed by a new value.
         match step {
-            Step::GoesOn if controller.newest_stop(self.target) != self.newest_stop => Step::Rest,
+            Step::GoesOn if controller.of(self.target).newest_stop() != self.newest_stop => Step::Rest,
             step => step,
         }
     }
@@ -118,7 +118,7 @@ impl Route {
     /// # Errors
     /// See [`CommandRefusal`].
     pub fn begin(
-        controller: &dyn RunningController,
+        controller: &AnyHandle,
         axis: usize,
         target: RequestTarget,
         quantity: Quantity,
@@ -154,17 +154,17 @@ impl Route {
             | (None, _) => Err(wrong()),
             (Some(mode), Quantity::Torque) if mode != OperationMode::CyclicSynchronousTorque => Err(wrong()),
             (Some(_), _) => {
-                let axes = controller.axes_of(target);
+                let axes = controller.of(target).axis_numbers();
                 let rest = |number: &usize| {
                     AxisPoint::position(state.axes().get(*number).map_or(0.0, |axis| axis.position_set))
                 };
                 let points: Vec<AxisPoint> = axes.iter().map(rest).collect();
                 let place = axes.iter().position(|number| *number == axis).ok_or_else(wrong)?;
-                controller.begin_streaming(target)?;
+                controller.of(target).begin_stream()?;
                 let mut route = Self::Stream { quantity, place, points };
                 // A value that is refused moves nothing, and leaves no stream behind.
                 if let Err(error) = route.send(controller, target, axis, value) {
-                    controller.request_stop(target, StopCategory::Two)?;
+                    controller.of(target).stop(StopCategory::Two)?;
                     return Err(error);
                 }
                 Ok(route)
@@ -172,13 +172,7 @@ impl Route {
         }
     }
 
-    fn step(
-        &mut self,
-        controller: &dyn RunningController,
-        target: RequestTarget,
-        axis: usize,
-        value: f64,
-    ) -> Step {
+    fn step(&mut self, controller: &AnyHandle, target: RequestTarget, axis: usize, value: f64) -> Step {
         match self {
             Self::Profile { newest, .. } => {
                 if let Some(Err(error)) = controller.result_of(*newest) {
@@ -205,7 +199,7 @@ impl Route {
 
     fn send(
         &mut self,
-        controller: &dyn RunningController,
+        controller: &AnyHandle,
         target: RequestTarget,
         axis: usize,
         value: f64,
@@ -224,7 +218,7 @@ impl Route {
                         Quantity::Torque => AxisPoint::Torque(value),
                     };
                 }
-                controller.push_point(target, controller.now_ns(), points)?;
+                controller.of(target).stream().push(controller.now_ns(), points)?;
             }
         }
         Ok(())

@@ -6,7 +6,7 @@
 //! the controller, whose clock may be a virtual one.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use takt_rt::{Nanoseconds, Phase, RequestTarget, StopCategory};
@@ -17,7 +17,7 @@ use super::command::{
 };
 use super::motion::{Kind, Motion, Route, Step, is_meant};
 use super::pages::PageNumber;
-use takt::command::{MoveOptions, RunningController, WaitError};
+use takt::command::{AnyHandle, MoveOptions, WaitError};
 
 /// A held key that is not renewed for so long is released.
 pub const HELD_FOR: Duration = Duration::from_millis(250);
@@ -37,7 +37,7 @@ pub struct Problem {
 
 /// What pages have set in motion.
 pub struct Motions {
-    controller: Arc<dyn RunningController>,
+    controller: AnyHandle,
     /// Held while the controller is asked, which may take its time.
     kept: Mutex<Kept>,
     changed: Condvar,
@@ -63,7 +63,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 
 impl Motions {
     /// Nothing moves.
-    pub fn new(controller: Arc<dyn RunningController>) -> Self {
+    pub fn new(controller: AnyHandle) -> Self {
         Self {
             controller,
             kept: Mutex::default(),
@@ -84,7 +84,7 @@ impl Motions {
     /// [`CommandRefusal::Controller`] if the controller has ended.
     pub fn stop(&self, target: RequestTarget, category: StopCategory) -> Result<(), CommandRefusal> {
         self.stops.fetch_add(1, Ordering::AcqRel);
-        Ok(self.controller.request_stop(target, category)?)
+        Ok(self.controller.of(target).stop(category)?)
     }
 
     /// Brings everything to rest that a page has set in motion. It waits for nobody.
@@ -101,7 +101,7 @@ impl Motions {
     fn end_where(&self, is_to_end: impl Fn(PageNumber) -> bool) {
         for (_, target) in locked(&self.moving).iter().filter(|(page, _)| is_to_end(*page)) {
             // Where the controller has ended, nothing moves.
-            let _ = self.controller.request_stop(*target, StopCategory::Two);
+            let _ = self.controller.of(*target).stop(StopCategory::Two);
         }
     }
 
@@ -124,7 +124,7 @@ impl Motions {
         stops: u64,
         may_begin: &dyn Fn() -> bool,
     ) -> Result<(), CommandRefusal> {
-        let controller = &*self.controller;
+        let controller = &self.controller;
         let machine = controller.machine();
         let options = |velocity, acceleration| MoveOptions {
             velocity_scale: velocity,
@@ -142,9 +142,9 @@ impl Motions {
             return Err(CommandRefusal::Discarded);
         }
         match command {
-            Command::Enable { group } => Ok(controller.begin_enable(target_of(group, machine)?)?),
+            Command::Enable { group } => Ok(controller.of(target_of(group, machine)?).enable()?),
             Command::Disable { group } => self.disable(target_of(group, machine)?),
-            Command::ClearFaults { group } => Ok(controller.clear_faults(target_of(group, machine)?)?),
+            Command::ClearFaults { group } => Ok(controller.of(target_of(group, machine)?).reset_faults()?),
             Command::BringUp { group } => self.bring_up(page, target_of(group, machine)?),
             Command::Move { axis, to, relative, velocity, acceleration } => {
                 let target = target_of_axis(axis, machine)?;
@@ -201,7 +201,7 @@ impl Motions {
     fn release_where(&self, is_meant: impl Fn(&Motion) -> bool) -> Result<(), CommandRefusal> {
         let released: Vec<Motion> =
             locked(&self.kept).motions.extract_if(.., |motion| is_meant(motion)).collect();
-        let ended = released.iter().try_for_each(|motion| match motion.zero(&*self.controller) {
+        let ended = released.iter().try_for_each(|motion| match motion.zero(&self.controller) {
             Some(zero) => zero.map(drop),
             None => self.rest(motion.target),
         });
@@ -217,9 +217,9 @@ impl Motions {
 
     /// Stops what is repeated, and waits until the real-time thread has taken that: a motion that follows begins after it.
     fn rest(&self, target: RequestTarget) -> Result<(), CommandRefusal> {
-        let (before, until_ns) = (self.controller.newest_stop(target), self.until(AT_REST_WITHIN));
-        self.controller.request_stop(target, StopCategory::Two)?;
-        while self.controller.newest_stop(target) == before && self.controller.now_ns() < until_ns {
+        let (before, until_ns) = (self.controller.of(target).newest_stop(), self.until(AT_REST_WITHIN));
+        self.controller.of(target).stop(StopCategory::Two)?;
+        while self.controller.of(target).newest_stop() == before && self.controller.now_ns() < until_ns {
             if self.controller.cycle_after(self.controller.state().slot, LOOK) == Err(WaitError::Ended) {
                 break;
             }
@@ -232,11 +232,11 @@ impl Motions {
         kept.motions.retain(|motion| target != RequestTarget::All && motion.target != target);
         self.list_moving(&kept);
         drop(kept);
-        Ok(self.controller.begin_disable(target)?)
+        Ok(self.controller.of(target).disable()?)
     }
 
     fn bring_up(&self, page: PageNumber, target: RequestTarget) -> Result<(), CommandRefusal> {
-        self.controller.begin_bring_up(target)?;
+        self.controller.of(target).begin_bring_up()?;
         locked(&self.kept).bring_ups.push((page, target));
         self.changed.notify_all();
         Ok(())
@@ -249,7 +249,7 @@ impl Motions {
             locked(&self.moving).push((motion.page, motion.target));
         }
         if self.stops() != stops || kept.has_ended {
-            let stopped = self.controller.request_stop(motion.target, StopCategory::Two);
+            let stopped = self.controller.of(motion.target).stop(StopCategory::Two);
             self.list_moving(&kept);
             return stopped.map_err(CommandRefusal::from).and(Err(CommandRefusal::Discarded));
         }
@@ -267,8 +267,8 @@ impl Motions {
         options: MoveOptions,
         stops: u64,
     ) -> Result<(), CommandRefusal> {
-        let newest_stop = self.controller.newest_stop(target);
-        let motion = begin_move(&*self.controller, target, positions, options)?;
+        let newest_stop = self.controller.of(target).newest_stop();
+        let motion = begin_move(&self.controller, target, positions, options)?;
         self.keep(Motion { page, target, newest_stop, kind: Kind::Move(motion) }, stops)
     }
 
@@ -281,9 +281,9 @@ impl Motions {
         stops: u64,
     ) -> Result<(), CommandRefusal> {
         let target = target_of_axis(axis, self.controller.machine())?;
-        let newest_stop = self.controller.newest_stop(target);
-        let ends = between.map(|position| positions_with(&*self.controller, target, axis, position));
-        let motion = begin_move(&*self.controller, target, &ends[0], options)?;
+        let newest_stop = self.controller.of(target).newest_stop();
+        let ends = between.map(|position| positions_with(&self.controller, target, axis, position));
+        let motion = begin_move(&self.controller, target, &ends[0], options)?;
         let kind = Kind::Reciprocate { axis, ends, options, next: 1, motion };
         self.keep(Motion { page, target, newest_stop, kind }, stops)
     }
@@ -297,8 +297,8 @@ impl Motions {
         stops: u64,
     ) -> Result<(), CommandRefusal> {
         let target = target_of_axis(axis, self.controller.machine())?;
-        let newest_stop = self.controller.newest_stop(target);
-        let by = Route::begin(&*self.controller, axis, target, quantity, value)?;
+        let newest_stop = self.controller.of(target).newest_stop();
+        let by = Route::begin(&self.controller, axis, target, quantity, value)?;
         let until = (lasts == Lasts::Held).then(|| self.until(HELD_FOR));
         let kind = Kind::Drive { axis, value, until, by };
         self.keep(Motion { page, target, newest_stop, kind }, stops)
@@ -352,7 +352,7 @@ impl Motions {
         tell: &impl Fn(Problem),
     ) {
         kept.motions.retain_mut(|motion| {
-            let step = if may_move(motion.page) { motion.step(&*self.controller) } else { Step::Rest };
+            let step = if may_move(motion.page) { motion.step(&self.controller) } else { Step::Rest };
             self.is_kept(motion, step, tell)
         });
         self.list_moving(&kept);
@@ -361,7 +361,7 @@ impl Motions {
         }
         let state = self.controller.state();
         kept.bring_ups.retain(|(page, target)| {
-            let result = self.controller.bring_up_result(*target, &state);
+            let result = self.controller.of(*target).bring_up_result(&state);
             if let Some(Err(error)) = &result {
                 tell(Problem { page: *page, refusal: error.clone().into() });
             }
@@ -376,10 +376,10 @@ impl Motions {
             Step::Rest => None,
             Step::Failed(refusal) => Some(refusal),
         };
-        let is_at_zero = matches!(motion.zero(&*self.controller), Some(Ok(_)));
+        let is_at_zero = matches!(motion.zero(&self.controller), Some(Ok(_)));
         if !is_at_zero {
             // Where the controller has ended, nothing moves.
-            let _ = self.controller.request_stop(motion.target, StopCategory::Two);
+            let _ = self.controller.of(motion.target).stop(StopCategory::Two);
         }
         if let Some(refusal) = refusal {
             tell(Problem { page: motion.page, refusal });

@@ -32,10 +32,11 @@ macro_rules! html {
 }
 
 /// What the pages of a running controller and of commissioning share.
-const SHARED: [File; 8] = [
+const SHARED: [File; 9] = [
     file!("/panel.css", "panel.css", "text/css; charset=utf-8"),
     file!("/connection.js", "connection.js", "text/javascript; charset=utf-8"),
     file!("/texts.js", "texts.js", "text/javascript; charset=utf-8"),
+    file!("/chinese.js", "chinese.js", "text/javascript; charset=utf-8"),
     file!("/frame.js", "frame.js", "text/javascript; charset=utf-8"),
     file!("/units.js", "units.js", "text/javascript; charset=utf-8"),
     file!("/monitor.js", "monitor.js", "text/javascript; charset=utf-8"),

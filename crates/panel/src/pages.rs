@@ -4,6 +4,9 @@
 
 use std::time::{Duration, Instant};
 
+use takt::words;
+use takt::words::Words;
+
 /// How long a page is present after it has last confirmed a state.
 pub const PRESENT_FOR: Duration = Duration::from_millis(1500);
 /// A page that has confirmed nothing for so long is closed.
@@ -15,34 +18,25 @@ pub const PAGES_AT_MOST: usize = 48;
 pub type PageNumber = u64;
 
 /// Why a page may not do what it asks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PageRefusal {
     /// Too many pages are open.
-    #[error("{PAGES_AT_MOST} pages are open already; close one of them")]
     TooManyPages,
     /// The page has been closed, or has never been open.
-    #[error("the connection of this page is lost; load it again")]
     NotOpen,
     /// The page has not confirmed a state lately.
-    #[error("states do not reach this page at present, so it moves nothing")]
     NotPresent,
     /// No page commands, or another one does.
-    #[error("this page does not command: {}", match commander {
-        Some(page) => format!("page {page} does; take over from it first"),
-        None => "take command first".to_owned(),
-    })]
     NotCommander {
         /// The page that commands.
         commander: Option<PageNumber>,
     },
     /// It asks too often.
-    #[error("too many commands: at most {per_second} a second are taken")]
     TooOften {
         /// What is taken.
         per_second: u32,
     },
     /// A later command of the page has come before it.
-    #[error("a later command of this page has overtaken this one")]
     Overtaken,
 }
 
@@ -56,6 +50,25 @@ impl PageRefusal {
             Self::NotCommander { .. } => "not_commander",
             Self::TooOften { .. } => "too_often",
             Self::Overtaken => "overtaken",
+        }
+    }
+
+    /// The sentence.
+    pub fn words(&self) -> Words {
+        match self {
+            Self::TooManyPages => {
+                words!("{pages} pages are open already; close one of them", pages = PAGES_AT_MOST)
+            }
+            Self::NotOpen => "the connection of this page is lost; load it again".into(),
+            Self::NotPresent => "states do not reach this page at present, so it moves nothing".into(),
+            Self::NotCommander { commander: Some(page) } => {
+                words!("this page does not command: page {page} does; take over from it first", page)
+            }
+            Self::NotCommander { commander: None } => "this page does not command: take command first".into(),
+            Self::TooOften { per_second } => {
+                words!("too many commands: at most {per_second} a second are taken", per_second)
+            }
+            Self::Overtaken => "a later command of this page has overtaken this one".into(),
         }
     }
 }

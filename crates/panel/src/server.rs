@@ -16,7 +16,6 @@ use takt_rt::StopCategory;
 use tokio::sync::oneshot;
 
 use super::access::Access;
-use super::chinese::Words;
 use super::command::{Command, CommandRefusal, target_of};
 use super::frames::{FrameView, Frames, Wanted};
 use super::gate::{self, Gate, Problematic, Visited, body, done, json_response, message, page_key};
@@ -25,7 +24,7 @@ use super::motions::{Motions, Problem};
 use super::page::{self, File};
 use super::pages::{Asked, PageNumber, PageRefusal};
 use super::view::{EventView, MachineView, Viewer, time_ms};
-use takt::command::{CommandError, RunningController, WaitError};
+use takt::command::{AnyHandle, CommandError, WaitError};
 use takt::telemetry::missed_slots::MissedSlotsSoFar;
 use takt::telemetry::{FrameFeed, OnBus};
 use takt_tools::monitor::BusDecoder;
@@ -51,7 +50,7 @@ pub struct FrameSource {
 /// What the threads of the panel share.
 pub struct Server {
     gate: Gate,
-    controller: Arc<dyn RunningController>,
+    controller: AnyHandle,
     take_lease: Option<TakeLease>,
     motions: Motions,
     viewer: Mutex<Viewer>,
@@ -87,7 +86,7 @@ impl Visited for Server {
             let pages = self.gate.pages();
             (pages.commander(), pages.count())
         };
-        message("state", &locked(&self.viewer).view(&*self.controller, commander, count, time_ms()))
+        message("state", &locked(&self.viewer).view(&self.controller, commander, count, time_ms()))
     }
 
     fn end(&self) {
@@ -109,7 +108,7 @@ enum Errand {
 
 impl Server {
     pub fn new(
-        controller: Arc<dyn RunningController>,
+        controller: AnyHandle,
         access: Access,
         take_lease: Option<TakeLease>,
         has_frames: bool,
@@ -117,7 +116,7 @@ impl Server {
         let (commands, commands_out) = sync_channel(COMMANDS_WAITING);
         Self {
             gate: Gate::new(access),
-            motions: Motions::new(Arc::clone(&controller)),
+            motions: Motions::new(controller.clone()),
             controller,
             take_lease,
             viewer: Mutex::default(),
@@ -137,7 +136,7 @@ impl Server {
 
     /// Keeps the events until the panel or the controller ends.
     pub fn collect_events(&self) {
-        let mut source = self.controller.event_source();
+        let mut source = self.controller.events();
         let (mut missed, mut missed_slots) = (0, MissedSlotsSoFar::default());
         while !self.gate.has_ended() {
             match source.wait(LOOK) {
@@ -176,8 +175,7 @@ impl Server {
             let reader = feed.reader();
             while self.are_frames_wanted() {
                 let Ok(OnBus { bus, what }) = reader.wait(LOOK) else { continue };
-                let words =
-                    decoders.get_mut(bus).map(|decoder| Words::of_meaning(&decoder.decode(&what.frame)));
+                let words = decoders.get_mut(bus).map(|decoder| decoder.decode(&what.frame).line());
                 let age_ns = self.controller.now_ns().saturating_sub(what.at_ns);
                 let mut frames = locked(&self.frames);
                 frames.lose(reader.take_lost());
@@ -187,7 +185,7 @@ impl Server {
                     bus,
                     direction: if what.is_sent { '>' } else { '<' },
                     frame: format!("{:?}", what.frame),
-                    words: words.unwrap_or_else(Words::none),
+                    words: words.unwrap_or_default(),
                 });
             }
         }
@@ -213,7 +211,8 @@ impl Server {
     pub fn lead_motions(&self) {
         let may_move = |page| self.gate.pages().may_move(page, Instant::now());
         let tell = |Problem { page, refusal }: Problem| {
-            self.gate.tell(Some(page), |_| message("problem", &refusal.view()));
+            self.gate
+                .tell(Some(page), |_| message("problem", &refusal.view(Some(self.controller.machine()))));
         };
         self.motions.run(may_move, tell);
     }
@@ -224,7 +223,7 @@ impl Server {
         self.commands.try_send(Work { what, reply }).map_err(|_| CommandRefusal::Busy)?;
         match replied.await {
             Ok(Ok(())) => Ok(done()),
-            Ok(Err(refusal)) => Err(refusal.into()),
+            Ok(Err(refusal)) => Err(Problematic::command(&refusal, Some(self.controller.machine()))),
             Err(_) => Err(CommandRefusal::Discarded.into()),
         }
     }
@@ -242,7 +241,7 @@ pub fn routes(server: &Arc<Server>) -> Router {
 }
 
 async fn machine(State(server): State<Arc<Server>>) -> Response {
-    json_response(StatusCode::OK, &MachineView::of(&*server.controller, server.has_frames))
+    json_response(StatusCode::OK, &MachineView::of(&server.controller, server.has_frames))
 }
 
 async fn frames(State(server): State<Arc<Server>>, request: Request) -> Result<Response, Problematic> {
@@ -303,7 +302,7 @@ async fn stop(State(server): State<Arc<Server>>, request: Request) -> Result<Res
         0 => StopCategory::Zero,
         1 => StopCategory::One,
         2 => StopCategory::Two,
-        _ => return Err(Problematic::Malformed("stop categories are 0, 1 and 2".to_owned())),
+        _ => return Err(Problematic::Malformed("stop categories are 0, 1 and 2".into())),
     };
     server.motions.stop(target_of(group, server.controller.machine())?, category)?;
     if let (Ok(key), Some(number)) = (page_key(&headers), number) {

@@ -7,10 +7,10 @@ use takt_rt::{
     BusHealth, BusState, Event, EventKind, Nanoseconds, RequestTarget, Snapshot, StopReason, TimingLevel,
 };
 
-use super::chinese::Words;
 use super::pages::PageNumber;
-use takt::command::RunningController;
+use takt::command::AnyHandle;
 use takt::telemetry::{Machine, words};
+use takt::words::Words;
 
 /// What does not change while the controller runs.
 #[derive(Serialize)]
@@ -54,7 +54,7 @@ struct BusDescriptionView {
 
 impl MachineView {
     /// Of a controller.
-    pub fn of(controller: &dyn RunningController, has_frames: bool) -> Self {
+    pub fn of(controller: &AnyHandle, has_frames: bool) -> Self {
         let machine = controller.machine();
         let axes = machine.axes.iter().enumerate().map(|(number, axis)| {
             let limits = controller.axis_properties(number).map(|axis| axis.limits);
@@ -71,12 +71,10 @@ impl MachineView {
                 torque: limit(|limits| limits.torque),
             }
         });
-        let all = || {
-            vec![GroupDescriptionView { name: String::new(), axes: controller.axes_of(RequestTarget::All) }]
-        };
+        let all = || vec![GroupDescriptionView { name: String::new(), axes: controller.axis_numbers() }];
         let group = |(number, name): (u8, &String)| GroupDescriptionView {
             name: name.clone(),
-            axes: controller.axes_of(RequestTarget::Group(number)),
+            axes: controller.of(RequestTarget::Group(number)).axis_numbers(),
         };
         let bus = |bus: &takt::telemetry::BusDescription| BusDescriptionView {
             name: bus.name.clone(),
@@ -211,7 +209,7 @@ impl Viewer {
     /// The view of a state, at this time of day.
     pub fn view(
         &mut self,
-        controller: &dyn RunningController,
+        controller: &AnyHandle,
         commander: Option<PageNumber>,
         pages: usize,
         time_ms: u64,
@@ -271,16 +269,16 @@ fn stop_view(stop: &StopReason, machine: &Machine) -> StopView {
         axis: stop.axis(),
         category: stop.category as u8,
         is_fault: !stop.is_requested(),
-        words: Words::of(words::stop_cause(stop, machine)),
-        cure: words::stop_cure(stop, machine).map(Words::of),
+        words: words::stop_cause(stop, machine),
+        cure: words::stop_cure(stop, machine).map(Words::from),
     }
 }
 
 fn axis_view(number: u8, axis: &takt_rt::AxisSnapshot, state: &Snapshot, machine: &Machine) -> AxisView {
     let error = (axis.error_code != 0).then(|| ErrorView {
         code: axis.error_code,
-        words: Words::of(machine.drive_error(number, axis.error_code)),
-        cure: Words::of(machine.drive_cure(number, axis.error_code)),
+        words: machine.drive_error(number, axis.error_code),
+        cure: machine.drive_cure(number, axis.error_code).into(),
     });
     AxisView {
         position: rounded(axis.position),
@@ -353,17 +351,17 @@ impl EventView {
             EventKind::Timing { level } if level != TimingLevel::Normal => "warning",
             _ => "info",
         };
-        Self { number, time_ms, level, words: Words::of(words::event(event, machine)) }
+        Self { number, time_ms, level, words: words::event(event, machine) }
     }
 
     /// What the panel itself has to say.
-    pub fn said(number: u64, level: &'static str, words: String) -> Self {
-        Self { number, time_ms: time_ms(), level, words: Words::of(words) }
+    pub fn said(number: u64, level: &'static str, words: Words) -> Self {
+        Self { number, time_ms: time_ms(), level, words }
     }
 
     /// Of events that came faster than they were read.
     pub fn missed(number: u64, count: u64, time_ms: u64) -> Self {
-        let words = Words::of(format!("{count} events were missed: they came too fast"));
+        let words = takt::words!("{count} events were missed: they came too fast", count);
         Self { number, time_ms, level: "warning", words }
     }
 }

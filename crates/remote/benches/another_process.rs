@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use takt::{Config, Controller, EventKind, Phase, RunningController, SessionOptions};
+use takt::{AnyHandle, Config, Controller, EventKind, Phase, SessionOptions};
 use takt_remote::ServeOptions;
 
 fn calls(criterion: &mut Criterion) {
@@ -36,21 +36,21 @@ fn calls(criterion: &mut Criterion) {
     client.wait_for(Phase::Holding, Duration::from_secs(10)).unwrap();
     let handle = arm.handle();
     println!("cycles from the state before a call to the one that shows the motion:");
-    println!("  own process     {:?}", cycles_to_motion(&handle));
-    println!("  another process {:?}", cycles_to_motion(&client));
+    println!("  own process     {:?}", cycles_to_motion(&handle.into()));
+    println!("  another process {:?}", cycles_to_motion(&client.into()));
 }
 
 /// How many of a hundred moves are first seen in motion so many cycles after the state that was seen before the call.
-fn cycles_to_motion(controller: &dyn RunningController) -> Vec<(u64, usize)> {
+fn cycles_to_motion(controller: &AnyHandle) -> Vec<(u64, usize)> {
     let patience = Duration::from_secs(10);
     let mut all = vec![];
     for number in 0..100 {
         let here: Vec<f64> = controller.state().axes().iter().map(|axis| axis.position_set).collect();
         let step = if number % 2 == 0 { 0.01 } else { -0.01 };
         let target: Vec<f64> = here.iter().map(|position| position + step).collect();
-        let mut events = controller.event_source();
+        let mut events = controller.events();
         let before = controller.state().slot;
-        let begun = controller.begin_move(takt_rt::RequestTarget::All, &target, takt::MoveOptions::default());
+        let begun = controller.move_to(&target);
         let motion = begun.unwrap();
         loop {
             let event = events.wait(patience).unwrap();

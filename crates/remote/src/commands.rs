@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use bitcode::{Decode, Encode};
-use takt::command::{MotionId, MoveOptions};
+use takt::command::Command;
 use takt::trajectory::TrajectoryPoint;
-use takt_rt::{AxisPoint, Frame, Nanoseconds, OperationMode, RequestTarget, StopCategory};
+use takt_rt::{AxisPoint, Nanoseconds, RequestTarget, StopCategory};
 
 use crate::socket::PACKET_BYTES;
 
@@ -16,82 +16,15 @@ pub struct Demand {
     pub number: u64,
     /// When the client made it, by `CLOCK_MONOTONIC`: a later stop discards it, if it has not been carried out by then.
     pub asked_ns: Nanoseconds,
-    /// The demand.
-    pub command: Command,
+    /// What is asked.
+    pub asked: Asked,
 }
 
 /// What a client that commands can ask.
 #[derive(Clone, Debug, PartialEq, Encode, Decode)]
-pub enum Command {
-    /// To command from now on; in place of another client only if `is_taken_over`.
-    Lease {
-        /// True if another client loses its lease.
-        is_taken_over: bool,
-    },
-    /// To command no longer.
-    Release,
-    /// See [`RunningController::begin_move`](takt::RunningController::begin_move).
-    Move {
-        /// Whose axes.
-        target: RequestTarget,
-        /// How.
-        options: MoveOptions,
-        /// Where to.
-        positions: Vec<f64>,
-    },
-    /// See [`RunningController::begin_move_by`](takt::RunningController::begin_move_by).
-    MoveBy {
-        /// Whose axes.
-        target: RequestTarget,
-        /// How.
-        options: MoveOptions,
-        /// How far.
-        distances: Vec<f64>,
-    },
-    /// A velocity in profile velocity.
-    Velocity {
-        /// The axis.
-        axis: usize,
-        /// rad/s (m/s)
-        velocity: f64,
-        /// For how long.
-        valid_for: Duration,
-    },
-    /// A torque in profile torque.
-    Torque {
-        /// The axis.
-        axis: usize,
-        /// N·m (N)
-        torque: f64,
-        /// For how long.
-        valid_for: Duration,
-    },
-    /// Another mode of operation for all axes of a target.
-    ChangeMode {
-        /// Whose axes.
-        target: RequestTarget,
-        /// The mode.
-        mode: OperationMode,
-    },
-    /// The same for one axis.
-    ChangeAxisMode {
-        /// The axis.
-        axis: usize,
-        /// The mode.
-        mode: OperationMode,
-    },
-    /// To enable.
-    Enable(RequestTarget),
-    /// To disable.
-    Disable(RequestTarget),
-    /// To clear latched faults.
-    ResetFaults(RequestTarget),
-    /// To bring drives up again.
-    BringUp(RequestTarget),
-    /// To say why drives were not brought up again.
-    BringUpFailure(RequestTarget),
-    /// To follow points.
-    BeginStream(RequestTarget),
+pub enum Asked {
+    /// What any controller can be asked.
+    Command(Command),
     /// A point of a stream.
     Point {
         /// Whose axes.
@@ -112,47 +45,28 @@ pub enum Command {
         /// An entry for each axis, of each point.
         points: Vec<Vec<AxisPoint>>,
     },
-    /// Points for [`Command::Execute`] or [`Command::Through`], behind those that came before.
+    /// Points for [`Asked::Trajectory`], behind those that came before: one packet has no room for all of them.
     Points {
         /// Whose axes.
         target: RequestTarget,
         /// The points.
         points: Vec<TrajectoryPoint>,
     },
-    /// To carry out the trajectory through the points that have come.
-    Execute {
+    /// To carry out [`Command::Execute`] with the points that have come, or [`Command::Through`] with their positions.
+    Trajectory {
         /// Whose axes.
         target: RequestTarget,
         /// How many points have been sent.
         points: usize,
+        /// True if their times count.
+        is_timed: bool,
     },
-    /// The same through waypoints: the positions of the points that have come.
-    Through {
-        /// Whose axes.
-        target: RequestTarget,
-        /// How many points have been sent.
-        points: usize,
-    },
-    /// Another speed along a trajectory.
-    SetSpeed {
-        /// The trajectory.
-        motion: MotionId,
-        /// The speed.
-        rate: f64,
-    },
-    /// To pause a trajectory.
-    Pause(MotionId),
-    /// To go on with it.
-    Resume(MotionId),
-    /// How far it is. It needs no lease.
-    Progress(MotionId),
-    /// To ask a device that is none of the configuration's.
-    Question {
-        /// The bus.
-        bus: usize,
-        /// The question.
-        frame: Frame,
-    },
+}
+
+impl From<Command> for Asked {
+    fn from(command: Command) -> Self {
+        Self::Command(command)
+    }
 }
 
 /// The bytes of a packet beside what repeats in it, at most.
@@ -168,20 +82,20 @@ pub const fn bytes_of_point(point: &TrajectoryPoint) -> usize {
 
 /// The points of a trajectory, in as many packets as they need. A point for more axes than any controller has is in a packet of its own,
 /// however long that is.
-pub fn packets_of_points(target: RequestTarget, points: &[TrajectoryPoint]) -> Vec<Command> {
+pub fn packets_of_points(target: RequestTarget, points: &[TrajectoryPoint]) -> Vec<Asked> {
     let mut packets = vec![];
     let (mut now, mut room) = (vec![], PACKET_BYTES - HEAD);
     for point in points {
         let bytes = bytes_of_point(point);
         if bytes > room && !now.is_empty() {
-            packets.push(Command::Points { target, points: std::mem::take(&mut now) });
+            packets.push(Asked::Points { target, points: std::mem::take(&mut now) });
             room = PACKET_BYTES - HEAD;
         }
         room = room.saturating_sub(bytes);
         now.push(point.clone());
     }
     if !now.is_empty() {
-        packets.push(Command::Points { target, points: now });
+        packets.push(Asked::Points { target, points: now });
     }
     packets
 }
@@ -200,56 +114,37 @@ impl Demand {
     /// The demand of a packet; `None` if no client of takt has sent it. What its numbers mean, the controller checks.
     pub fn of(packet: &[u8]) -> Option<Self> {
         let demand: Self = bitcode::decode(packet).ok()?;
-        match &demand.command {
-            Command::Question { frame, .. } if !frame.is_valid() => None,
+        match &demand.asked {
+            Asked::Command(Command::Question { frame, .. }) if !frame.is_valid() => None,
             _ => Some(demand),
         }
     }
 }
 
-impl Command {
+impl Asked {
     /// Whose axes are meant, where the client says so.
     pub const fn target(&self) -> Option<RequestTarget> {
         match self {
-            Self::Lease { .. }
-            | Self::Release
-            | Self::Velocity { .. }
-            | Self::Torque { .. }
-            | Self::ChangeAxisMode { .. }
-            | Self::Question { .. } => None,
-            Self::SetSpeed { motion, .. }
-            | Self::Pause(motion)
-            | Self::Resume(motion)
-            | Self::Progress(motion) => Some(motion.target()),
-            Self::Enable(target)
-            | Self::Disable(target)
-            | Self::ResetFaults(target)
-            | Self::BringUp(target)
-            | Self::BringUpFailure(target)
-            | Self::BeginStream(target)
+            Self::Command(command) => command.target(),
+            Self::Point { target, .. }
+            | Self::Chunk { target, .. }
             | Self::Points { target, .. }
-            | Self::Execute { target, .. }
-            | Self::Through { target, .. }
-            | Self::Move { target, .. }
-            | Self::MoveBy { target, .. }
-            | Self::ChangeMode { target, .. }
-            | Self::Point { target, .. }
-            | Self::Chunk { target, .. } => Some(*target),
+            | Self::Trajectory { target, .. } => Some(*target),
         }
+    }
+
+    /// True for points of a stream.
+    pub const fn is_of_stream(&self) -> bool {
+        matches!(self, Self::Point { .. } | Self::Chunk { .. })
     }
 
     /// True for what begins or changes a motion.
     pub const fn is_discarded_by_stops(&self) -> bool {
-        !matches!(
-            self,
-            Self::Lease { .. }
-                | Self::Release
-                | Self::Disable(_)
-                | Self::Points { .. }
-                | Self::Progress(_)
-                | Self::BringUpFailure(_)
-                | Self::Question { .. }
-        )
+        match self {
+            Self::Command(command) => command.is_discarded_by_stops(),
+            Self::Point { .. } | Self::Chunk { .. } | Self::Trajectory { .. } => true,
+            Self::Points { .. } => false,
+        }
     }
 }
 
@@ -292,8 +187,8 @@ mod tests {
         std::f64::consts::PI * (1.0 + of as f64).powi(9)
     }
 
-    fn bytes(command: Command) -> usize {
-        Demand { number: u64::MAX, asked_ns: u64::MAX, command }.packet().len()
+    fn bytes(asked: Asked) -> usize {
+        Demand { number: u64::MAX, asked_ns: u64::MAX, asked }.packet().len()
     }
 
     #[test]
@@ -324,15 +219,16 @@ mod tests {
             };
             let points = vec![(0..axes).map(entry).collect(); chunk_points(axes)];
             let interval = Duration::MAX;
-            let chunk = Command::Chunk { target, from_ns: u64::MAX, interval, points };
+            let chunk = Asked::Chunk { target, from_ns: u64::MAX, interval, points };
             assert!(bytes(chunk) <= PACKET_BYTES, "{axes} axes");
         }
     }
 
     #[test]
     fn a_question_that_is_no_frame_is_no_demand() {
-        let frame = Frame::fd(takt_rt::Id::base(0x601).unwrap(), &[7; 12], false).unwrap();
-        let packet = Demand { number: 1, asked_ns: 2, command: Command::Question { bus: 0, frame } }.packet();
+        let frame = takt_rt::Frame::fd(takt_rt::Id::base(0x601).unwrap(), &[7; 12], false).unwrap();
+        let asked = Command::Question { bus: 0, frame }.into();
+        let packet = Demand { number: 1, asked_ns: 2, asked }.packet();
         assert!(Demand::of(&packet).is_some());
         let length = packet.iter().rposition(|byte| *byte == 12).unwrap();
         for wrong in [11, 13, 65, 255] {

@@ -1,7 +1,6 @@
 //! Connecting to a controller that another process serves.
 
 use std::io;
-use std::sync::Arc;
 
 use crate::client::Client;
 use crate::connection::Connection;
@@ -57,5 +56,5 @@ pub fn connect(name: &str) -> Result<Client, ConnectError> {
         Unreadable::Foreign => foreign(),
         Unreadable::Version(theirs) => ConnectError::Version { theirs },
     })?;
-    Ok(Client(Arc::new(Connection::new(names, shown, description, observer))))
+    Ok(Client::new(Connection::new(names, shown, description, observer)))
 }

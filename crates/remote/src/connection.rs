@@ -4,23 +4,23 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use takt::command::{CommandError, MotionId, StreamError, TrajectoryProgress, WaitError};
+use takt::command::{Command, CommandError, Reply, StreamError, WaitError};
 use takt::trajectory::TrajectoryPoint;
 use takt_rt::{Nanoseconds, RequestTarget, StopCategory};
 
-use crate::commands::{Command, Demand, StopRequest, packets_of_points};
+use crate::commands::{Asked, Demand, StopRequest, packets_of_points};
 use crate::layout::Description;
 use crate::no_answer::{LOOK, NoAnswer, REPLY_WITHIN};
-use crate::replies::{Answer, Reply};
+use crate::replies::{Answer, Replied};
 use crate::shown::{Shown, now_ns};
 use crate::socket::{Names, PACKET_BYTES, Packets, Received, Role};
 use crate::stops::Stops;
 
-/// The controller of another process that a client observes and asks.
+/// A controller of another process, as what the handle of a [`Client`](crate::Client) stands on.
 pub struct Connection {
-    pub names: Names,
-    pub shown: Shown,
-    pub description: Description,
+    pub(crate) names: Names,
+    pub(crate) shown: Shown,
+    pub(crate) description: Description,
     /// It is closed when the process of the controller ends.
     observer: Packets,
     stops: Stops,
@@ -39,18 +39,18 @@ struct Commands {
 
 impl Connection {
     /// The controller of these names that shows itself so.
-    pub fn new(names: Names, shown: Shown, description: Description, observer: Packets) -> Self {
+    pub(crate) fn new(names: Names, shown: Shown, description: Description, observer: Packets) -> Self {
         let (stops, commands) = (Stops::new(&names, &observer), Mutex::default());
         Self { names, shown, description, observer, stops, commands, answered_at: AtomicU64::new(0) }
     }
 
     /// Returns `true` if the controller has ended, or its process.
-    pub fn has_ended(&self) -> bool {
+    pub(crate) fn is_over(&self) -> bool {
         self.shown.has_ended() || self.observer.is_closed()
     }
 
     /// Looks after each cycle, and when the other process ends.
-    pub fn look_until<T>(
+    pub(crate) fn await_found<T>(
         &self,
         at_most: Duration,
         mut look: impl FnMut() -> Option<T>,
@@ -60,7 +60,7 @@ impl Connection {
         let _ = self.await_stops(at_most.min(REPLY_WITHIN));
         loop {
             // These are read before what is looked at, so that the last of it before the end is seen, and nothing is slept through.
-            let (seen, has_ended) = (self.shown.states(), self.has_ended());
+            let (seen, has_ended) = (self.shown.states(), self.is_over());
             if let Some(found) = look() {
                 return Ok(found);
             }
@@ -76,25 +76,25 @@ impl Connection {
     }
 
     fn await_stops(&self, at_most: Duration) -> Result<(), NoAnswer> {
-        self.stops.await_taken(at_most, || self.has_ended())
+        self.stops.await_taken(at_most, || self.is_over())
     }
 
     /// Asks, and waits for the answer.
-    fn ask(&self, command: Command) -> Result<Reply, NoAnswer> {
+    fn ask(&self, asked: Asked) -> Result<Replied, NoAnswer> {
         self.await_stops(REPLY_WITHIN)?;
         let asked_ns = now_ns();
         // A panic of another holder of the lock leaves a connection whose replies have other numbers.
         let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
-        self.ask_by(&mut commands, asked_ns, command)
+        self.ask_by(&mut commands, asked_ns, asked)
     }
 
     fn ask_by(
         &self,
         commands: &mut Commands,
         asked_ns: Nanoseconds,
-        command: Command,
-    ) -> Result<Reply, NoAnswer> {
-        if self.has_ended() {
+        asked: Asked,
+    ) -> Result<Replied, NoAnswer> {
+        if self.is_over() {
             return Err(NoAnswer::Ended);
         }
         commands.number += 1;
@@ -103,8 +103,8 @@ impl Connection {
             Some(connection) => connection,
             place => place.insert(self.connected()?),
         };
-        let asked = connection.send(&Demand { number, asked_ns, command }.packet());
-        let answer = match asked {
+        let sent = connection.send(&Demand { number, asked_ns, asked }.packet());
+        let answer = match sent {
             Ok(()) => self.answer(connection, number),
             Err(_) => None,
         };
@@ -130,7 +130,7 @@ impl Connection {
     }
 
     /// The answer to a demand; `None` if the connection is closed.
-    fn answer(&self, connection: &Packets, number: u64) -> Option<Result<Reply, NoAnswer>> {
+    fn answer(&self, connection: &Packets, number: u64) -> Option<Result<Replied, NoAnswer>> {
         let begun = Instant::now();
         let mut packet = [0; PACKET_BYTES];
         loop {
@@ -155,94 +155,64 @@ impl Connection {
     fn await_answered_state(&self) {
         let answered_at = self.answered_at.load(Ordering::Acquire);
         // It is shown within a cycle. A process that is paused meanwhile shows an older one for longer.
-        let _ =
-            self.look_until(REPLY_WITHIN, || (self.shown.state().snapshot.slot >= answered_at).then_some(()));
+        let _ = self
+            .await_found(REPLY_WITHIN, || (self.shown.state().snapshot.slot >= answered_at).then_some(()));
     }
 
-    /// Asks for what has no result.
-    pub fn done(&self, command: Command) -> Result<(), CommandError> {
-        self.asked(command)?;
-        self.await_answered_state();
-        Ok(())
-    }
-
-    /// As [`Connection::done`], for what no state shows.
-    pub fn asked(&self, command: Command) -> Result<(), CommandError> {
-        match self.ask(command)? {
-            Reply::Done | Reply::Motion(_) => Ok(()),
-            Reply::Refused(error) => Err(error),
-            Reply::NotTaken(_) | Reply::Progress(_) | Reply::BringUpFailure(_) => {
-                Err(CommandError::Unanswered)
+    /// Asks for what any controller can be asked.
+    pub(crate) fn command(&self, command: Command) -> Result<Reply, CommandError> {
+        let is_shown = !command.only_reads();
+        let replied = match command {
+            Command::Execute { target, points } => self.trajectory(target, &points, true)?,
+            Command::Through { target, waypoints } => {
+                let point = |positions| TrajectoryPoint { positions, ..TrajectoryPoint::default() };
+                let points: Vec<TrajectoryPoint> = waypoints.into_iter().map(point).collect();
+                self.trajectory(target, &points, false)?
             }
+            command => self.ask(command.into())?,
+        };
+        let Replied::Command(reply) = replied else { return Err(CommandError::Unanswered) };
+        if is_shown && reply.is_ok() {
+            self.await_answered_state();
         }
-    }
-
-    /// Asks how far a trajectory is.
-    pub fn progress(&self, motion: MotionId) -> Result<Option<TrajectoryProgress>, CommandError> {
-        match self.ask(Command::Progress(motion))? {
-            Reply::Progress(progress) => Ok(progress),
-            Reply::Refused(error) => Err(error),
-            _ => Err(CommandError::Unanswered),
-        }
-    }
-
-    /// Asks why drives were not brought up again.
-    pub fn bring_up_failure(&self, target: RequestTarget) -> Result<Option<String>, CommandError> {
-        match self.ask(Command::BringUpFailure(target))? {
-            Reply::BringUpFailure(words) => Ok(words),
-            Reply::Refused(error) => Err(error),
-            _ => Err(CommandError::Unanswered),
-        }
-    }
-
-    /// Asks for a motion.
-    pub fn begun(&self, command: Command) -> Result<MotionId, CommandError> {
-        self.motion(self.ask(command)?)
-    }
-
-    fn motion(&self, reply: Reply) -> Result<MotionId, CommandError> {
-        match reply {
-            Reply::Motion(motion) => {
-                self.await_answered_state();
-                Ok(motion)
-            }
-            Reply::Refused(error) => Err(error),
-            _ => Err(CommandError::Unanswered),
-        }
+        reply
     }
 
     /// Hands points to a stream.
-    pub fn taken(&self, command: Command) -> Result<(), StreamError> {
-        match self.ask(command)? {
-            Reply::NotTaken(error) => Err(error),
-            Reply::Refused(CommandError::Lease(error)) => Err(error.into()),
-            Reply::Refused(_) | Reply::Progress(_) | Reply::BringUpFailure(_) => Err(StreamError::Ended),
-            Reply::Done | Reply::Motion(_) => Ok(()),
+    pub(crate) fn points(&self, asked: Asked) -> Result<(), StreamError> {
+        match self.ask(asked)? {
+            Replied::Points(taken) => taken,
+            Replied::Command(Err(CommandError::Lease(error))) => Err(error.into()),
+            Replied::Command(_) => Err(StreamError::Ended),
         }
     }
 
     /// Hands the points of a trajectory over, and asks to carry it out.
-    pub fn trajectory(
+    fn trajectory(
         &self,
         target: RequestTarget,
         points: &[TrajectoryPoint],
-        command: Command,
-    ) -> Result<MotionId, CommandError> {
+        is_timed: bool,
+    ) -> Result<Replied, NoAnswer> {
         self.await_stops(REPLY_WITHIN)?;
         let asked_ns = now_ns();
         let mut commands = self.commands.lock().unwrap_or_else(PoisonError::into_inner);
         for packet in packets_of_points(target, points) {
-            if let Reply::Refused(error) = self.ask_by(&mut commands, asked_ns, packet)? {
-                return Err(error);
+            let replied = self.ask_by(&mut commands, asked_ns, packet)?;
+            if replied != Replied::Command(Ok(Reply::Done)) {
+                return Ok(replied);
             }
         }
-        let reply = self.ask_by(&mut commands, asked_ns, command)?;
-        drop(commands);
-        self.motion(reply)
+        let asked = Asked::Trajectory { target, points: points.len(), is_timed };
+        self.ask_by(&mut commands, asked_ns, asked)
     }
 
     /// Sends a stop. It waits for nothing, allocates nothing and takes no lock.
-    pub fn send_stop(&self, target: RequestTarget, category: StopCategory) -> Result<(), CommandError> {
+    pub(crate) fn send_stop(
+        &self,
+        target: RequestTarget,
+        category: StopCategory,
+    ) -> Result<(), CommandError> {
         if self.shown.has_ended() {
             return Err(CommandError::Ended);
         }

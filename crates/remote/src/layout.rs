@@ -15,7 +15,7 @@ use takt_rt::{MAX_GROUPS, RequestTarget};
 /// `takt mem`, as bytes.
 pub const MAGIC: u64 = u64::from_ne_bytes(*b"takt mem");
 /// Counts changes of the memory, the packets and their meaning. Both sides must have the same.
-pub const VERSION: u64 = 5;
+pub const VERSION: u64 = 6;
 
 /// Events that an observer can be behind, and one that is being written.
 const EVENT_SLOTS: u64 = 1024 + 1;

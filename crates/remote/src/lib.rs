@@ -41,9 +41,8 @@
 //! ```text
 //! serve                             a running controller, offered to other processes
 //! connect error                     how a client comes to a controller, and why it does not
-//! group stream                      one group, and a stream
-//! running_controller commanding     what a client commands
-//! events client                     what a client observes
+//! client                            who commands and observes from here
+//! backend events                    what its handle stands on
 //! connection stops no_answer        asking the other process, and its answers
 //! replies commands                  what the packets say
 //! shown                             the state and the events in the memory, for their writer and their readers
@@ -53,40 +52,35 @@
 //! ```
 #![deny(unsafe_code)]
 
+mod backend;
 mod client;
-mod commanding;
 mod commands;
 mod connect;
 mod connection;
 mod error;
 mod events;
-mod group;
 mod layout;
 mod memory;
 mod no_answer;
 mod replies;
-mod running_controller;
 mod serve;
 mod shown;
 mod socket;
 mod stops;
-mod stream;
 
 pub use client::Client;
 pub use connect::connect;
+pub use connection::Connection;
 pub use error::ConnectError;
-pub use events::ClientEvents;
-pub use group::ClientGroup;
 pub use serve::{Claim, ServeError, ServeOptions, Server, serve};
 pub use shown::now_ns;
 pub use socket::names_in_use;
-pub use stream::ClientStream;
 
 /// What goes between the processes, for tests and fuzzers. It may change in any release.
 #[doc(hidden)]
 pub mod packets {
-    pub use crate::commands::{Command, Demand, StopRequest};
-    pub use crate::replies::{Answer, Reply};
+    pub use crate::commands::{Asked, Demand, StopRequest};
+    pub use crate::replies::{Answer, Replied};
     pub use crate::socket::{PACKET_BYTES, Packets, Received, Role};
 }
 

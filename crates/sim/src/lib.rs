@@ -9,10 +9,9 @@
 //!     who sends, when       │
 //!     mailbox              cia402 ── any CiA 402 drive, made from its electronic data sheet
 //!                          bit_fields ── any drive of bit fields, made from its description
-//!                          erob, erob_can, yz_aim ── drives of their own, by their manuals and field experience
+//!                          erob_can, yz_aim ── drives of their own, by their manuals and field experience
 //!     frames                │
 //!     waiting               ├── object_dictionary, sdo_server, pdo_engine, network, errors ── CANopen (CiA 301)
-//!                           │     canopen_node ── these together, for the drives with CiA 402
 //!                         erob_modbus ── a drive on a serial line, with its line
 //!                           │
 //!                         commanded_module, profile_motions ── an eRob that commands move, as both protocols of its maker do
@@ -54,12 +53,10 @@
 //! ```
 
 pub mod bit_fields;
-mod canopen_node;
 pub mod cia402;
 pub mod commanded_module;
 mod defect;
 mod drive;
-pub mod erob;
 pub mod erob_can;
 pub mod erob_modbus;
 mod errors;

@@ -165,14 +165,15 @@ mod tests {
     use std::os::unix::net::UnixDatagram;
 
     use super::*;
-    use crate::erob::{ErobJoint, ErobParameters};
+    use crate::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
+    use crate::homing_switches::ReferenceSwitches;
     use crate::plant::{Encoder, FrictionShape, JointParameters};
     use takt_rt::Id;
     use takt_wire::canopen::lss::{LssAddress, LssRequest, LssResponse};
+    use takt_wire::quirks::Quirks;
 
-    fn parameters(node: u8) -> ErobParameters {
-        ErobParameters {
-            node,
+    fn drive(node: u8) -> Box<dyn Drive> {
+        let axis = Cia402AxisParameters {
             joint: JointParameters {
                 inertia: 1.0,
                 viscous_friction: 10.0,
@@ -186,20 +187,27 @@ mod tests {
             rated_torque: 10.0,
             peak_torque: 30.0,
             highest_velocity: 3.0,
+            switches: ReferenceSwitches::default(),
+            end_stops: None,
+        };
+        let sheet = include_bytes!("../../../configs/eds/erob-canopen.eds");
+        let parameters = Cia402Parameters {
+            sheet: takt_wire::canopen::eds::parse("data sheet", sheet).unwrap().dictionary,
+            node,
+            quirks: Quirks::default(),
+            axes: vec![axis],
             power_up_ns: 1_000_000,
             feedback_delay_ns: 50_000,
-            has_battery: true,
-            has_interpolated_position: false,
-            is_upload_segmented: false,
             seed: 1,
-        }
+        };
+        Box::new(Cia402Drive::new(parameters).unwrap())
     }
 
     /// Three drives on one end of a socket pair, and the other end. Only the interface differs from a real one.
     fn connected() -> (LiveDrives, SocketCanPort) {
         let (ours, theirs) = UnixDatagram::pair().unwrap();
         let port = |socket: &UnixDatagram| SocketCanPort::new(socket.as_raw_fd(), 1_000_000, None).unwrap();
-        let drives = (1..=3).map(|node| -> Box<dyn Drive> { Box::new(ErobJoint::new(parameters(node))) });
+        let drives = (1..=3).map(drive);
         (LiveDrives::new(drives.collect(), Box::new(port(&ours))), port(&theirs))
     }
 

@@ -6,7 +6,7 @@ mod set_points;
 
 use super::servo::Servo;
 
-pub use generator::{ARRIVED, Generator};
+pub use generator::Generator;
 pub use set_points::SetPoints;
 
 /// The measured motion.

@@ -142,7 +142,10 @@ impl SimulatedDictionary {
             let highest = object.entries.last().map_or(0, |entry| entry.address.subindex);
             let described = object.entries.iter().filter(|entry| !is_missing(entry.address));
             entries.extend(described.map(|entry| {
-                let is_count = object.object_type.has_sub_objects() && entry.address.subindex == 0;
+                // The error history counts the errors in it, of which there are none.
+                let is_count = object.object_type.has_sub_objects()
+                    && entry.address.subindex == 0
+                    && object.index != 0x1003;
                 read_entry(entry, node, is_count.then_some(highest), is_constant(entry.address))
             }));
         }
@@ -265,6 +268,12 @@ impl SimulatedDictionary {
         self.set(place, value);
         let entry = &mut self.entries[place];
         (entry.default, entry.saved) = (self.numbers[place], self.numbers[place]);
+    }
+
+    /// Narrows the range of a number.
+    pub fn set_range(&mut self, place: usize, [low, high]: [i64; 2]) {
+        let entry = &mut self.entries[place];
+        (entry.low, entry.high) = (low.into(), high.into());
     }
 
     /// Appends the bytes of an SDO transfer.

@@ -8,6 +8,10 @@ import { readFileSync, readdirSync, writeFileSync } from "node:fs";
 import path from "node:path";
 import { pathToFileURL } from "node:url";
 
+// The wording of the panel's page, which asks for the language that was chosen last.
+globalThis.localStorage = { getItem: () => "en" };
+const { told } = await import("../../../crates/panel/src/page/texts.js");
+
 const [moduleFolder, recordings, takt] = process.argv.slice(2).map((name) => path.resolve(name));
 const { Takt } = await import(pathToFileURL(path.join(moduleFolder, "takt.mjs")));
 const module = await WebAssembly.compile(readFileSync(path.join(moduleFolder, "takt.wasm")));
@@ -70,8 +74,8 @@ class Arm {
     for (const message of this.#takt.advance(ms).split("\n\n").filter(Boolean)) {
       const [, name, data] = /^event: (\w+)\ndata: (.*)$/.exec(message);
       if (name === "state") this.state = JSON.parse(data);
-      if (name === "event") this.events.push(JSON.parse(data).words.en);
-      if (name === "problem") this.problems.push(JSON.parse(data).words.en);
+      if (name === "event") this.events.push(told(JSON.parse(data).words));
+      if (name === "problem") this.problems.push(told(JSON.parse(data).words));
     }
     return this;
   }
@@ -91,7 +95,7 @@ await check("the simulated arm moves where it is told to, and jogs while it is t
   arm.takt.command(move(1, 0.3));
   arm.pass(2000);
   assert.ok(Math.abs(arm.state.axes[1].position - 0.3) < 1e-3, `${arm.state.axes[1].position}`);
-  assert.throws(() => arm.takt.command(move(1, 99)), (refusal) => refusal.error === "refused" && /joint2/.test(refusal.words.en) && /位置限值|超出/.test(refusal.words.zh));
+  assert.throws(() => arm.takt.command(move(1, 99)), (refusal) => refusal.error === "refused" && /joint2.* is not within its limits/.test(told(refusal.words)) && /joint2.*超出其限值/.test(told(refusal.words, "zh")));
   arm.takt.command({ do: "drive", axis: 0, quantity: "velocity", value: 0.5, while: "held" });
   for (let renewals = 0; renewals < 10; renewals += 1) {
     arm.takt.command({ do: "renew", axis: 0, value: 0.5 });
@@ -149,7 +153,7 @@ for (const [what, rule, isState, isMended] of [
     if (arm.phase === "disabled") {
       const enable = () => arm.takt.command({ do: "enable", group: null });
       // A drive that has left the bus has confirmed nothing.
-      if (isState && !isMended) return assert.throws(enable, (refusal) => /not_disabled/.test(refusal.words.en));
+      if (isState && !isMended) return assert.throws(enable, (refusal) => /not_disabled/.test(told(refusal.words)));
       enable();
       arm.pass(6000);
     }

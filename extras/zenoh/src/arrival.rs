@@ -2,8 +2,8 @@
 
 use takt::rt::RequestTarget;
 use takt::telemetry::phase_words;
-use takt::{EventKind, Phase, RequestId, RunningController, Snapshot, Stopped};
-use takt_remote::{Client, ClientEvents};
+use takt::{EventKind, Events, Phase, RequestId, Snapshot, Stopped};
+use takt_remote::Client;
 use thiserror::Error;
 
 /// Reason for which a trajectory that has not begun is discarded.
@@ -52,8 +52,8 @@ impl Arrival {
         let (slot, lease) = (controller.state().slot, controller.lease_generation());
         // The phase is read last: a stop that comes in between shows in it, or as one that has come since then.
         let of_group = |target| GroupAtArrival {
-            newest_stop: controller.newest_stop(target),
-            fault: controller.fault_in(target),
+            newest_stop: controller.of(target).newest_stop(),
+            fault: controller.of(target).fault(),
             phase: phase_in(&controller.state(), target),
         };
         Self { slot, lease, groups: targets(controller).map(of_group).collect() }
@@ -84,7 +84,7 @@ impl Arrival {
 
     /// Returns `true` if a stop of a group was requested since then.
     pub fn has_stopped(&self, group: usize, controller: &Client) -> bool {
-        let newest_stop = target_of(group).map(|target| controller.newest_stop(target));
+        let newest_stop = target_of(group).map(|target| controller.of(target).newest_stop());
         self.groups.get(group).map(|group| group.newest_stop) != newest_stop
     }
 
@@ -114,7 +114,7 @@ fn targets(controller: &Client) -> impl Iterator<Item = RequestTarget> {
 
 /// The newest stop of each group, whatever the cause: also by a fault, and with another group.
 pub struct Stops {
-    events: ClientEvents,
+    events: Events,
     missed: u64,
     newest_slots: Vec<u64>,
 }

@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use takt::rt::{RequestTarget, StopCategory};
+use takt::rt::StopCategory;
 use takt::telemetry::CdrEncoder;
-use takt::{RunningController, Snapshot, WaitError};
+use takt::{Snapshot, WaitError};
 use takt_remote::{Client, ConnectError};
 use thiserror::Error;
 use zenoh::liveliness::LivelinessToken;
@@ -241,7 +241,7 @@ fn subscribe(
 
 /// Stops the axes. It waits for no message before it, and until the stop shows: it discards none that comes after it.
 fn stop_at_once(controller: &Client, receiving: &Inbox<Message>) {
-    let newest = || controller.newest_stop(RequestTarget::All);
+    let newest = || controller.newest_stop();
     let before = newest();
     let is_sent = controller.stop(StopCategory::Two).is_ok();
     // The thread that carries messages out tries again, and says why it cannot.

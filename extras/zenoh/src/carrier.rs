@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use takt::rt::{RequestTarget, StopCategory};
-use takt::{CommandError, MotionId, RunningController, TrajectoryPoint};
+use takt::{CommandError, MotionId, TrajectoryPoint};
 use takt_remote::Client;
 
 use crate::arrival::{Arrival, Discarded, Stops};
@@ -177,7 +177,7 @@ impl<'b> Carrier<'b> {
     /// A stop that came while a trajectory was begun may have come before its first cycle.
     fn stop_again(&self, group: usize) {
         let target = u8::try_from(group).map_or(RequestTarget::All, RequestTarget::Group);
-        match self.controller.request_stop(target, StopCategory::Two) {
+        match self.controller.of(target).stop(StopCategory::Two) {
             Ok(()) => self.say("a trajectory was stopped: its axes were stopped while it began"),
             Err(reason) => {
                 self.say(&format!("a trajectory that was to stop has begun, and is not stopped: {reason}"))

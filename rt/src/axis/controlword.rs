@@ -1,7 +1,9 @@
 //! The controlwords (object 6040) that a drive is sent: which one, how long ago, and whether one is due.
 
-use super::SETTLED_CYCLES;
 use crate::cia402::controlword;
+
+/// Cycles of its bus after which a drive has obeyed a controlword and has said so.
+pub(super) const SETTLED_CYCLES: u32 = 4;
 
 /// The controlwords that an axis has sent. Cycles are those of its bus.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,22 +3,13 @@
 use super::exchange::{Exchange, NoFeedback};
 use super::joint::JointFacts;
 use super::late_reply::SetPointSkip;
-use super::{Axis, FeedbackSince};
+use super::off_cycle::OffCycleReport;
+use super::{Axis, FeedbackSince, Jump};
 use crate::cia402::DriveState;
 use crate::frame::Frame;
 use crate::pdo::FeedbackSlot;
 use crate::time::Nanoseconds;
 use crate::watch::NodeFault;
-
-/// A report of a joint where it cannot have got to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
-pub struct Jump {
-    /// How far that is from its last plausible position: rad (m).
-    pub distance: f64,
-    /// How far it can have got: rad (m).
-    pub reach: f64,
-}
 
 impl Axis {
     /// Begins to wait for the feedback of a cycle. What arrived before `now_ns` and has not been used is too late for its
@@ -97,6 +88,24 @@ impl Axis {
             self.duplicate_node.note_repetition();
         }
         Ok(())
+    }
+
+    /// Takes a report of a drive that is spoken to outside of the cycle. One that carries no number changes nothing.
+    pub fn receive_off_cycle(&mut self, report: &OffCycleReport) {
+        let OffCycleReport { state, position, velocity, torque, error_code, temperature } = *report;
+        let is_number = position.is_finite() && velocity.is_finite() && torque.is_finite();
+        if !is_number || !self.is_off_cycle() {
+            return;
+        }
+        let scale = &self.parameters.scale;
+        self.feedback.take(FeedbackSlot::Statusword, state.statusword_bits().into());
+        self.feedback.take(FeedbackSlot::OperationModeDisplay, self.mode_set().into());
+        self.feedback.take(FeedbackSlot::Position, scale.position_to_counts(position));
+        self.feedback.take(FeedbackSlot::Velocity, scale.velocity_to_drive(velocity));
+        self.feedback.take(FeedbackSlot::Torque, scale.torque_to_per_mille(torque));
+        self.feedback.take(FeedbackSlot::ErrorCode, error_code.into());
+        self.off_cycle_temperature = temperature.filter(|temperature| temperature.is_finite());
+        self.reception.note_arrival(0);
     }
 
     /// Drops what has arrived of a report in this cycle.

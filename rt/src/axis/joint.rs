@@ -1,11 +1,11 @@
 //! Where the joint of an axis is, by the reports that are plausible, and whether it stands.
 
+use super::parameters::AxisParameters;
 use super::plausibility::{Meaning, Plausibility, PlausibilityCheck, TravelBound};
 use super::position_counter::PositionCounter;
 use super::reception::ReportSpan;
-use super::standstill::Standstill;
+use super::standstill::{AT_REST, Standstill};
 use super::velocity_estimate::{CountRate, VelocityEstimate};
-use super::{AT_REST, AxisParameters, Jump};
 use crate::guard::AxisLimits;
 use crate::units::Scale;
 
@@ -38,6 +38,16 @@ impl<'a> JointFacts<'a> {
     fn lap(self) -> f64 {
         self.counter.lap() as f64 / self.scale.resolution()
     }
+}
+
+/// A report of a joint where it cannot have got to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
+pub struct Jump {
+    /// How far that is from its last plausible position: rad (m).
+    pub distance: f64,
+    /// How far it can have got: rad (m).
+    pub reach: f64,
 }
 
 /// How the position of the joint is known.

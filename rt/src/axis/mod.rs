@@ -1,12 +1,14 @@
 //! One axis: what its drive reported, where it is to be, and the numbers that go onto the wire.
 //!
-//! The parts of an [`Axis`], a file each: `set_points` and `delay` (where it is to be, and the guard),
-//! `stream` (what a source wants, and the set-points that come of it), `torque_loop` (the torque where it is made here),
-//! `mode` (its change at run time), `profile_mode` (targets instead of set-points), `joint`, `plausibility` and `position_counter` (where the joint is), `reception` and
-//! `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
-//! `sdo_fallback` (the controlword when process data do not arrive), `exchange` and `command` (the frames), `bit_fields` (the same for a
-//! drive without PDOs), `off_cycle` (a drive that is spoken to outside of the cycle), `rest` and `standstill` (has the
-//! joint stopped).
+//! The parts of an [`Axis`], a file each: `set_points` and `delay` (where it is to be), `torque_loop` (the torque where it is made here),
+//! `mode` and `profile_mode` (the mode of its drive, and the target in a profile mode), `joint`, `plausibility`, `position_counter`,
+//! `velocity_estimate` and `standstill` (where the joint is, and whether it has stopped), `measured` (whether it is beyond its limits),
+//! `reception` and `late_reply` (which feedback has arrived, and in time), `drive_report` (state and errors), `power`, `controlword`,
+//! `sdo_fallback` (the controlword when process data do not arrive). `parameters` and `exchange` do not change.
+//!
+//! What becomes of them: `feedback` (what the drive reports, in the cycle or outside of it), `stream` (what a source wants, and the set-points
+//! that come of it), `next_set_point` (the guard), `profile_targets` (targets instead of set-points), `command` (the frames), `bit_fields` (the
+//! same for a drive without PDOs), `mode_change`, `drive_power`, `sdo_stop`, `measured_limits`, `rest` (has the joint stopped).
 //!
 //! # Power
 //!
@@ -28,22 +30,28 @@ mod bit_fields;
 mod command;
 mod controlword;
 mod delay;
+mod drive_power;
 mod drive_report;
 mod exchange;
 mod feedback;
 mod joint;
 mod late_reply;
 mod measured;
+mod measured_limits;
 mod mode;
+mod mode_change;
+mod next_set_point;
 mod off_cycle;
 mod parameters;
 mod plausibility;
 mod position_counter;
 mod power;
 mod profile_mode;
+mod profile_targets;
 mod reception;
 mod rest;
 mod sdo_fallback;
+mod sdo_stop;
 mod set_points;
 mod standstill;
 mod stream;
@@ -74,20 +82,14 @@ use sdo_fallback::SdoFallback;
 use set_points::SetPoints;
 use torque_loop::TorqueLoop;
 
-pub use exchange::{CommandPdo, Exchange, NoFeedback, Pdo, Pdos, SenderByte};
-pub use feedback::Jump;
+pub use exchange::{CommandPdo, Exchange, NoFeedback, Pdo, Pdos};
+pub use joint::Jump;
 pub use off_cycle::OffCycleReport;
 pub use parameters::{
     AxisParameters, AxisParametersError, FeedForward, FeedbackSince, ModeChanges, ModeCondition, Supervision,
     TorqueLimits,
 };
 pub use position_counter::PositionCounter;
-
-/// Cycles of its bus after which a drive has obeyed a controlword and has said so.
-const SETTLED_CYCLES: u32 = 4;
-
-/// A joint slower than this fraction of its velocity limit stands.
-const AT_REST: f64 = 0.02;
 
 /// An axis at run time.
 #[derive(Clone, Debug)]

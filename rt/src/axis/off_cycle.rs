@@ -1,11 +1,11 @@
-//! An axis whose drive is spoken to outside of the cycle, because it answers too slowly for it.
+//! The report of a drive that is spoken to outside of the cycle, because it answers too slowly for it.
 
-use super::Axis;
 use crate::cia402::DriveState;
 use crate::pdo::FeedbackSlot;
 
 /// What a drive has said outside of the cycle. At the joint: rad, rad/s and N·m, or m, m/s and N.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct OffCycleReport {
     /// Its state: [`DriveState::OperationEnabled`] while it follows set-points, [`DriveState::SwitchedOn`] while it is being enabled or
     /// disabled, so that it may have torque.
@@ -32,24 +32,4 @@ impl OffCycleReport {
         FeedbackSlot::Torque,
         FeedbackSlot::ErrorCode,
     ];
-}
-
-impl Axis {
-    /// Takes a report of a drive that is spoken to outside of the cycle. One that carries no number changes nothing.
-    pub fn receive_off_cycle(&mut self, report: &OffCycleReport) {
-        let OffCycleReport { state, position, velocity, torque, error_code, temperature } = *report;
-        let is_number = position.is_finite() && velocity.is_finite() && torque.is_finite();
-        if !is_number || !self.is_off_cycle() {
-            return;
-        }
-        let scale = &self.parameters.scale;
-        self.feedback.take(FeedbackSlot::Statusword, state.statusword_bits().into());
-        self.feedback.take(FeedbackSlot::OperationModeDisplay, self.mode_set().into());
-        self.feedback.take(FeedbackSlot::Position, scale.position_to_counts(position));
-        self.feedback.take(FeedbackSlot::Velocity, scale.velocity_to_drive(velocity));
-        self.feedback.take(FeedbackSlot::Torque, scale.torque_to_per_mille(torque));
-        self.feedback.take(FeedbackSlot::ErrorCode, error_code.into());
-        self.off_cycle_temperature = temperature.filter(|temperature| temperature.is_finite());
-        self.reception.note_arrival(0);
-    }
 }

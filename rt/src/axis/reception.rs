@@ -1,6 +1,6 @@
 //! Which feedback has arrived in this cycle of the bus, and how old the last complete feedback is.
 
-use super::FeedbackSince;
+use super::parameters::FeedbackSince;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// Reports that are further apart than this many cycles of the bus have slots between them that were missed.

@@ -7,8 +7,11 @@
 //! the velocity limit is low and the encoder coarse, it takes longer to show that a joint stands there: as long as a joint at
 //! the mean speed that is allowed would take for the counts that have been seen, and one for the rounding.
 
+use super::controlword::SETTLED_CYCLES;
 use super::reception::ReportSpan;
-use super::{AT_REST, SETTLED_CYCLES};
+
+/// A joint slower than this fraction of its velocity limit stands.
+pub(super) const AT_REST: f64 = 0.02;
 
 /// Reports that show the joint in one place before it counts as at rest: several times what a drive takes to obey.
 pub(super) const STANDING_REPORTS: u32 = 5 * SETTLED_CYCLES;

@@ -2,8 +2,8 @@
 
 use super::layout::{BitField, ByteOrder, FrameLayout, LayoutError};
 use super::values::{CommandValue, CommandValues, FieldValue, ReplyValue, ReplyValues};
-use crate::axis::SenderByte;
 use crate::frame::{Frame, FrameFormat, Id};
+use crate::sender_byte::SenderByte;
 use core::marker::PhantomData;
 
 /// A command to a drive or a reply of one: identifier, kind of frame and layout.

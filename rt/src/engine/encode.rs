@@ -6,10 +6,10 @@
 use super::group::{Commands, Group};
 use super::heartbeat::HeartbeatProducer;
 use super::parameters::CanopenNetwork;
-use super::shared::Shared;
+use super::shared::{Shared, has_cycle};
 use super::shared_frames::SharedFrames;
 use super::state::{GroupState, PowerRemoval};
-use super::{Deadline, Engine, SendBatch, has_cycle};
+use super::{Deadline, Engine, SendBatch};
 use crate::axis::{Axis, FeedbackSince};
 use crate::bit_set::BitSet;
 use crate::cia402::{Goal, controlword};

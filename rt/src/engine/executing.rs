@@ -6,6 +6,7 @@
 use arrayvec::ArrayVec;
 
 use super::Engine;
+use super::execution::{Execution, Successor};
 use super::group::GroupContext;
 use super::requests::Handled;
 use super::state::GroupState;
@@ -20,52 +21,6 @@ use crate::request::{ExecutionStart, RequestId, TrajectoryId};
 use crate::source::TrajectorySample;
 use crate::stop::{Origin, StopCause};
 use crate::stop_category::StopCategory;
-
-/// A trajectory that the group is on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
-pub(super) struct Execution<const AXES: usize> {
-    /// The request that began the motion.
-    pub(super) motion: RequestId,
-    /// The number under which the host has the trajectory.
-    pub(super) trajectory: TrajectoryId,
-    /// Cycles of the trajectory that have been carried out.
-    pub(super) cycles: u64,
-    /// What takes its place.
-    pub(super) successor: Option<Successor>,
-    /// What is wanted in the next cycle; `None` if the host has nothing.
-    pub(super) wanted: Option<TrajectorySample<AXES>>,
-}
-
-/// What takes the place of a trajectory.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
-pub(super) struct Successor {
-    trajectory: TrajectoryId,
-    /// The motion that goes on with it: the present one, or one of its own.
-    motion: RequestId,
-    /// Once so many cycles of the present trajectory have been carried out.
-    after_cycles: u64,
-}
-
-impl<const AXES: usize> Execution<AXES> {
-    /// As it is when one more cycle has been carried out. What takes its place does so at once: from then on, another one may be to
-    /// take the place of that.
-    fn after_cycle(&self) -> Self {
-        let cycles = self.cycles + 1;
-        match self.successor {
-            Some(Successor { trajectory, motion, after_cycles }) if cycles >= after_cycles => {
-                Self { motion, trajectory, cycles: 0, successor: None, wanted: self.wanted }
-            }
-            _ => Self { cycles, ..*self },
-        }
-    }
-
-    /// The trajectories that are still needed.
-    fn in_use(&self) -> [Option<TrajectoryId>; 2] {
-        [Some(self.trajectory), self.successor.map(|successor| successor.trajectory)]
-    }
-}
 
 impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
     /// Asks the host for what the trajectories want in the next cycle, and tells it which of them are needed.

@@ -7,9 +7,8 @@
 
 use arrayvec::ArrayVec;
 
-use super::Engine;
 use super::parameters::EngineParameters;
-use crate::axis::{Axis, Supervision};
+use crate::axis::Supervision;
 use crate::frame::{Frame, Id};
 use crate::function_code;
 use crate::watch::node_state;
@@ -33,9 +32,9 @@ enum Exchange {
 /// One node that is asked.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
-struct NodeGuard {
-    bus: u8,
-    node: u8,
+pub(super) struct NodeGuard {
+    pub(super) bus: u8,
+    pub(super) node: u8,
     guard_cycles: u32,
     /// Cycles until the next request.
     due: u32,
@@ -44,11 +43,19 @@ struct NodeGuard {
     exchange: Exchange,
 }
 
+impl NodeGuard {
+    /// Returns `true` if it has been asked and has not replied yet.
+    #[inline]
+    pub(super) const fn is_asked(&self) -> bool {
+        matches!(self.exchange, Exchange::Asked { .. })
+    }
+}
+
 /// The nodes that are asked, each once, however many axes it has.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub(super) struct NodeGuards<const AXES: usize> {
-    nodes: ArrayVec<NodeGuard, AXES>,
+    pub(super) nodes: ArrayVec<NodeGuard, AXES>,
     is_begun: bool,
 }
 
@@ -131,21 +138,6 @@ impl<const AXES: usize> NodeGuards<AXES> {
             matches!(guard.exchange, Exchange::Answered { .. } | Exchange::Asked { before: Some(_) })
         };
         guard.is_none_or(has_replied)
-    }
-}
-
-impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
-    /// Lets a slot pass without a reply, for the axes of the nodes that have been asked for one.
-    #[inline]
-    pub(super) fn watch_guarded_nodes(&mut self) {
-        for guard in &self.shared.guards.nodes {
-            if matches!(guard.exchange, Exchange::Asked { .. }) {
-                let is_its = |axis: &&mut Axis| {
-                    (axis.parameters().bus, axis.parameters().node) == (guard.bus, guard.node)
-                };
-                self.axes.iter_mut().filter(is_its).for_each(Axis::note_unanswered_guarding);
-            }
-        }
     }
 }
 

@@ -12,17 +12,20 @@
 //!   `process_data` exchanges mappings;
 //! - `faults` looks for the first thing that is wrong, and begins stops;
 //! - `step` makes the next set-points of the phase that the group is in (`state` has the table of phases), `streaming` those
-//!   of a stream, `executing` those of a trajectory, `in_loop` those of a callback; `changing_mode` changes modes of operation;
+//!   of a stream, `executing` those of a trajectory, `calling` those of a callback; `changing_mode` changes modes of operation;
 //! - `encode` makes frames of them, and decides what may leave; `sdo_fallback` stops drives that PDOs do not reach.
 //!
 //! Events wait in an outbox until [`Engine::finish`] hands them to the host.
 
 mod backlog;
+mod calling;
 mod changing_mode;
 #[cfg(feature = "checkpoint")]
 mod checkpoint;
+mod cycle_input;
 mod encode;
 mod executing;
+mod execution;
 mod faults;
 mod foreign_frames;
 mod group;
@@ -35,6 +38,7 @@ mod parameters;
 mod process_data;
 mod requests;
 mod sdo_fallback;
+mod send_batch;
 mod sense;
 mod shared;
 mod shared_frames;
@@ -49,58 +53,25 @@ use arrayvec::ArrayVec;
 
 use crate::axis::Axis;
 use crate::bit_set::BitSet;
+use crate::capacity::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::dispatch::Dispatch;
-use crate::frame::Frame;
 use crate::group_trajectory::ProfileStore;
 use crate::host::HostInterface;
 use crate::phase::Phase;
 use crate::places::Places;
 use crate::port::BusHealth;
-use crate::record::{CycleTiming, EventKind, MAX_AXES, MAX_BUSES, MAX_GROUPS};
+use crate::record::{CycleTiming, EventKind};
 use crate::time::Nanoseconds;
 use group::{Commands, Group, GroupContext};
 use parameters::{axes_of, dispatch_of};
 use shared::{Ending, Shared};
 
+pub use cycle_input::{CycleInput, Deadline};
 pub use parameters::{
     BusParameters, CanopenNetwork, CycleCount, EngineParameters, GroupParameters, Heartbeat, SetUpError,
 };
+pub use send_batch::{SEND_BATCH, SendBatch};
 pub use sense::Receiver;
-
-/// The most frames that the engine hands to one bus in one cycle.
-pub const SEND_BATCH: usize = 64;
-
-/// Frames for one bus.
-pub type SendBatch = ArrayVec<Frame, SEND_BATCH>;
-
-/// What a cycle begins with.
-#[derive(Clone, Copy, Debug)]
-pub struct CycleInput<'a> {
-    /// The slot.
-    pub slot: u64,
-    /// Its start on the grid: the time that its set-points stand for.
-    pub slot_start_ns: Nanoseconds,
-    /// The time at which its set-points must be ready.
-    pub set_points_due_ns: Nanoseconds,
-    /// The time.
-    pub now_ns: Nanoseconds,
-    /// How long the computer has been suspended since the cycle before: the clock stood still then.
-    pub suspended_ns: Nanoseconds,
-    /// The state of each bus.
-    pub buses: &'a [BusHealth],
-    /// The buses on which own frames of an earlier cycle still wait for the wire.
-    pub behind: BitSet,
-}
-
-/// The deadline of the set-points of a cycle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
-pub enum Deadline {
-    /// They were.
-    Met,
-    /// They would run into the next SYNC. Nothing leaves but what stops the drives, and the slot counts as missed.
-    Missed,
-}
 
 /// The axes of a controller, in groups that each move together.
 ///
@@ -391,9 +362,4 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
             *shown = *health;
         }
     }
-}
-
-/// Returns `true` if a bus has SYNC, feedback and set-points in this slot. Most have them in each, which takes no division to see.
-const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
-    bus.divider == 1 || slot.is_multiple_of(bus.divider as u64)
 }

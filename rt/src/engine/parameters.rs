@@ -2,14 +2,14 @@
 
 use arrayvec::ArrayVec;
 
-use super::SEND_BATCH;
+use super::send_batch::SEND_BATCH;
 use crate::axis::{Axis, AxisParameters, AxisParametersError, Exchange, FeedbackSince, Supervision};
 use crate::bit_fields::FieldDriveParameters;
 use crate::bit_set::BitSet;
+use crate::capacity::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::dispatch::{Dispatch, IdTaken};
 use crate::frame::{FrameFormat, Id};
 use crate::function_code;
-use crate::record::{MAX_AXES, MAX_BUSES, MAX_GROUPS};
 use crate::stop::StopCategories;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 use crate::watch::TimingLadder;

@@ -187,6 +187,19 @@ impl<const AXES: usize, const BUSES: usize> Engine<AXES, BUSES> {
         self.watch_guarded_nodes();
     }
 
+    /// Lets a slot pass without a reply, for the axes of the nodes that have been asked for one.
+    #[inline]
+    fn watch_guarded_nodes(&mut self) {
+        for guard in &self.shared.guards.nodes {
+            if guard.is_asked() {
+                let is_its = |axis: &&mut Axis| {
+                    (axis.parameters().bus, axis.parameters().node) == (guard.bus, guard.node)
+                };
+                self.axes.iter_mut().filter(is_its).for_each(Axis::note_unanswered_guarding);
+            }
+        }
+    }
+
     /// A drive that is being brought up may be reset at any moment: what it reports counts when its group is active.
     fn drop_reports_of_passive_groups(&mut self) {
         for group in self.groups.iter().filter(|group| matches!(group.state, GroupState::Passive)) {

@@ -3,13 +3,13 @@
 use arrayvec::ArrayVec;
 
 use super::backlog::Backlog;
+use super::cycle_input::Deadline;
 use super::foreign_frames::ForeignFrames;
 use super::guarding::NodeGuards;
 use super::heartbeat::HeartbeatProducer;
 use super::outbox::Outbox;
 use super::parameters::{BusParameters, EngineParameters};
 use super::slots::SlotWatch;
-use super::{Deadline, has_cycle};
 use crate::axis::{Axis, Exchange};
 use crate::bit_set::BitSet;
 use crate::host::Snapshot;
@@ -176,4 +176,9 @@ impl<const AXES: usize, const BUSES: usize> Shared<AXES, BUSES> {
         let is_in_cycle = |number: &usize| self.buses.get(*number).is_some_and(|bus| has_cycle(bus, slot));
         others.iter().filter(is_in_cycle).collect::<BitSet>().union(self.buses_of_every_slot)
     }
+}
+
+/// Returns `true` if a bus has SYNC, feedback and set-points in this slot. Most have them in each, which takes no division to see.
+pub(super) const fn has_cycle(bus: &BusParameters, slot: u64) -> bool {
+    bus.divider == 1 || slot.is_multiple_of(bus.divider as u64)
 }

@@ -6,8 +6,8 @@
 
 use arrayvec::ArrayVec;
 
-use super::parameters::EngineParameters;
-use super::{SEND_BATCH, SendBatch, SetUpError};
+use super::parameters::{EngineParameters, SetUpError};
+use super::send_batch::{SEND_BATCH, SendBatch};
 use crate::axis::{AxisParameters, CommandPdo, FeedbackSince};
 use crate::frame::{Frame, FrameFormat};
 use crate::pdo::TransmissionType;

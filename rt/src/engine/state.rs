@@ -26,7 +26,7 @@
 //! A number in brackets is a stop category of IEC 60204-1. While a group changes its mode it is shown in the phase that it has come
 //! from and goes back to. It does nothing else then but stop and be disabled.
 
-use super::executing::Execution;
+use super::execution::Execution;
 use super::in_loop::InLoop;
 use crate::cia402::Goal;
 use crate::phase::Phase;

@@ -3,7 +3,7 @@
 //! A drive gets the way of one cycle of its bus in that cycle. After a missed slot, or commands that were ready too late, more
 //! would have gathered: the set-points then stay where they are until the bus has sent them.
 
-use super::BusParameters;
+use super::parameters::BusParameters;
 use crate::bit_set::BitSet;
 
 /// Steps since the last set-points that have left, a bus each.

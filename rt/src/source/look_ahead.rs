@@ -9,8 +9,8 @@ use super::axis_piece::{AxisPiece, IntervalTime};
 use super::delay::{DelayEstimator, StreamDelay};
 use super::interpolation::{BEGIN, WINDOW, Window};
 use super::target::{AxisPoint, AxisTarget, PointRole, StreamCounts, StreamPoint, StreamSample, StreamWish};
+use crate::capacity::MAX_AXES;
 use crate::guard::AxisLimits;
-use crate::record::MAX_AXES;
 use crate::time::{NANOSECONDS_PER_SECOND, Nanoseconds};
 
 /// The most points that a [`LookAhead`] can hold.

@@ -1,7 +1,7 @@
 //! What a stream wants: of an axis in one of its points, and of every axis in one slot.
 
+use crate::capacity::MAX_AXES;
 use crate::plan::State;
-use crate::record::MAX_AXES;
 use crate::time::Nanoseconds;
 
 /// What is done with a stream that asks for more than the limits of an axis allow.

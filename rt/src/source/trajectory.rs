@@ -4,12 +4,13 @@
 //! moment of the execution: at first they are the same; a speed override, a pause or a resumption changes the law, and never
 //! the path. The real-time thread only samples both, from memory that the host owns.
 
+use crate::capacity::MAX_AXES;
 use crate::plan::State;
-use crate::record::MAX_AXES;
 
 /// A polynomial of the fifth degree, its coefficients in ascending order: the position of an axis (rad or m) at a time in
 /// seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct Polynomial(pub [f64; 6]);
 
 impl Polynomial {
@@ -38,6 +39,7 @@ impl Polynomial {
 
 /// A part of a time law: from a time of the execution on, up to the next part.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "checkpoint", derive(bitcode::Encode, bitcode::Decode))]
 pub struct TimeLawPhase {
     /// When it begins, in seconds after the beginning of the execution.
     pub from_s: f64,

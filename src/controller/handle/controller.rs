@@ -7,13 +7,13 @@ use std::thread::{self, JoinHandle};
 use takt_rt::linux::ThreadReport;
 use takt_rt::{Snapshot, StopCategory};
 
-use super::in_loop::Callbacks;
+use super::callbacks::Callbacks;
 use super::life::Life;
 use super::messages::Messages;
 use super::pace::Pace;
 use super::start_failure::StartFailure;
-use super::trajectory::Trajectories;
-use super::{Handle, Shared};
+use super::trajectories::Trajectories;
+use super::{Handle, OwnProcess};
 use crate::channels::MotionEnd;
 use crate::config::Config;
 use crate::controller::outcome::{Interrupt, Outcome, Progress};
@@ -126,7 +126,7 @@ impl Controller {
             timing,
         } = remote;
         let trajectories = Trajectories::new(trajectories);
-        let handle = Handle(Arc::new(Shared {
+        let handle = Handle::new(Arc::new(OwnProcess {
             axes,
             groups,
             machine,
@@ -187,7 +187,7 @@ impl Controller {
 
     /// Stops the present motion and ends the run. Waiting requests are discarded.
     fn begin_end(&self) {
-        let shared = &self.handle.0;
+        let shared = self.handle.backend();
         shared.life.begin_end();
         shared.clients.stop(MotionEnd::Stop(StopCategory::Two));
     }
@@ -215,7 +215,7 @@ impl Handle {
     /// What the operating system granted to the real-time thread: scheduling policy and priority, CPU, locked memory; and what it
     /// refused.
     pub fn realtime(&self) -> &ThreadReport {
-        &self.0.realtime
+        &self.backend().realtime
     }
 }
 

@@ -1,59 +1,50 @@
-//! The events of a running controller, for any number of observers.
+//! The events of a controller of this process.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use takt_rt::Event;
 
-use super::Handle;
+use super::OwnProcess;
 use crate::channels::EventReader;
-use crate::command::WaitError;
-use crate::telemetry::words;
+use crate::command::{Backend, EventSource, WaitError};
 
-/// The events of a controller since a beginning: changes of phase, stops, emergency messages, rejections …
-///
-/// As an iterator it never waits: it gives the events that have come, then `None`, and later those that have come later. An
-/// observer may be 1024 events behind. One that is slower loses the oldest, and [`Events::missed`] counts them.
-pub struct Events {
-    handle: Handle,
+/// The place of an observer among the events.
+pub(super) struct OwnEvents {
+    own: Arc<OwnProcess>,
     reader: EventReader,
 }
 
-impl Events {
-    pub(super) fn new(handle: &Handle) -> Self {
-        Self { handle: handle.clone(), reader: handle.0.events.begin_now() }
+impl OwnEvents {
+    /// The events from now on.
+    pub fn new(own: Arc<OwnProcess>) -> Self {
+        let reader = own.events.begin_now();
+        Self { own, reader }
     }
+}
 
-    /// Waits for the next event, for no longer than `at_most`.
-    ///
-    /// # Errors
-    /// [`WaitError::NotInTime`]; [`WaitError::Ended`] if the controller has ended and no event is left.
-    pub fn wait(&mut self, at_most: Duration) -> Result<Event, WaitError> {
-        let deadline = self.handle.deadline_after(at_most);
+impl EventSource for OwnEvents {
+    fn wait(&mut self, at_most: Duration) -> Result<Event, WaitError> {
+        let deadline = self.own.deadline_after(at_most);
         loop {
             // This is read before the events, so that the last ones before the end are seen.
-            let has_ended = self.handle.has_ended();
+            let has_ended = self.own.has_ended();
             if let Some(event) = self.next() {
                 return Ok(event);
             }
             if has_ended {
                 return Err(WaitError::Ended);
             }
-            self.handle.sleep_until_look(&self.handle.state(), &deadline)?;
+            self.own.sleep_until_look(self.own.observer.look(|state| state.at_ns), &deadline)?;
         }
     }
 
-    /// How many events this observer has missed because it was too slow.
-    pub fn missed(&self) -> u64 {
+    fn missed(&self) -> u64 {
         self.reader.missed()
-    }
-
-    /// An event as a sentence, with the names of the axes and buses.
-    pub fn words(&self, event: &Event) -> String {
-        words::event(event, self.handle.machine())
     }
 }
 
-impl Iterator for Events {
+impl Iterator for OwnEvents {
     type Item = Event;
 
     fn next(&mut self) -> Option<Event> {

@@ -5,13 +5,10 @@ use std::time::Duration;
 
 use takt_rt::{
     AxisLimits, CallbackCycle, CallbackId, CallbackRun, Follow, Nanoseconds, Request, RequestTarget, Rule,
-    SlotPlan,
 };
 
-use super::Handle;
-use crate::channels::{
-    CallbackCommand, CallbackGiver, CallbackRecord, CallbackState, CallbackTimes, GivenCallback,
-};
+use super::{Handle, OwnProcess};
+use crate::channels::{CallbackCommand, CallbackRecord, CallbackState, CallbackTimes, GivenCallback};
 use crate::command::{CommandError, MotionError, MotionId};
 
 /// A callback that has panicked is back from the real-time thread within this time.
@@ -29,20 +26,6 @@ pub struct CallbackOptions {
     /// What is done with a command beyond the limits: [`Follow::Smooth`] tracks it within them, [`Follow::Exact`] stops the group. `None`
     /// is as each axis is configured.
     pub follow: Option<Follow>,
-}
-
-/// What the handles of a controller need for callbacks.
-pub(super) struct Callbacks {
-    pub(super) giver: CallbackGiver,
-    /// The longest budget.
-    pub(super) longest_ns: Nanoseconds,
-}
-
-impl Callbacks {
-    /// The budgets end with the time in which the set-points of a cycle must be ready.
-    pub(super) fn new(giver: CallbackGiver, plan: &SlotPlan) -> Self {
-        Self { giver, longest_ns: plan.latest_set_points_ns.saturating_sub(plan.command_phase_ns) }
-    }
 }
 
 /// A callback that leads a group, or has led it. To drop the handle changes nothing.
@@ -87,52 +70,47 @@ impl Handle {
         options: CallbackOptions,
         callback: impl FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send + 'static,
     ) -> Result<CallbackHandle, CommandError> {
-        let axes: Vec<usize> = (0..self.axes().len()).collect();
-        self.lead_in_loop((RequestTarget::All, 0), &axes, options, callback)
-    }
-
-    /// Lets a callback lead a group of the axes with these numbers.
-    pub(super) fn lead_in_loop(
-        &self,
-        (target, group): (RequestTarget, u8),
-        axes: &[usize],
-        options: CallbackOptions,
-        callback: impl FnMut(&CallbackState<'_>, &CallbackCycle, &mut CallbackCommand<'_>) + Send + 'static,
-    ) -> Result<CallbackHandle, CommandError> {
-        let budget_ns = self.budget_ns(options.budget)?;
-        let limits = |index: &usize| self.axes().get(*index).map(|axis| (*index, axis.limits));
+        let (own, axes) = (self.backend(), self.axis_numbers());
+        let group = match self.target() {
+            RequestTarget::All => 0,
+            RequestTarget::Group(number) => number,
+        };
+        let budget_ns = own.budget_ns(options.budget)?;
+        let limits = |index: &usize| own.axes.get(*index).map(|axis| (*index, axis.limits));
         let axes: Vec<(usize, AxisLimits)> = axes.iter().filter_map(limits).collect();
         let given = GivenCallback::new(group, &axes, Box::new(callback));
         let record = given.record();
-        let giver = &self.0.callbacks.giver;
+        let giver = &own.callbacks.giver;
         let callback = giver.give(given).ok_or(CommandError::TooManyCallbacks)?;
         let CallbackOptions { overruns_allowed, follow, .. } = options;
         let run = CallbackRun { callback, budget_ns, overruns_allowed, follow };
-        match self.begin_callback(target, run) {
+        match own.begin_callback(own.asked(self.target()), run) {
             Ok(motion) => Ok(CallbackHandle { handle: self.clone(), motion, record }),
             Err(error) => {
                 // The real-time thread may not have asked for it, or gives it back.
-                self.free_callback(callback);
+                own.free_callback(callback);
                 Err(error)
             }
         }
     }
+}
 
+impl OwnProcess {
     fn begin_callback(&self, target: RequestTarget, run: CallbackRun) -> Result<MotionId, CommandError> {
-        let request = self.submit(target, Request::RunCallback(run))?;
+        let request = self.hand_in(target, Request::RunCallback(run))?;
         self.wait_for_grant(target, request)?;
         Ok(MotionId { request, target })
     }
 
     fn free_callback(&self, callback: CallbackId) {
-        self.0.callbacks.giver.take_back(callback);
-        self.0.callbacks.giver.release();
+        self.callbacks.giver.take_back(callback);
+        self.callbacks.giver.release();
     }
 
     fn budget_ns(&self, budget: Option<Duration>) -> Result<Nanoseconds, CommandError> {
-        let longest_ns = self.0.callbacks.longest_ns;
+        let longest_ns = self.callbacks.longest_ns;
         let Some(budget) = budget else {
-            let groups = self.groups().len().max(1) as u64;
+            let groups = self.groups.len().max(1) as u64;
             return Ok(longest_ns / 2 / groups);
         };
         let budget_ns = u64::try_from(budget.as_nanos()).unwrap_or(u64::MAX);
@@ -161,7 +139,7 @@ impl CallbackHandle {
     /// [`MotionError::Replaced`], and see [`MotionError`].
     pub fn wait(&self, at_most: Duration) -> Result<(), MotionError> {
         let result = self.handle.wait(self.motion, at_most);
-        self.handle.0.callbacks.giver.release();
+        self.handle.backend().callbacks.giver.release();
         result.map_err(|error| self.with_message(error))
     }
 
@@ -179,7 +157,7 @@ impl CallbackHandle {
         }
         // It comes back with the cycle that stops the group, or just after it.
         let _ = self.handle.wait_until(COMING_BACK, |_| {
-            self.handle.0.callbacks.giver.release();
+            self.handle.backend().callbacks.giver.release();
             self.record.is_over().then_some(())
         });
         match self.record.panic() {

@@ -1,19 +1,20 @@
 //! Trajectories: points with times, along which the speed may be changed, and which may be paused and resumed.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use takt_rt::plan::State;
 use takt_rt::{
-    AxisLimits, ExecutionStart, MAX_GROUPS, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request,
-    RequestId, RequestTarget, TrajectoryId,
+    AxisLimits, ExecutionStart, MotionState, NANOSECONDS_PER_SECOND, RejectReason, Request, RequestId,
+    RequestTarget,
 };
 
-use super::{GroupHandle, Handle};
-use crate::channels::{GivenTrajectory, GroupAxes, TrajectoryGiver};
-use crate::command::{CommandError, MotionId, TrajectoryProgress, needed};
+use super::trajectories::{Present, TrajectoryState};
+use super::{Handle, OwnProcess};
+use crate::channels::{GivenTrajectory, GroupAxes};
+use crate::command::{Backend, CommandError, MotionId, TrajectoryProgress, needed};
 use crate::config::Axis;
-use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError, TrajectoryPoint};
+use crate::trajectory::{Trajectory, TrajectoryConditions, TrajectoryError};
 
 /// By how much later than now a trajectory takes the place of another one: first, and at most. It must have been computed and handed
 /// over by then.
@@ -22,115 +23,60 @@ const LONGEST_MARGIN_S: f64 = 1.0;
 /// A trajectory that has been granted takes the place of the present one within this time, unless the motion ends before.
 const TAKING_OVER: Duration = Duration::from_secs(5);
 
-/// The trajectories of the handles of a controller.
-pub(super) struct Trajectories {
-    giver: TrajectoryGiver,
-    /// Those of each group.
-    groups: [Mutex<TrajectoryState>; MAX_GROUPS],
-}
-
-#[derive(Default)]
-struct TrajectoryState {
-    /// The trajectory that was granted last.
-    present: Option<Present>,
-    /// Those whose requests may not have been taken yet.
-    submitted: Vec<(TrajectoryId, RequestId)>,
-}
-
-/// A trajectory that was granted.
-#[derive(Clone)]
-struct Present {
-    motion: RequestId,
-    id: TrajectoryId,
-    given: Arc<GivenTrajectory>,
-    /// The rate that it has while it is not paused.
-    rate: f64,
-    is_paused: bool,
-}
-
-impl Trajectories {
-    pub(super) fn new(giver: TrajectoryGiver) -> Self {
-        Self { giver, groups: Default::default() }
-    }
-
-    /// Commands of trajectories of a group wait for one another; no other call needs this lock.
-    fn lock(&self, group: u8) -> MutexGuard<'_, TrajectoryState> {
-        let [first, ..] = &self.groups;
-        let state = self.groups.get(usize::from(group)).unwrap_or(first);
-        // A panic of another holder of the lock leaves the state consistent.
-        state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
 impl Handle {
-    /// Starts a trajectory through points with times, as ROS' `JointTrajectory` has them: see [`Trajectory::new`]. All of it is checked
-    /// before: what breaks a limit anywhere is refused, with the first point, axis and limit.
-    ///
-    /// While the axes hold, a first point at the time 0 must be where they are; with a later one the trajectory goes there first. If that
-    /// point is passed in motion, a way there from rest that would swing far back is refused.
-    /// While another trajectory is under way, this one takes its place without a step, 20 ms later or as soon as it is computed: its
-    /// first point then needs a time after 0. Returns when the real-time thread has granted it.
+    /// As [`Handle::execute`](crate::command::Handle::execute), for a trajectory that `make` makes from where the axes are when it begins. It
+    /// is called again if that took too long.
     ///
     /// # Errors
-    /// [`CommandError::Trajectory`], [`CommandError::Refused`] in any other motion, [`CommandError::SeveralGroups`] where
-    /// [`GroupHandle::execute`] is meant, and see [`CommandError`]; nothing has changed then.
-    pub fn execute(&self, points: &[TrajectoryPoint]) -> Result<MotionId, CommandError> {
-        self.only_group()?.execute(points)
-    }
-
-    /// The same, for a trajectory that `make` makes from where the axes are when it begins. It is called again if that took too
-    /// long.
-    ///
-    /// # Errors
-    /// As [`Handle::execute`].
+    /// As [`Handle::execute`](crate::command::Handle::execute).
     pub fn execute_with(
         &self,
         make: impl Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>,
     ) -> Result<MotionId, CommandError> {
-        self.only_group()?.execute_with(make)
+        self.backend().one_group(self.target())?.execute_with(make)
+    }
+}
+
+/// One group, which a trajectory is for.
+pub(super) struct OneGroup<'a> {
+    own: &'a OwnProcess,
+    number: u8,
+    /// The numbers of its axes.
+    axes: Vec<usize>,
+}
+
+impl OwnProcess {
+    /// The one group that is meant.
+    pub(super) fn one_group(&self, target: RequestTarget) -> Result<OneGroup<'_>, CommandError> {
+        let number = match target {
+            RequestTarget::All if self.groups.len() > 1 => {
+                return Err(CommandError::SeveralGroups { groups: self.machine.groups.clone() });
+            }
+            RequestTarget::All => 0,
+            RequestTarget::Group(number) => number,
+        };
+        let group = match self.groups.is_empty() {
+            true => RequestTarget::All,
+            false => RequestTarget::Group(number),
+        };
+        Ok(OneGroup { own: self, number, axes: self.axes_of(group) })
     }
 
-    /// Starts a trajectory through waypoints, without stopping, to rest at the last one, in nearly the shortest time that the limits
-    /// allow. Each waypoint has a position (rad or m) for each axis. It begins where the axes hold, or takes the place of a trajectory
-    /// under way as [`Handle::execute`] does. See [`Trajectory::through`].
-    ///
-    /// # Errors
-    /// As [`Handle::execute`].
-    pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
-        self.only_group()?.move_through(waypoints)
+    /// The group of a motion.
+    pub(super) fn group_of_motion(&self, motion: MotionId) -> Result<OneGroup<'_>, CommandError> {
+        self.one_group(match motion.target {
+            RequestTarget::All => RequestTarget::Group(0),
+            group => group,
+        })
     }
 
-    /// Changes the speed along the path of a trajectory: 1 as it was written, 0.5 half as fast. The path stays the same, and all limits
-    /// are kept: the change is a ramp that is as short as they allow. Of a trajectory that is paused, it is the speed after
-    /// [`Handle::resume`]. Returns when the change begins.
-    ///
-    /// # Errors
-    /// [`CommandError::Rate`] for what the limits do not allow, [`CommandError::NoTrajectory`] if that motion is not a trajectory under way,
-    /// and see [`CommandError`]. The trajectory goes on as before then.
-    pub fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError> {
-        self.group_of_motion(motion).change_rate(motion, |present| (rate, present.is_paused))
-    }
-
-    /// Brings the axes to rest on the path of a trajectory. Returns when they begin to slow down.
-    ///
-    /// # Errors
-    /// As [`Handle::set_speed`].
-    pub fn pause(&self, motion: MotionId) -> Result<(), CommandError> {
-        self.group_of_motion(motion).change_rate(motion, |present| (present.rate, true))
-    }
-
-    /// Goes on with a trajectory that was paused. Returns when it does.
-    ///
-    /// # Errors
-    /// As [`Handle::set_speed`].
-    pub fn resume(&self, motion: MotionId) -> Result<(), CommandError> {
-        self.group_of_motion(motion).change_rate(motion, |present| (present.rate, false))
-    }
-
-    /// How far a trajectory under way is: the time on its path in seconds, of how many, and the present rate.
-    pub fn trajectory_progress(&self, motion: MotionId) -> Option<TrajectoryProgress> {
-        let group = self.group_of_motion(motion);
-        let trajectories = self.0.trajectories.lock(group.number);
+    /// How far a trajectory under way is.
+    pub(super) fn progress(&self, motion: MotionId) -> Option<TrajectoryProgress> {
+        let number = match motion.target {
+            RequestTarget::Group(number) => number,
+            RequestTarget::All => 0,
+        };
+        let trajectories = self.trajectories.lock(number);
         let present = self.under_way(&trajectories).filter(|present| present.motion == motion.request)?;
         let trajectory = present.given.trajectory();
         let path_time = trajectory.path_time(present.given.at_s());
@@ -141,43 +87,24 @@ impl Handle {
         })
     }
 
-    fn group_of_motion(&self, motion: MotionId) -> GroupHandle {
-        self.group_of_number(match motion.target {
-            RequestTarget::Group(number) => number,
-            RequestTarget::All => 0,
-        })
-    }
-
     /// The trajectory under way.
     fn under_way(&self, trajectories: &TrajectoryState) -> Option<Present> {
-        let state = self.state();
-        let is_under_way =
-            |present: &&Present| state.motions.of(present.motion) == Some(MotionState::InProgress);
-        trajectories.present.as_ref().filter(is_under_way).cloned()
+        let present = trajectories.present.as_ref()?;
+        let state = self.observer.look(|state| state.motions.of(present.motion));
+        (state == Some(MotionState::InProgress)).then(|| present.clone())
     }
 }
 
-impl GroupHandle {
-    /// As [`Handle::execute`], for the axes of the group in the order of [`GroupHandle::axes`]; errors count them so, too.
-    ///
-    /// # Errors
-    /// See [`Handle::execute`].
-    pub fn execute(&self, points: &[TrajectoryPoint]) -> Result<MotionId, CommandError> {
-        self.execute_with(|conditions| Trajectory::new(points, conditions))
-    }
-
-    /// As [`Handle::execute_with`], for the axes of the group in the order of [`GroupHandle::axes`].
-    ///
-    /// # Errors
-    /// See [`Handle::execute`].
-    pub fn execute_with(
+impl OneGroup<'_> {
+    /// See [`Handle::execute_with`].
+    pub(super) fn execute_with(
         &self,
         make: impl Fn(&TrajectoryConditions<'_>) -> Result<Trajectory, TrajectoryError>,
     ) -> Result<MotionId, CommandError> {
         let stopped = self.newest_asked_stop();
-        let mut trajectories = self.handle.0.trajectories.lock(self.number);
-        let Some(present) = self.handle.under_way(&trajectories) else {
-            let state = self.handle.state();
+        let mut trajectories = self.own.trajectories.lock(self.number);
+        let Some(present) = self.own.under_way(&trajectories) else {
+            let state = self.own.observer.snapshot();
             let standing = |axis: &usize| state.axes().get(*axis).map(|axis| State::rest(axis.position_set));
             let start: Vec<State> = self.axes.iter().filter_map(standing).collect();
             let trajectory = self.made(&start, &make)?;
@@ -190,12 +117,14 @@ impl GroupHandle {
         self.take_over(&mut trajectories, &present, stopped, None, |at_s| self.made(&start(at_s), &make))
     }
 
-    /// As [`Handle::move_through`], for the axes of the group in the order of [`GroupHandle::axes`].
-    ///
-    /// # Errors
-    /// See [`Handle::move_through`].
-    pub fn move_through(&self, waypoints: &[Vec<f64>]) -> Result<MotionId, CommandError> {
-        self.execute_with(|conditions| Trajectory::through(waypoints, conditions))
+    /// Another speed of a trajectory under way.
+    pub(super) fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError> {
+        self.change_rate(motion, |present| (rate, present.is_paused))
+    }
+
+    /// Pauses a trajectory under way, or goes on with it.
+    pub(super) fn set_paused(&self, motion: MotionId, is_paused: bool) -> Result<(), CommandError> {
+        self.change_rate(motion, |present| (present.rate, is_paused))
     }
 
     fn made(
@@ -222,8 +151,8 @@ impl GroupHandle {
         wanted: impl Fn(&Present) -> (f64, bool),
     ) -> Result<(), CommandError> {
         let stopped = self.newest_asked_stop();
-        let mut trajectories = self.handle.0.trajectories.lock(self.number);
-        let present = self.handle.under_way(&trajectories).filter(|present| present.motion == motion);
+        let mut trajectories = self.own.trajectories.lock(self.number);
+        let present = self.own.under_way(&trajectories).filter(|present| present.motion == motion);
         let present = present.ok_or(CommandError::NoTrajectory)?;
         let (rate, is_paused) = wanted(&present);
         if !(rate.is_finite() && rate > 0.0) {
@@ -288,13 +217,13 @@ impl GroupHandle {
         if self.newest_asked_stop() != stopped {
             return Err(CommandError::Overtaken);
         }
-        let giver = &self.handle.0.trajectories.giver;
+        let giver = &self.own.trajectories.giver;
         self.take_back_discarded(trajectories);
         let given = Arc::new(GivenTrajectory::new(trajectory, GroupAxes::new(self.axes.clone())));
         let id = giver
             .give(self.number, &given)
             .ok_or(CommandError::Full { waiting: trajectories.submitted.len() })?;
-        let request = match self.handle.submit(self.target(), Request::Execute { trajectory: id, start }) {
+        let request = match self.own.hand_in(self.target(), Request::Execute { trajectory: id, start }) {
             Ok(request) => request,
             Err(error) => {
                 giver.take_back(id);
@@ -302,12 +231,12 @@ impl GroupHandle {
             }
         };
         trajectories.submitted.push((id, request));
-        self.handle.wait_for_grant(self.target(), request)?;
+        self.own.wait_for_grant(self.target(), request)?;
         let motion = same.map_or(request, |same| same.motion);
         let (rate, is_paused) = same.map_or((1.0, false), |same| (same.rate, same.is_paused));
         trajectories.present = Some(Present { motion, id, given: Arc::clone(&given), rate, is_paused });
         // Until then nothing else can take the place of the present one. The motion may end before.
-        let _ = self.handle.wait_until(TAKING_OVER, |state| {
+        let _ = self.own.wait_until(TAKING_OVER, |state| {
             let is_under_way = state.motions.of(motion) == Some(MotionState::InProgress);
             (given.at_s() > 0.0 || !is_under_way).then_some(())
         });
@@ -316,19 +245,24 @@ impl GroupHandle {
 
     /// Takes trajectories back whose requests a stop has discarded.
     fn take_back_discarded(&self, trajectories: &mut TrajectoryState) {
-        let state = self.handle.state();
+        let state = self.own.observer.snapshot();
         trajectories.submitted.retain(|(id, request)| {
-            let is_discarded = self.handle.is_discarded(self.target(), *request, &state);
+            let is_discarded = self.own.is_discarded(self.target(), *request, &state);
             if is_discarded {
-                self.handle.0.trajectories.giver.take_back(*id);
+                self.own.trajectories.giver.take_back(*id);
             }
             !is_discarded && state.answers.of(*request) == takt_rt::Answer::None
         });
-        self.handle.0.trajectories.giver.release();
+        self.own.trajectories.giver.release();
+    }
+
+    /// Whom its requests are for.
+    fn target(&self) -> RequestTarget {
+        self.own.asked(RequestTarget::Group(self.number))
     }
 
     fn newest_asked_stop(&self) -> RequestId {
-        self.handle.0.clients.newest_asked_stop(self.target())
+        self.own.clients.newest_asked_stop(self.target())
     }
 
     fn limits(&self) -> Vec<AxisLimits> {
@@ -336,11 +270,11 @@ impl GroupHandle {
     }
 
     fn own_axes(&self) -> impl Iterator<Item = &Axis> {
-        self.axes.iter().filter_map(|axis| self.handle.axes().get(*axis))
+        self.axes.iter().filter_map(|axis| self.own.axes.get(*axis))
     }
 
     /// As the engine computes it.
     fn period_s(&self) -> f64 {
-        self.handle.machine().cycle_ns as f64 / NANOSECONDS_PER_SECOND as f64
+        self.own.machine.cycle_ns as f64 / NANOSECONDS_PER_SECOND as f64
     }
 }

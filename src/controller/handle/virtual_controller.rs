@@ -6,12 +6,12 @@ use std::time::Duration;
 
 use takt_rt::StopCategory;
 
-use super::in_loop::Callbacks;
+use super::callbacks::Callbacks;
 use super::life::Life;
 use super::pace::{Pace, VirtualLog, VirtualPace};
 use super::start_failure::StartFailure;
-use super::trajectory::Trajectories;
-use super::{Handle, Shared};
+use super::trajectories::Trajectories;
+use super::{Handle, OwnProcess};
 use crate::channels::{LogSide, MotionEnd};
 use crate::config::Config;
 use crate::controller::assemble::{self, AssembleError};
@@ -98,7 +98,7 @@ impl VirtualController {
         let (mut run, records) = VirtualRun::serving(config, ports, after_bring_up)?;
         let log = log(records, &mut run);
         let host = run.host();
-        let shared = Shared {
+        let shared = OwnProcess {
             axes: config.axes.clone(),
             groups: config.groups.clone(),
             machine: Machine::of(config),
@@ -118,7 +118,7 @@ impl VirtualController {
             life: Arc::<Life>::default(),
             pace: Pace::Virtual(Box::new(VirtualPace::new(run, log))),
         };
-        let controller = Self { handle: Handle(Arc::new(shared)) };
+        let controller = Self { handle: Handle::new(Arc::new(shared)) };
         match controller.wait_until_brought_up(after_bring_up) {
             Ok(()) => Ok(controller),
             Err(_) => {
@@ -130,12 +130,12 @@ impl VirtualController {
 
     /// Hands the ports out, to break something.
     pub fn with_ports<T>(&self, with: impl FnOnce(&mut [Port]) -> T) -> Option<T> {
-        self.handle.virtual_pace().map(|pace| pace.with_ports(with))
+        self.handle.backend().virtual_pace().map(|pace| pace.with_ports(with))
     }
 
     /// Lets this many cycles pass, or fewer up to the end of the run. Returns how many.
     pub fn step(&self, cycles: u64) -> u64 {
-        self.handle.virtual_pace().map_or(0, |pace| pace.step(cycles, &self.handle.0.life))
+        self.handle.backend().virtual_pace().map_or(0, |pace| pace.step(cycles, &self.handle.backend().life))
     }
 
     /// Lets a time pass, rounded up to whole cycles. Returns the number of cycles.
@@ -162,14 +162,16 @@ impl VirtualController {
             Outcome::Interrupted => Outcome::Finished,
             outcome => outcome,
         };
-        (outcome, self.handle.virtual_pace().map_or(vec![], |pace| pace.unreached()))
+        (outcome, self.handle.backend().virtual_pace().map_or(vec![], |pace| pace.unreached()))
     }
 
     fn end(&self) -> Outcome {
-        let shared = &self.handle.0;
+        let shared = self.handle.backend();
         shared.life.begin_end();
         shared.clients.stop(MotionEnd::Stop(StopCategory::Two));
-        let Some(pace) = self.handle.virtual_pace() else { return Outcome::ThreadDied { told: vec![] } };
+        let Some(pace) = self.handle.backend().virtual_pace() else {
+            return Outcome::ThreadDied { told: vec![] };
+        };
         pace.interrupt();
         // Each stage of the end has a time-out, so that it ends.
         while pace.step(1, &shared.life) > 0 {}

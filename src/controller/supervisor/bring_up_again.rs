@@ -1,74 +1,13 @@
 //! Groups that a client has let go back to passive are brought up again, beside what the others do.
 
-use takt_rt::{Answer, Frame, Phase, Request, RequestId, RequestTarget, Snapshot};
+use takt_rt::{Request, RequestId, RequestTarget, Snapshot};
 use tracing::{error, info};
 
+use super::again::{BringUpAgain, Step};
 use super::{Supervisor, service_sender};
 use crate::channels::HostSide;
-use crate::config::Config;
 use crate::controller::outcome::Outcome;
-use crate::family::bring_up::BringUp;
 use crate::telemetry::Machine;
-
-/// The bring-up of some groups.
-pub(super) struct BringUpAgain {
-    /// The numbers of the groups, and of their axes.
-    groups: Vec<u8>,
-    axes: Vec<usize>,
-    bring_up: BringUp,
-    step: Step,
-    /// The requests that make the groups active again.
-    activations: Vec<RequestId>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    Configure,
-    Start,
-    /// The groups are to be active. The drives have to report within the time of a stage.
-    Report {
-        since_ns: u64,
-    },
-    /// The groups are to be active, so that the drives show what is wrong with them.
-    Failed,
-}
-
-impl BringUpAgain {
-    /// Of the groups that are passive; `None` if there are none.
-    fn of_passive(config: &Config, first: &BringUp, snapshot: &Snapshot) -> Option<Self> {
-        let numbered = (0..).zip(snapshot.groups());
-        let passive = numbered.filter(|(_, group)| group.phase == Phase::Passive).map(|(number, _)| number);
-        let groups: Vec<u8> = passive.collect();
-        if groups.is_empty() {
-            return None;
-        }
-        let axes: Vec<usize> =
-            groups.iter().flat_map(|group| config.axes_of_group((*group).into())).collect();
-        let bring_up = first.again(&axes);
-        Some(Self { groups, axes, bring_up, step: Step::Configure, activations: vec![] })
-    }
-
-    /// Takes a received frame.
-    pub(super) fn receive(&mut self, bus: usize, frame: &Frame) {
-        self.bring_up.receive(bus, frame);
-    }
-
-    /// Returns `true` if the requests that make its groups active have been carried out.
-    fn is_activated(&self, snapshot: &Snapshot) -> bool {
-        let answers = &snapshot.answers;
-        self.activations.iter().all(|id| answers.of(*id) != Answer::None || answers.have_forgotten(*id))
-    }
-
-    fn is_any_passive(&self, snapshot: &Snapshot) -> bool {
-        let mut groups = self.groups.iter().filter_map(|group| snapshot.groups().get(usize::from(*group)));
-        groups.any(|group| group.phase == Phase::Passive)
-    }
-
-    /// Returns `true` if it has the drive of this axis to itself.
-    pub(super) fn speaks_to(&self, axis: usize) -> bool {
-        matches!(self.step, Step::Configure | Step::Start) && self.axes.contains(&axis)
-    }
-}
 
 impl Supervisor {
     /// Continues the bring-up of groups that have gone back to passive, or begins it.

@@ -8,6 +8,7 @@
 //! [`Supervisor::poll`] is called repeatedly with the host's side of the channels. It never blocks. So it runs beside the
 //! real-time thread, and also between the cycles of a run in virtual time.
 
+mod again;
 mod bring_up_again;
 mod ending;
 mod phases;
@@ -20,7 +21,6 @@ use takt_rt::{
 };
 use tracing::{info, warn};
 
-use self::bring_up_again::BringUpAgain;
 use super::arrival::Arrival;
 use super::assemble::enabled_from_ns;
 use super::lines::Lines;
@@ -32,6 +32,7 @@ use crate::config::Config;
 use crate::family;
 use crate::family::bring_up::{AxisFacts, BringUp, Shutdown};
 use crate::telemetry::BusReport;
+use again::BringUpAgain;
 use phases::fault_stop;
 
 pub use phases::unreleased_stop;

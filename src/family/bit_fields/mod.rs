@@ -4,7 +4,6 @@
 //! A description says everything of a make of drive; nothing here knows one. It comes with takt (`drives/bit-fields/`), or from a file of
 //! your own. Families of one vendor are the same with their own words.
 
-mod chinese;
 mod commission;
 mod device;
 mod scan;
@@ -20,12 +19,14 @@ use takt_wire::bit_fields::{BesideTargetKind, Description, FieldDevice, ReplyMom
 use super::bring_up::{AxisSession, ProcessData};
 use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
-use super::{ChinesePhrase, DataSheet, Family, LookingAtSlave, SettingUp, SignOfLife, Unwatched, Watchdog};
+use super::{DataSheet, Family, LookingAtSlave, SettingUp, SignOfLife, Unwatched, Watchdog};
 use crate::config::{
     Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, ErrorControl, FamilyKeys,
     ModeChangeRule, ModeSet, Protocol, Quantity, bit_fields,
 };
 use crate::procedure::ModbusSession;
+use crate::words;
+use crate::words::Words;
 use takt_sim::Drive;
 use takt_sim::bit_fields::FieldSimulation;
 
@@ -65,8 +66,6 @@ pub struct FoundBy {
     pub on_line: Option<LookOnLine>,
     /// The keys of an axis with such a drive.
     pub starting_keys: fn(&FoundDevice) -> Option<StartingKeys>,
-    /// What is said of them then, in Chinese.
-    pub chinese_phrases: &'static [ChinesePhrase],
 }
 
 /// Drives whose description the configuration names.
@@ -77,12 +76,7 @@ pub static FROM_FILE: BitFieldFamily = BitFieldFamily {
     describe: described,
     on_line: None,
     pulse_width: None,
-    found_by: Some(FoundBy {
-        protocols: scan::protocols,
-        on_line: None,
-        starting_keys: scan::starting_keys,
-        chinese_phrases: scan::CHINESE_PHRASES,
-    }),
+    found_by: Some(FoundBy { protocols: scan::protocols, on_line: None, starting_keys: scan::starting_keys }),
 };
 
 /// The descriptions that come with takt.
@@ -352,17 +346,12 @@ impl Family for BitFieldFamily {
         Some(device)
     }
 
-    fn error_words(&self, code: u16) -> String {
-        format!("error {code} of the drive")
+    fn error_words(&self, code: u16) -> Words {
+        words!("error {code} of the drive", code)
     }
 
     fn error_cure(&self, _: u16) -> Option<&'static str> {
         Some("remove its cause, then reset the fault; if it stays, power-cycle the drive")
-    }
-
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        let of_scan = self.found_by.map_or(&[][..], |found_by| found_by.chinese_phrases);
-        [chinese::PHRASES, of_scan].concat()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

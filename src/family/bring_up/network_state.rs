@@ -122,7 +122,7 @@ impl AxisSession<'_> {
     /// Probes the node by SDO and by the vendor's own protocol, because it has not reported the awaited state. It may
     /// still report it meanwhile.
     async fn probe(&self, awaited: NmtState, waited_ns: Nanoseconds) -> StepResult {
-        let other = family::of(&self.axis.drive).other_protocol(self.axis.node);
+        let other = family::of(&self.axis.drive).other_protocol(&self.axis.drive, self.axis.node);
         if let Some(other) = other {
             self.bus.send(other.request);
         }

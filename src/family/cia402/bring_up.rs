@@ -16,10 +16,10 @@ use crate::family::bring_up::axis_units::{
 };
 use crate::family::bring_up::configuration_file::{self, write_unless_in_file};
 use crate::family::bring_up::{
-    AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat, identity,
-    pdo_mapping, planner,
+    AxisFacts, AxisSession, Check, ProcessData, RESTART_STEP, StepResult, actual_position, heartbeat,
+    identity, pdo_mapping, planner,
 };
-use crate::family::stops_by_itself_after;
+use crate::family::{DataSheet, stops_by_itself_after};
 
 const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::U32, "following error window");
 const ABORT_CONNECTION_OPTION: Object = Object::new(0x6007, 0, DataType::I16, "abort connection option code");
@@ -38,16 +38,14 @@ impl Sheet<'_> {
     /// From any state to pre-operational, configured, without torque.
     pub async fn configure(&self) -> StepResult {
         let c = self.c;
-        c.step(
-            RESTART_STEP,
-            "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID",
-        );
+        let if_silent = "check that the drive is powered, the wiring and the termination of the bus, its bit rate, and its node ID";
+        c.step(RESTART_STEP, self.device.quirks.if_silent.unwrap_or(if_silent));
         if c.is_first_of_node() {
             c.restart_communication().await?;
         }
-        // Some drives leave the profile out of object 1000.
-        identity::compare(c, Check::Any).await?;
+        identity::compare(c, self.profile()).await?;
         identity::read_texts(c).await?;
+        self.supported_modes().await?;
         self.come_to_rest().await?;
         configuration_file::write(c).await?;
         self.synchronisation().await?;
@@ -59,6 +57,33 @@ impl Sheet<'_> {
         self.target_at_actual_position().await?;
         if c.is_last_of_node() {
             self.heartbeats().await?;
+        }
+        Ok(())
+    }
+
+    /// The profile of a drive whose device type the configuration leaves open. Some drives leave it out of object 1000.
+    fn profile(&self) -> Check {
+        let by_sheet = self.device.number(DEVICE_TYPE.address).unwrap_or(0);
+        if identity::PROFILE_CIA402.passes(by_sheet) { identity::PROFILE_CIA402 } else { Check::Any }
+    }
+
+    /// A unit with other firmware may lack a mode that the data sheet has.
+    async fn supported_modes(&self) -> StepResult {
+        let c = self.c;
+        c.step(
+            "supported modes",
+            "choose another control mode for this axis, or load firmware that has this one",
+        );
+        let by_sheet =
+            self.device.number(SUPPORTED_DRIVE_MODES.address).filter(|_| self.device.quirks.modes.is_none());
+        for control in c.axis.controls() {
+            let supports = Check::Supports(control.operation_mode());
+            let expected =
+                if by_sheet.is_some_and(|bits| supports.passes(bits)) { supports } else { Check::Any };
+            if self.device.has(&SUPPORTED_DRIVE_MODES) {
+                c.read(SUPPORTED_DRIVE_MODES, expected, |facts, value| facts.supported_modes = value as u32)
+                    .await?;
+            }
         }
         Ok(())
     }
@@ -201,11 +226,16 @@ impl Sheet<'_> {
 
     async fn mode(&self) -> StepResult {
         let c = self.c;
-        c.step(
-            "mode of operation",
-            "choose another control mode for this axis; clear the drive's fault if it has one",
-        );
-        let mode = c.axis.control.operation_mode() as i64;
+        let mode = c.axis.control.operation_mode();
+        let advice = match self.device.quirks.undeclared_modes.contains(&mode) {
+            true => {
+                "not every firmware of this drive has this mode (object 6502 need not declare it; 6061 shows it): choose \
+                 another mode for this axis, such as mode = \"csp\""
+            }
+            false => "choose another control mode for this axis; clear the drive's fault if it has one",
+        };
+        c.step("mode of operation", advice);
+        let mode = mode as i64;
         c.write(MODES_OF_OPERATION, mode).await?;
         if !self.device.has(&MODES_OF_OPERATION_DISPLAY) {
             return Ok(());
@@ -216,12 +246,22 @@ impl Sheet<'_> {
 
     async fn ratings(&self) -> StepResult {
         let c = self.c;
-        c.step("ratings", "say the rated torque in the configuration: [axis.joint] rated_torque");
+        c.step(
+            "ratings",
+            "torque cannot be commanded without the drive's rated torque: say it in the configuration, [axis.joint] rated_torque, or \
+             choose another control mode",
+        );
         let thousandths = |value: i64| (value > 0).then_some(value as f64 / 1000.0);
-        c.read_optional(SUPPORTED_DRIVE_MODES, |facts, value| facts.supported_modes = value as u32).await?;
         c.read_optional(MOTOR_RATED_CURRENT, |facts, value| facts.rated_current_a = thousandths(value))
             .await?;
-        c.read_optional(MOTOR_RATED_TORQUE, |facts, value| facts.rated_torque = thousandths(value)).await?;
+        let is_torque_sent = self.has_target(CommandSlot::TargetTorque) || c.axis.feed_forward.has_torque();
+        if is_torque_sent && c.axis.joint.rated_torque.is_none() && self.device.has(&MOTOR_RATED_TORQUE) {
+            let keep = |facts: &mut AxisFacts, value| facts.rated_torque = thousandths(value);
+            c.read(MOTOR_RATED_TORQUE, Check::Positive, keep).await?;
+        } else {
+            c.read_optional(MOTOR_RATED_TORQUE, |facts, value| facts.rated_torque = thousandths(value))
+                .await?;
+        }
         c.read_optional(MAX_TORQUE, |facts, value| facts.max_torque_per_mille = Some(value as u16)).await?;
         let option = QUICK_STOP_OPTION_CODE;
         c.read_optional(option, |facts, value| facts.quick_stop_option_code = Some(value as i16)).await?;
@@ -243,7 +283,13 @@ impl Sheet<'_> {
             // In profile position mode the drive follows its own profile, so its following error is not limited here.
             let error =
                 if axis.control.is_profile() { f64::INFINITY } else { 2.0 * axis.following_error.limit };
-            self.limit(FOLLOWING_ERROR_WINDOW, counts(axis, error)).await?;
+            let window = counts(axis, error);
+            // All ones, which is no window, would be -1 in an object with a sign.
+            let window = match DataSheet::data_type(self.device, FOLLOWING_ERROR_WINDOW.address) {
+                Some(DataType::I32) => window.min(i32::MAX.into()),
+                _ => window,
+            };
+            self.limit(FOLLOWING_ERROR_WINDOW, window).await?;
             self.limit(PROFILE_VELOCITY, profile_velocity_units(axis, limits.velocity)).await?;
         }
         for (object, acceleration) in [

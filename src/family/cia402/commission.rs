@@ -1,24 +1,56 @@
 //! Commissioning of a drive by its data sheet: the tasks of the drive profile. What only a vendor's own objects can do is
 //! refused with what to do instead.
 
+use super::device::Device;
+use super::turns;
 use crate::family::commission::failure::Failure;
 use crate::family::commission::profile;
 use crate::family::commission::report::Report;
 use crate::family::commission::sdo_session::SdoSession;
 use crate::family::commission::target::TargetDrive;
 use crate::family::commission::task::Task;
+use takt_wire::quirks::Refusal;
 
 /// Carries out a task, other than reading and writing objects.
 pub async fn carry_out(c: &SdoSession, s: &TargetDrive, task: Task) -> Result<Report, Failure> {
+    let quirks = s.drive.description().map(|device: &Device| &device.quirks);
+    let refusals = quirks.map_or(&[][..], |quirks| &quirks.refusals);
+    if let Some(Refusal { reason, instead, .. }) =
+        refusals.iter().find(|refusal| refusal.task == command(&task))
+    {
+        let (what, instead) = ((*reason).to_owned(), (*instead).to_owned());
+        return Err(Failure::Unsupported { what, instead });
+    }
     if let Some(done) = profile::carry_out(c, s, &task).await {
         return done;
     }
-    match task {
-        Task::Home { method, within_ns, is_forced } => {
+    match (task, quirks.and_then(|quirks| quirks.turn_count)) {
+        (Task::Zero { is_confirmed }, Some(turns)) => turns::zero(c, s, turns, is_confirmed).await,
+        (Task::ClearFault { is_confirmed }, Some(turns)) => {
+            let before = async |code| turns::before_fault_reset(c, s, turns, code, is_confirmed).await;
+            profile::fault::clear(c, s, before).await
+        }
+        (Task::Home { method, within_ns, is_forced }, _) => {
             profile::homing::home(c, s, method, within_ns, is_forced).await
         }
-        Task::ClearFault { .. } => profile::fault::clear(c, s, async |_| Ok(())).await,
-        task => Err(unsupported(&task)),
+        (Task::ClearFault { .. }, None) => profile::fault::clear(c, s, async |_| Ok(())).await,
+        (task, _) => Err(unsupported(&task)),
+    }
+}
+
+/// The command of `takt drive` by which a quirk file refuses a task; empty for one that it cannot refuse.
+fn command(task: &Task) -> &'static str {
+    match task {
+        Task::Zero { .. } => "zero",
+        Task::Restore { .. } => "restore",
+        Task::SetId { .. } => "set-id",
+        Task::SetBitRate { .. } => "set-bit-rate",
+        Task::ReleaseBrake { .. } => "release-brake",
+        Task::Gains { .. } | Task::GainFactors(_) => "gains",
+        Task::Gear { .. } => "gear",
+        Task::AutoHome { .. } => "auto-home",
+        Task::Interpolation => "interpolation",
+        _ => "",
     }
 }
 

@@ -1,5 +1,6 @@
 //! A drive as its data sheet (EDS or DCF) describes it, with the quirks that are known of it.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode, PositionCounter};
@@ -10,9 +11,9 @@ use takt_wire::canopen::objects::{
     POSITION_ACTUAL_VALUE, PRODUCER_HEARTBEAT_TIME, PROFILE_ACCELERATION, PROFILE_VELOCITY, PdoDirection,
     PdoParameters, STATUSWORD,
 };
-use takt_wire::quirks::{MotionUnit, Quirks};
+use takt_wire::quirks::{MotionUnit, NamedObject, Quirks};
 
-use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, VelocityUnit};
+use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, Plausible, VelocityUnit};
 use crate::family::DataSheet;
 use crate::family::bring_up::first_pdo;
 use crate::family::commission::profile::objects::HOMING_METHOD;
@@ -74,6 +75,17 @@ impl Device {
             Some(path) => crate::config::quirks::load(path).map_err(|error| error.to_string())?,
             None => Quirks::default(),
         };
+        Self { node_axis: 1, dictionary: loaded.dictionary, quirks }.of_axis(1)
+    }
+
+    /// Reads the texts of a data sheet and of a file of quirks.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn parse(eds: &str, quirks: &str) -> Result<Self, String> {
+        let loaded = takt_wire::canopen::eds::parse("data sheet", eds.as_bytes())
+            .map_err(|findings| findings.to_string())?;
+        let quirks = crate::config::quirks::parse("quirks", quirks).map_err(|error| error.to_string())?;
         Self { node_axis: 1, dictionary: loaded.dictionary, quirks }.of_axis(1)
     }
 
@@ -165,6 +177,12 @@ impl Device {
         (1..=MAX_OBJECTS as u8).take_while(has).count()
     }
 
+    /// The first object that the first PDO of a direction carries by the data sheet.
+    pub fn first_mapped(&self, direction: PdoDirection) -> Option<ObjectAddress> {
+        let first = self.number(PdoParameters::at(direction, self.first_pdo()).mapped_object(1).address)?;
+        Some(ObjectAddress::new((first >> 16) as u16, (first >> 8) as u8))
+    }
+
     /// The identifier of a PDO by the data sheet, for a drive with this node ID; `None` if it gives none.
     pub fn pdo_id(&self, direction: PdoDirection, number: u16, node: u8) -> Option<Id> {
         let cob_id = PdoParameters::at(direction, number).cob_id().address;
@@ -217,10 +235,15 @@ impl Device {
             (None, Some(bits)) => ModeSet(bits),
             (None, None) => having(&MARKS),
         };
-        let can_interpolate = self.entry(INTERPOLATION_DATA).is_none_or(|data| data.is_mappable);
-        let not_by_process_data =
-            if can_interpolate { 0 } else { ModeSet::of(&[OperationMode::InterpolatedPosition]).0 };
-        ModeSet(told.0 & having(&TARGETS).0 & !not_by_process_data)
+        let told = told.0 | ModeSet::of(&self.quirks.undeclared_modes).0;
+        let interpolated = ModeSet::of(&[OperationMode::InterpolatedPosition]).0;
+        let targets = having(&TARGETS).0;
+        let targets = match self.quirks.interpolation_target {
+            Some(target) if self.is_mappable(target) => targets | interpolated,
+            None if self.entry(INTERPOLATION_DATA).is_none_or(|data| data.is_mappable) => targets,
+            _ => targets & !interpolated,
+        };
+        ModeSet(told & targets)
     }
 
     /// The unit of a velocity or an acceleration object by the quirks, if they tell.
@@ -291,6 +314,7 @@ impl Device {
             Control::ProfileVelocity,
             Control::ProfileTorque,
         ];
+        let Quirks { plausible, keeps_empty_limits, bit_rates, .. } = self.quirks;
         DriveFacts {
             identity: Identity {
                 device_type: number(DEVICE_TYPE),
@@ -311,16 +335,26 @@ impl Device {
                 .into_iter()
                 .find(|control| modes.contains(control.operation_mode()))
                 .unwrap_or(Control::Position),
-            interpolation_target: match self.is_mappable(INTERPOLATION_DATA) {
-                true => MappedObject::new(INTERPOLATION_DATA.index, INTERPOLATION_DATA.subindex, 32),
-                false => standard.interpolation_target,
-            },
+            interpolation_target: self
+                .quirks
+                .interpolation_target
+                .or(self.is_mappable(INTERPOLATION_DATA).then_some(INTERPOLATION_DATA))
+                .map_or(standard.interpolation_target, |target| {
+                    MappedObject::new(target.index, target.subindex, 32)
+                }),
             has_fixed_process_data: !self.is_mapped_freely(),
             reports_mode: self.is_mappable(ObjectAddress::new(0x6061, 0)),
             node_axis: self.node_axis,
             error_control: self.error_control(),
             consumes_heartbeat: self.consumes_heartbeat(),
             sends_emergencies: self.entry(ObjectAddress::new(0x1014, 0)).is_some(),
+            empty_software_limits_are_off: !keeps_empty_limits,
+            bit_rates,
+            plausible: Plausible {
+                fastest_turns_per_s: plausible.fastest_per_s.unwrap_or(f64::INFINITY),
+                usual_velocity: plausible.usual_per_s.map_or(f64::INFINITY, |turns| turns * TAU),
+                inner_gear_from: plausible.inner_gear_from,
+            },
             ..standard
         }
     }
@@ -353,6 +387,7 @@ impl DataSheet for Device {
     fn adds_mode(&self, mode: OperationMode) -> bool {
         let tells = self.number(SUPPORTED_MODES).is_some_and(|bits| bits != 0);
         match (&self.quirks.modes, mode) {
+            _ if self.quirks.undeclared_modes.contains(&mode) => true,
             (Some(modes), _) => modes.contains(&mode),
             (None, OperationMode::Homing) => !tells && self.has(&HOMING_METHOD),
             (None, mode) => !tells && self.modes().contains(mode),
@@ -361,6 +396,23 @@ impl DataSheet for Device {
 
     fn own_errors(&self) -> &[(u16, String)] {
         &self.quirks.errors
+    }
+
+    fn own_cure(&self, code: u16) -> Option<&'static str> {
+        self.quirks.cures.iter().find(|(known, _)| *known == code).map(|(_, cure)| *cure)
+    }
+
+    fn named(&self) -> &[NamedObject] {
+        &self.quirks.named
+    }
+
+    fn temperature(&self) -> Option<Object> {
+        let address = self.quirks.temperature?;
+        Some(Object { address, data_type: self.data_type(address)?, name: "temperature" })
+    }
+
+    fn lacks_switches(&self) -> bool {
+        self.quirks.lacks_switches
     }
 
     fn storing_ns(&self) -> Option<Nanoseconds> {

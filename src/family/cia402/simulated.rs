@@ -10,14 +10,27 @@ use takt_sim::plant::{Encoder, JointParameters};
 
 /// The simulated drive of an axis, with the other axes of its node.
 pub fn drive(axis: &Axis, device: &Device, config: &Config) -> Box<dyn Drive> {
-    let axes: Vec<&Axis> =
-        (1..=last_axis(axis, config)).map(|number| stand_in(number, axis, config)).collect();
+    let axes = axes(axis, config);
     let parameters = parameters(axis, &axes, device, &config.simulation);
     let mut drive = Cia402Drive::new(parameters).expect("the data sheet was checked when it was read");
     for (number, axis) in axes.iter().enumerate() {
         drive.set_axis_gravity(number, gravity(axis));
     }
     Box::new(drive)
+}
+
+/// The parameters of the drive that simulates an axis, with the other axes of its node.
+///
+/// # Panics
+/// The drive of the axis is of another family.
+#[doc(hidden)]
+pub fn simulated_parameters(axis: &Axis, config: &Config) -> Cia402Parameters {
+    parameters(axis, &axes(axis, config), super::device(axis), &config.simulation)
+}
+
+/// The axes of the node of an axis.
+fn axes<'a>(axis: &'a Axis, config: &'a Config) -> Vec<&'a Axis> {
+    (1..=last_axis(axis, config)).map(|number| stand_in(number, axis, config)).collect()
 }
 
 fn of_node<'a>(axis: &Axis, config: &'a Config) -> impl Iterator<Item = &'a Axis> {

@@ -79,7 +79,7 @@ pub async fn report_identity(c: &SdoSession, s: &TargetDrive, report: &mut Repor
 
 /// Checks for firmware without CANopen, by a request in the vendor's own protocol that changes nothing.
 async fn other_protocol(c: &SdoSession, target: &TargetDrive) -> Result<Option<AnsweredProtocol>, Failure> {
-    let Some(other) = target.family().other_protocol(target.node) else { return Ok(None) };
+    let Some(other) = target.family().other_protocol(&target.drive, target.node) else { return Ok(None) };
     c.send(other.request);
     let collected = c.collect_frames(OTHER_PROTOCOL_NS).await?;
     let has_answered = collected.iter().any(|frame| frame.id() == other.answer);

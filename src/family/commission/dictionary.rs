@@ -1,9 +1,10 @@
 //! A family's object dictionary for the operator: names, access, units.
 
 use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
+use takt_wire::quirks::NamedObject;
 
 use crate::config::{DriveFamily, Quantity};
-use crate::family;
+use crate::family::{self, DataSheet};
 
 use super::command_value::{integer, parse};
 use super::failure::Failure;
@@ -43,6 +44,24 @@ pub enum ObjectUnit {
 }
 
 impl ObjectUnit {
+    /// The unit that a quirk file names: a quantity of motion, or a factor and the name of a unit (`0.001 Nm`).
+    pub(in crate::family) fn named(words: &'static str) -> Self {
+        match words {
+            "" => Self::None,
+            "position" => Self::Position,
+            "distance" => Self::Distance,
+            "velocity" => Self::Velocity,
+            "acceleration" => Self::Acceleration,
+            "torque" => Self::Torque,
+            words => {
+                match words.split_once(' ').and_then(|(factor, unit)| Some((factor.parse().ok()?, unit))) {
+                    Some((factor, unit)) => Self::Of(factor, unit),
+                    None => Self::Of(1.0, words),
+                }
+            }
+        }
+    }
+
     /// The unit in words; empty for a plain number.
     fn words(self) -> String {
         match self {
@@ -173,7 +192,7 @@ pub struct NamedEntry {
 
 /// The objects that the family of a drive knows by name.
 pub fn entries(drive: &DriveFamily) -> Vec<NamedEntry> {
-    let known = family::of(drive).objects().iter().filter_map(|known| entry(drive, known.object.address));
+    let known = known(drive).filter_map(|known| entry(drive, known.object.address));
     let named = known.map(|entry| NamedEntry {
         address: entry.object.address.to_string(),
         name: entry.object.name,
@@ -186,6 +205,21 @@ pub fn entries(drive: &DriveFamily) -> Vec<NamedEntry> {
         note: "",
     });
     named.collect()
+}
+
+/// The objects that have a name: those of the drive, and of its family the others.
+fn known(drive: &DriveFamily) -> impl Iterator<Item = ObjectEntry> {
+    let family = family::of(drive);
+    let own = named(drive);
+    let is_own = |known: &&ObjectEntry| own.iter().any(|named| named.address == known.object.address);
+    let of_family: Vec<ObjectEntry> =
+        family.objects().iter().filter(|known| !is_own(known)).copied().collect();
+    own.iter().filter_map(|named| entry(drive, named.address)).chain(of_family)
+}
+
+/// The objects that the data sheet of a drive names.
+fn named(drive: &DriveFamily) -> &[NamedObject] {
+    family::of(drive).data_sheet(drive).map_or(&[], DataSheet::named)
 }
 
 /// An object selected by the user.
@@ -203,7 +237,12 @@ pub fn entry(drive: &DriveFamily, address: ObjectAddress) -> Option<ObjectEntry>
     let known = family.objects().iter().find(|entry| entry.object.address == address).copied();
     let Some(sheet) = family.data_sheet(drive) else { return known };
     let data_type = sheet.data_type(address)?;
-    let (name, unit) = known.map_or((UNNAMED, ObjectUnit::None), |entry| (entry.object.name, entry.unit));
+    let named = sheet.named().iter().find(|named| named.address == address);
+    let (name, unit) = match (named, known) {
+        (Some(named), _) => (named.name, ObjectUnit::named(named.unit)),
+        (None, Some(entry)) => (entry.object.name, entry.unit),
+        (None, None) => (UNNAMED, ObjectUnit::None),
+    };
     let permission = if sheet.is_writable(address) { Permission::Write } else { Permission::Read };
     Some(ObjectEntry { object: Object { address, data_type, name }, permission, unit })
 }
@@ -218,9 +257,8 @@ pub fn find(drive: &DriveFamily, text: &str) -> Result<SelectedObject, Failure> 
         return Ok(entry(drive, address).map_or(SelectedObject::Unknown(address), SelectedObject::Known));
     }
     let wanted = plain(text);
-    let family = family::of(drive);
     let named = |is_it: &dyn Fn(&str) -> bool| -> Vec<ObjectEntry> {
-        let named = family.objects().iter().filter(|entry| is_it(&plain(entry.object.name)));
+        let named = known(drive).filter(|entry| is_it(&plain(entry.object.name)));
         named.filter_map(|named| entry(drive, named.object.address)).collect()
     };
     let exact = named(&|name| name == wanted);

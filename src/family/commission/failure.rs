@@ -8,16 +8,17 @@ use takt_wire::canopen::sdo::{AbortCode, SdoError};
 use crate::config::Quantity;
 #[doc(hidden)]
 pub use crate::procedure::Access;
+use crate::words;
+use crate::words::Words;
 
 /// Why a procedure failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{}", self.words())]
 #[non_exhaustive]
 pub enum Failure {
     /// It was interrupted; the axis was stopped and disabled.
-    #[error("interrupted")]
     Interrupted,
     /// No drive answers under this node ID.
-    #[error("node {node} does not answer{}{}", nmt_words(*.reported), other_words(*.other_protocol))]
     Silent {
         /// The node ID.
         node: u8,
@@ -27,7 +28,6 @@ pub enum Failure {
         other_protocol: Option<AnsweredProtocol>,
     },
     /// A transfer failed.
-    #[error("{}: {error}", access.words(object))]
     Transfer {
         /// The object.
         object: Object,
@@ -37,7 +37,6 @@ pub enum Failure {
         error: SdoError,
     },
     /// A request in a protocol without an object dictionary failed.
-    #[error("{what}")]
     Request {
         /// The request, and why it failed.
         what: String,
@@ -45,7 +44,6 @@ pub enum Failure {
         cure: Option<&'static str>,
     },
     /// Reading a text or bytes failed.
-    #[error("reading {object}: {error}")]
     TextTransfer {
         /// The object.
         object: ObjectAddress,
@@ -53,7 +51,6 @@ pub enum Failure {
         error: SdoError,
     },
     /// An object's data has the wrong length for a number.
-    #[error("reading {object}: expected {} bytes, got {received}", object.data_type.length())]
     Length {
         /// The object.
         object: Object,
@@ -61,7 +58,6 @@ pub enum Failure {
         received: usize,
     },
     /// A value does not fit its object.
-    #[error("{value} does not fit the {} bits of {object}", 8 * object.data_type.length())]
     DoesNotFit {
         /// The object.
         object: Object,
@@ -69,7 +65,6 @@ pub enum Failure {
         value: i64,
     },
     /// The drive accepted a value but holds another one.
-    #[error("{object}: {} was written and accepted, {} is read back", object.show(*.written), object.show(*.received))]
     NotKept {
         /// The object.
         object: Object,
@@ -79,7 +74,6 @@ pub enum Failure {
         received: i64,
     },
     /// A condition was not met in time.
-    #[error("timeout waiting for {what} after {} ms; {object} is {}", waited_ns / 1_000_000, object.show(*.last))]
     NotInTime {
         /// The object.
         object: Object,
@@ -91,9 +85,6 @@ pub enum Failure {
         waited_ns: Nanoseconds,
     },
     /// Another drive than expected answers.
-    #[error(
-        "another drive answers: its vendor ID (1018:01) is 0x{received:08X}, a {family} has 0x{expected:08X}"
-    )]
     OtherDrive {
         /// The expected family.
         family: &'static str,
@@ -103,32 +94,27 @@ pub enum Failure {
         received: u32,
     },
     /// The drive is in a fault, which must be cleared first.
-    #[error("the drive is in a fault: {what}{}", advice_words(.advice))]
     Faulted {
         /// The fault.
-        what: String,
+        what: Words,
         /// What to do about it.
         advice: Option<&'static str>,
     },
     /// The fault did not go away.
-    #[error("the fault persists: {what}{}", advice_words(.advice))]
     FaultPersists {
         /// The fault.
-        what: String,
+        what: Words,
         /// What to do about it.
         advice: Option<&'static str>,
     },
     /// The drive is enabled but must not be.
-    #[error("the drive is enabled: disable it first")]
     Enabled,
     /// The drive left the enabled state by itself.
-    #[error("the drive is no longer enabled (statusword 0x{statusword:04X})")]
     Disabled {
         /// Its statusword.
         statusword: u16,
     },
     /// A value lies outside the limits of the axis.
-    #[error("{} lies outside the limits of the axis, {} to {}", quantity.show(*.value), quantity.show(*.low), quantity.show(*.high))]
     OutsideLimits {
         /// The quantity.
         quantity: Quantity,
@@ -140,7 +126,6 @@ pub enum Failure {
         high: f64,
     },
     /// The axis reached a limit during the motion and was stopped.
-    #[error("stopped at the limit of the axis: {} of {} to {}", quantity.show(*.value), quantity.show(*.low), quantity.show(*.high))]
     AtLimit {
         /// The quantity.
         quantity: Quantity,
@@ -152,7 +137,6 @@ pub enum Failure {
         high: f64,
     },
     /// A value is required here, because no default is known.
-    #[error("{what} must be given: {why}")]
     Missing {
         /// What is missing.
         what: &'static str,
@@ -160,13 +144,11 @@ pub enum Failure {
         why: &'static str,
     },
     /// The axis moved while it was being enabled.
-    #[error("the axis has moved by {counts} counts while it was being enabled")]
     Jumped {
         /// How far, in counts.
         counts: i64,
     },
     /// This drive does not support the task.
-    #[error("{what}; {instead}")]
     Unsupported {
         /// What it does not support.
         what: String,
@@ -174,7 +156,6 @@ pub enum Failure {
         instead: String,
     },
     /// The task was not done, because the user did not confirm it.
-    #[error("{consequence}; add {option} to do it")]
     NeedsConsent {
         /// What the task would cause.
         consequence: &'static str,
@@ -182,23 +163,11 @@ pub enum Failure {
         option: &'static str,
     },
     /// Homing failed.
-    #[error("homing failed: {0}")]
     Homing(&'static str),
     /// The request itself is not valid.
-    #[error("{0}")]
     Unsuitable(String),
     /// The drive confirmed a value but behaves otherwise.
-    #[error("{0}")]
     Contradicted(String),
-}
-
-fn nmt_words(reported: Option<NmtState>) -> String {
-    reported.map_or_else(String::new, |state| format!("; the last state that it has reported is {state}"))
-}
-
-fn other_words(answered: Option<AnsweredProtocol>) -> String {
-    answered
-        .map_or_else(String::new, |AnsweredProtocol { name, .. }| format!(", but it did answer the {name}"))
 }
 
 /// A protocol in which a drive did answer, other than the expected one.
@@ -210,11 +179,129 @@ pub struct AnsweredProtocol {
     pub cure: &'static str,
 }
 
-fn advice_words(advice: &Option<&'static str>) -> String {
-    advice.map_or_else(String::new, |advice| format!("; {advice}"))
+fn advice_words(advice: Option<&'static str>) -> Words {
+    advice.map_or("".into(), |advice| words!("; {advice}", advice = Words::from(advice)))
+}
+
+fn sdo_words(error: SdoError) -> Words {
+    match error {
+        SdoError::Aborted(code) => words!(
+            "abort {code} ({meaning})",
+            code = format!("0x{:08X}", code.number()),
+            meaning = Words::bilingual(code.bilingual())
+        ),
+        SdoError::NoReply { attempts, reply_timeout_ns, unusable: 0 } => words!(
+            "no reply within {wait} ms in {attempts} attempts",
+            wait = reply_timeout_ns / 1_000_000,
+            attempts
+        ),
+        error => error.to_string().into(),
+    }
 }
 
 impl Failure {
+    /// The sentence, for a page in another language.
+    pub fn words(&self) -> Words {
+        match self {
+            Self::Interrupted => "interrupted".into(),
+            Self::Silent { node, reported, other_protocol } => words!(
+                "node {node} does not answer{reported}{other}",
+                node,
+                reported = reported.map_or("".into(), |state| words!(
+                    "; the last state that it has reported is {state}",
+                    state = Words::from(state.to_string())
+                )),
+                other = other_protocol.map_or("".into(), |other| words!(
+                    ", but it did answer the {protocol}",
+                    protocol = Words::from(other.name)
+                ))
+            ),
+            Self::Transfer { object, access, error } => {
+                words!("{access}: {error}", access = access.words(object), error = sdo_words(*error))
+            }
+            Self::Request { what, .. } => what.clone().into(),
+            Self::TextTransfer { object, error } => {
+                words!("reading {object}: {error}", object = object.to_string(), error = sdo_words(*error))
+            }
+            Self::Length { object, received } => words!(
+                "reading {object}: expected {bytes} bytes, got {received}",
+                object = object.to_string(),
+                bytes = object.data_type.length(),
+                received
+            ),
+            Self::DoesNotFit { object, value } => words!(
+                "{value} does not fit the {bits} bits of {object}",
+                value,
+                bits = 8 * object.data_type.length(),
+                object = object.to_string()
+            ),
+            Self::NotKept { object, written, received } => words!(
+                "{object}: {written} was written and accepted, {received} is read back",
+                object = object.to_string(),
+                written = object.show(*written),
+                received = object.show(*received)
+            ),
+            Self::NotInTime { object, what, last, waited_ns } => words!(
+                "timeout waiting for {what} after {waited} ms; {object} is {last}",
+                what = Words::from(*what),
+                waited = waited_ns / 1_000_000,
+                object = object.to_string(),
+                last = object.show(*last)
+            ),
+            Self::OtherDrive { family, expected, received } => words!(
+                "another drive answers: its vendor ID (1018:01) is {received}, a {family} has {expected}",
+                received = format!("0x{received:08X}"),
+                family = *family,
+                expected = format!("0x{expected:08X}")
+            ),
+            Self::Faulted { what, advice } => words!(
+                "the drive is in a fault: {what}{advice}",
+                what = what.clone(),
+                advice = advice_words(*advice)
+            ),
+            Self::FaultPersists { what, advice } => words!(
+                "the fault persists: {what}{advice}",
+                what = what.clone(),
+                advice = advice_words(*advice)
+            ),
+            Self::Enabled => "the drive is enabled: disable it first".into(),
+            Self::Disabled { statusword } => words!(
+                "the drive is no longer enabled (statusword {statusword})",
+                statusword = format!("0x{statusword:04X}")
+            ),
+            Self::OutsideLimits { quantity, value, low, high } => words!(
+                "{value} lies outside the limits of the axis, {low} to {high}",
+                value = quantity.show(*value),
+                low = quantity.show(*low),
+                high = quantity.show(*high)
+            ),
+            Self::AtLimit { quantity, value, low, high } => words!(
+                "stopped at the limit of the axis: {value} of {low} to {high}",
+                value = quantity.show(*value),
+                low = quantity.show(*low),
+                high = quantity.show(*high)
+            ),
+            Self::Missing { what, why } => {
+                words!("{what} must be given: {why}", what = Words::from(*what), why = Words::from(*why))
+            }
+            Self::Jumped { counts } => {
+                words!("the axis has moved by {counts} counts while it was being enabled", counts)
+            }
+            Self::Unsupported { what, instead } => words!(
+                "{what}; {instead}",
+                what = Words::from(what.clone()),
+                instead = Words::from(instead.clone())
+            ),
+            Self::NeedsConsent { consequence, option } => words!(
+                "{consequence}; add {option} to do it",
+                consequence = Words::from(*consequence),
+                option = *option
+            ),
+            Self::Homing(why) => words!("homing failed: {why}", why = Words::from(*why)),
+            Self::Unsuitable(text) | Self::Contradicted(text) => text.clone().into(),
+        }
+    }
+
     /// Returns `true` if the drive reports that the object does not exist.
     pub(crate) fn means_absent(&self) -> bool {
         match self {

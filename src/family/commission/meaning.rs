@@ -17,7 +17,7 @@ pub fn of(target: &TargetDrive, frame: &Frame) -> String {
         return nmt(command, target);
     }
     // Its identifiers are those of the SDO of another node, but SDO frames have eight bytes.
-    if let Some(other) = target.family().other_protocol(target.node)
+    if let Some(other) = target.family().other_protocol(&target.drive, target.node)
         && frame.payload().len() < 8
     {
         if frame.id() == other.request.id() {
@@ -62,7 +62,7 @@ fn emergency(target: &TargetDrive, message: &Emergency) -> String {
         // A code 00xx is that of the standard alone: the error has been reset.
         "error reset".to_owned()
     } else {
-        target.error_words(code)
+        target.error_words(code).to_string()
     };
     let mut words = format!("emergency: {error}, error register: {}", message.register);
     if message.manufacturer != [0; 5] {

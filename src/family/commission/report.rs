@@ -3,6 +3,8 @@
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::Value;
 
+use crate::words::Words;
+
 /// One named value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReportItem {
@@ -13,7 +15,7 @@ pub struct ReportItem {
     /// The value for programs.
     pub value: Value,
     /// The value for people.
-    pub text: String,
+    pub text: Words,
 }
 
 /// Named values in reading order. It serialises as one map.
@@ -31,7 +33,7 @@ impl Report {
     }
 
     /// Adds a value.
-    pub fn add(&mut self, key: &'static str, label: &str, value: impl Into<Value>, text: impl Into<String>) {
+    pub fn add(&mut self, key: &'static str, label: &str, value: impl Into<Value>, text: impl Into<Words>) {
         let item = ReportItem { key, label: label.to_owned(), value: value.into(), text: text.into() };
         self.items.push(item);
     }

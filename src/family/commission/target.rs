@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 
 use takt_rt::{Nanoseconds, OperationMode, Scale, ScaleError, ScaleParameters};
-use takt_wire::canopen::object::ObjectAddress;
+use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
 
 use super::failure::Failure;
 use crate::config::{Axis, DriveFamily, Limits, Quantity, Travel};
 use crate::family::{self, DataSheet, Family, is_rounded};
+use crate::words::Words;
 
 /// A value as the user wrote it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,6 +115,16 @@ impl TargetDrive {
         self.data_sheet().is_none_or(|sheet| sheet.has(address))
     }
 
+    /// The type that the data sheet of the drive gives an object.
+    pub(in crate::family) fn data_type(&self, address: ObjectAddress) -> Option<DataType> {
+        self.data_sheet()?.data_type(address)
+    }
+
+    /// The object with the temperature of the drive in °C, if it is known.
+    pub(super) fn temperature(&self) -> Option<Object> {
+        self.data_sheet()?.temperature()
+    }
+
     /// The name that the data sheet of the drive gives an object.
     pub(super) fn name_by_sheet(&self, address: ObjectAddress) -> Option<&str> {
         self.data_sheet()?.name(address)
@@ -129,19 +140,24 @@ impl TargetDrive {
         self.data_sheet().is_some_and(|sheet| sheet.adds_mode(mode))
     }
 
+    /// Returns `true` if the drive is known to have no inputs for the switches of homing.
+    pub(super) fn lacks_switches(&self) -> bool {
+        self.data_sheet().is_some_and(DataSheet::lacks_switches)
+    }
+
     /// How long the drive takes to store its parameters, if it is known.
     pub(super) fn storing_ns(&self) -> Option<Nanoseconds> {
         self.data_sheet()?.storing_ns()
     }
 
     /// An error code of the drive in words.
-    pub fn error_words(&self, code: u16) -> String {
+    pub fn error_words(&self, code: u16) -> Words {
         family::drive_error_words(&self.drive, code)
     }
 
     /// What clears an error of the drive, and its cause.
     pub fn error_cure(&self, code: u16) -> &'static str {
-        family::error_cure(Some(self.drive.word), code)
+        family::drive_error_cure(&self.drive, code)
     }
 
     /// The quantity of a position: an angle or a length.

@@ -9,8 +9,6 @@
 //! - `following`: the velocity that leads a joint beside the cycle, and the times of that.
 //! - `simulated`: the module that stands in for an axis.
 
-pub mod chinese;
-pub mod chinese_terms;
 pub mod following;
 pub mod module;
 pub mod motion;
@@ -20,6 +18,10 @@ pub mod simulated;
 pub mod tasks;
 
 use takt_rt::Nanoseconds;
+
+/// The name of the error 730F in English and in Chinese.
+pub const BATTERY_LOW: (&str, &str) =
+    ("battery voltage of the multi-turn encoder low", "多圈编码器电池电压低");
 
 /// From power-on until a module can be enabled (cure of the errors 001F and 0056 of its own CAN protocol).
 pub const ENABLED_FROM_NS: Nanoseconds = 8_000_000_000;

@@ -191,7 +191,7 @@ fn physical<P: Parameter>(target: &TargetDrive, parameter: &P, value: i64) -> Op
 /// A value in words: as on the wire, and in the units of the joint. A fault has words of its own.
 pub fn words<M: CommandedModule>(target: &TargetDrive, parameter: &M::Parameter, value: i64) -> String {
     if *parameter == M::FAULT_CODE {
-        return target.error_words(value as u16);
+        return target.error_words(value as u16).to_string();
     }
     let shown = parameter.show(value);
     match physical(target, parameter, value) {

@@ -60,7 +60,7 @@ impl CommandedModule for ErobCanSession {
             }
         }
         let mut other_protocol = None;
-        if let Some(other) = target.family().other_protocol(target.node)
+        if let Some(other) = target.family().other_protocol(&target.drive, target.node)
             && self.answers(other.request, other.answer, OTHER_PROTOCOL_NS).await
         {
             other_protocol = Some(AnsweredProtocol { name: other.name, cure: other.cure });

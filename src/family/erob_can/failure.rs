@@ -5,6 +5,8 @@ use takt_wire::erob_can::client::{RequestError, RequestFailure};
 
 use super::follower::UNKNOWN_REFUSAL;
 use crate::family::commission::Failure;
+use crate::words;
+use crate::words::Words;
 
 /// What helps after an error of the drive.
 pub const FAULT_CURE: &str =
@@ -27,21 +29,25 @@ impl From<RequestError> for Failure {
 
 /// An error in words: of the drive, index 001F, or why it refuses to be enabled. The eRunner manual has no list of the codes of
 /// index 001F; codes of CiA 402 are likely.
-pub fn error_words(code: u16) -> String {
-    if code == 0 {
-        return "none".to_owned();
+pub fn error_words(code: u16) -> Words {
+    let number = format!("0x{code:04X}");
+    if let Some(why) = takt_wire::erob_can::error_code::ErrorCode(code).bilingual() {
+        return words!(
+            "{number} (the drive refuses to be enabled: {why})",
+            number,
+            why = Words::bilingual(why)
+        );
     }
-    /// What CiA 402 says of other codes.
-    const UNKNOWN: &str = "unknown error";
-    if let Some(words) = takt_wire::erob_can::error_code::ErrorCode(code).words() {
-        return format!("0x{code:04X} (the drive refuses to be enabled: {words})");
-    }
-    if code == UNKNOWN_REFUSAL {
-        return "the drive refuses to be enabled, and does not say why".to_owned();
-    }
-    let list = "the list is in the eRob user manual, appendix 2";
-    match ErrorCode(code).words() {
-        UNKNOWN => format!("0x{code:04X} ({list})"),
-        words => format!("0x{code:04X} ({words}, if it is a code of CiA 402; {list})"),
+    match (code, ErrorCode(code).bilingual()) {
+        (0, _) => "none".into(),
+        (UNKNOWN_REFUSAL, _) => "the drive refuses to be enabled, and does not say why".into(),
+        (_, ("unknown error", _)) => {
+            words!("{number} (the list is in the eRob user manual, appendix 2)", number)
+        }
+        (_, name) => words!(
+            "{number} ({name}, if it is a code of CiA 402; the list is in the eRob user manual, appendix 2)",
+            number,
+            name = Words::bilingual(name)
+        ),
     }
 }

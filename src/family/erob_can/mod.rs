@@ -27,12 +27,13 @@ use takt_rt::{Frame, Id};
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
 use super::{
-    ChinesePhrase, ChineseTerm, Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol,
-    SettingUp, Unwatched, Watchdog, erob,
+    Family, FrameWords, NamedEntry, OffCycleBudget, OffCycleDrive, OtherProtocol, SettingUp, Unwatched,
+    Watchdog,
 };
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::erob::selection;
+use crate::words::Words;
 use follower::Follower;
 use takt_sim::Drive;
 use takt_wire::canopen::function_code;
@@ -113,7 +114,7 @@ impl Family for ErobCan {
         Box::pin(async { Ok(()) })
     }
 
-    fn other_protocol(&self, node: u8) -> Option<OtherProtocol> {
+    fn other_protocol(&self, _: &DriveFamily, node: u8) -> Option<OtherProtocol> {
         Some(OtherProtocol {
             name: "CANopen",
             request: SdoRequest::Upload { object: DEVICE_TYPE.address }.frame(node),
@@ -122,20 +123,12 @@ impl Family for ErobCan {
         })
     }
 
-    fn error_words(&self, code: u16) -> String {
+    fn error_words(&self, code: u16) -> Words {
         failure::error_words(code)
     }
 
     fn error_cure(&self, _: u16) -> Option<&'static str> {
         Some(failure::FAULT_CURE)
-    }
-
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        erob::chinese::PHRASES.to_vec()
-    }
-
-    fn chinese_terms(&self) -> Vec<ChineseTerm> {
-        erob::chinese_terms::TERMS.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

@@ -13,6 +13,7 @@ use crate::family::commission::{DriveTask, Failure, Report, TargetDrive, Task};
 use crate::family::erob::module::CommandedModule as _;
 use crate::family::erob::{selection, tasks};
 use crate::procedure::{ModbusClient, ModbusSession, Procedure};
+use crate::words::Words;
 
 /// A task with a drive on a line of this bit rate.
 ///
@@ -245,7 +246,7 @@ fn of_command(failure: CommandFailure) -> Failure {
     match failure {
         CommandFailure::Access(error) => error.into(),
         CommandFailure::FaultStays(code) => {
-            Failure::FaultPersists { what: code.words().to_owned(), advice: Some(code.cure()) }
+            Failure::FaultPersists { what: Words::bilingual(code.bilingual()), advice: Some(code.cure()) }
         }
         CommandFailure::ReadBack { .. } => Failure::Request { what: failure.to_string(), cure: None },
     }

@@ -7,7 +7,7 @@ use std::fmt;
 
 use takt_wire::canopen::emcy;
 
-use crate::family::error_cure;
+use crate::family::{erob, error_cure};
 
 /// The family whose codes the others are taken for.
 const SAME_MODULE: Option<&str> = Some("erob-canopen");
@@ -27,14 +27,21 @@ impl FaultCode {
     /// No code of the drive: register 0x0002 shows another communication time-out than was written, so that it was not enabled.
     pub const TIMEOUT_NOT_KEPT: Self = Self(0xFFFE);
 
-    /// What the code means.
+    /// The meaning of the code.
     pub fn words(self) -> &'static str {
+        self.bilingual().0
+    }
+
+    /// The meaning of the code in English and in Chinese.
+    pub fn bilingual(self) -> (&'static str, &'static str) {
         match self {
-            Self::COMMUNICATION_TIMEOUT => "RS-485 communication time-out",
-            Self::MULTI_TURN_BATTERY => "battery voltage of the multi-turn encoder low",
-            Self::REFUSED => "the drive has refused to be prepared or enabled",
-            Self::TIMEOUT_NOT_KEPT => "the drive has not kept its communication time-out",
-            Self(code) => emcy::ErrorCode(code).words(),
+            Self::COMMUNICATION_TIMEOUT => ("RS-485 communication time-out", "RS-485 通信超时"),
+            Self::MULTI_TURN_BATTERY => erob::BATTERY_LOW,
+            Self::REFUSED => ("the drive has refused to be prepared or enabled", "驱动器拒绝准备或使能"),
+            Self::TIMEOUT_NOT_KEPT => {
+                ("the drive has not kept its communication time-out", "驱动器未保持写入的通信超时")
+            }
+            Self(code) => emcy::ErrorCode(code).bilingual(),
         }
     }
 

@@ -35,13 +35,14 @@ use takt_rt::Frame;
 use super::commission::{DriveTask, Failure, TargetDrive, Task};
 use super::scan::{FoundDevice, StartingKeys};
 use super::{
-    ChinesePhrase, Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, SignOfLife,
-    Unwatched, Watchdog, erob, erob_can,
+    Family, LookingAtSlave, NamedEntry, OffCycleBudget, OffCycleLine, SettingUp, SignOfLife, Unwatched,
+    Watchdog, coded, erob_can,
 };
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::erob::selection;
 use crate::procedure::ModbusSession;
+use crate::words::Words;
 use axis::LineKeys;
 use budget::LineBudget;
 use fault_code::FaultCode;
@@ -145,19 +146,15 @@ impl Family for ErobModbus {
         Box::pin(async { Ok(()) })
     }
 
-    fn error_words(&self, code: u16) -> String {
+    fn error_words(&self, code: u16) -> Words {
         match code {
-            0 => "none".to_owned(),
-            code => format!("0x{code:04X} ({})", FaultCode(code).words()),
+            0 => "none".into(),
+            code => coded(code, Words::bilingual(FaultCode(code).bilingual())),
         }
     }
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         Some(FaultCode(code).cure())
-    }
-
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        erob::chinese::PHRASES.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

@@ -10,7 +10,6 @@
 //!
 //! The wire formats of the serial lines, which the simulated devices need as well, are in `hollow_lines`.
 
-mod chinese;
 pub mod encoder_output;
 mod lines;
 pub mod pwm;
@@ -37,7 +36,6 @@ pub static CAN: BitFieldFamily = BitFieldFamily {
         protocols: || &[&scan::CanScan],
         on_line: None,
         starting_keys: scan::starting_keys,
-        chinese_phrases: chinese::PHRASES,
     }),
 };
 
@@ -53,7 +51,6 @@ pub static CAN_FD: BitFieldFamily = BitFieldFamily {
         protocols: || &[&scan::FdScan],
         on_line: Some(|session, bit_rate| Box::pin(scan::look(session, bit_rate))),
         starting_keys: scan::starting_keys,
-        chinese_phrases: chinese::PHRASES,
     }),
 };
 

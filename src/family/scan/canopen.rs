@@ -12,6 +12,7 @@ use takt_wire::printable::printable;
 use super::device::{Answered, FoundDevice};
 use super::heard::HeardNode;
 use super::session::ScanSession;
+use crate::config::Identity;
 use crate::family::{self, Family};
 
 /// A node of which nothing more is known.
@@ -36,6 +37,13 @@ pub struct NodeIdentity {
     pub revision: Option<u32>,
     /// Object 1018:4.
     pub serial: Option<u32>,
+}
+
+impl NodeIdentity {
+    /// Returns `true` if the node is a drive with this vendor and product.
+    pub fn is_of(&self, drive: &Identity) -> bool {
+        drive.vendor.is_some() && drive.vendor == self.vendor && drive.product == self.product
+    }
 }
 
 /// How surely a family takes a node for one of its drives.
@@ -176,7 +184,7 @@ pub fn remark_heard(device: &mut FoundDevice, heard: &HeardNode) {
     if let Some(emergency) = heard.emergency {
         let words = match device.drive.and_then(family::named) {
             Some(family) => family.error_words(emergency.code.0),
-            None => emergency.code.to_string(),
+            None => family::standard_error(emergency.code.0),
         };
         device.remark(format!("it reports an error: {words}"));
     }

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use super::canopen::NodeIdentity;
+use crate::words;
+use crate::words::Words;
 
 /// How a device has shown itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,14 +28,14 @@ pub enum Answered {
 
 impl Answered {
     /// The protocol in words.
-    pub fn words(self) -> String {
+    pub fn words(self) -> Words {
         match self {
-            Self::Sdo => "CANopen SDO".to_owned(),
-            Self::Heard(protocol) => format!("{protocol}, heard"),
-            Self::Own(protocol) => protocol.to_owned(),
-            Self::Modbus { bit_rate } => format!("Modbus-RTU at {bit_rate} bit/s"),
-            Self::Lss => "LSS fastscan".to_owned(),
-            Self::OfController => "not asked".to_owned(),
+            Self::Sdo => "CANopen SDO".into(),
+            Self::Heard(protocol) => words!("{protocol}, heard", protocol = Words::from(protocol)),
+            Self::Own(protocol) => protocol.into(),
+            Self::Modbus { bit_rate } => words!("Modbus-RTU at {bit_rate} bit/s", bit_rate),
+            Self::Lss => "LSS fastscan".into(),
+            Self::OfController => "not asked".into(),
         }
     }
 }

@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+use crate::words;
+use crate::words::Words;
+
 /// An alarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Alarm {
@@ -59,15 +62,25 @@ impl Alarm {
         }
     }
 
-    const fn words(self) -> &'static str {
+    /// The alarm with its code.
+    pub fn words(self) -> Words {
+        let name = Words::bilingual(self.bilingual());
         match self {
-            Self::None => "none",
-            Self::Battery => "battery power lost, multi-turn position lost",
-            Self::BlockedRotor => "blocked rotor",
-            Self::LossOfSpeed => "loss of speed (stall)",
-            Self::OverVoltage => "over-voltage, above 52 V",
-            Self::CommunicationLost => "communication lost (heartbeat timeout)",
-            Self::Other(_) => "not described",
+            Self::None => words!("alarm {name}", name),
+            _ => words!("alarm {code}h ({name})", code = format!("{:02X}", self.code()), name),
+        }
+    }
+
+    /// Its name in English and in Chinese.
+    const fn bilingual(self) -> (&'static str, &'static str) {
+        match self {
+            Self::None => ("none", "无"),
+            Self::Battery => ("battery power lost, multi-turn position lost", "电池断电，多圈位置丢失"),
+            Self::BlockedRotor => ("blocked rotor", "堵转"),
+            Self::LossOfSpeed => ("loss of speed (stall)", "失速"),
+            Self::OverVoltage => ("over-voltage, above 52 V", "过压，高于 52 V"),
+            Self::CommunicationLost => ("communication lost (heartbeat timeout)", "通信丢失（心跳超时）"),
+            Self::Other(_) => ("not described", "手册未说明"),
         }
     }
 
@@ -102,7 +115,7 @@ impl fmt::Display for Alarm {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::None => f.write_str("none"),
-            alarm => write!(f, "{:02X}h ({})", alarm.code(), alarm.words()),
+            alarm => write!(f, "{:02X}h ({})", alarm.code(), alarm.bilingual().0),
         }
     }
 }

@@ -5,7 +5,6 @@
 
 mod alarm;
 mod bring_up;
-mod chinese;
 mod commission;
 mod facts;
 mod process_data;
@@ -20,12 +19,13 @@ use takt_rt::Frame;
 use takt_wire::canopen::object::Object;
 
 use super::scan::{FoundDevice, StartingKeys};
-use super::{ChinesePhrase, ChineseTerm, Family, MappingMatch, SettingUp};
+use super::{Family, MappingMatch, SettingUp};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::commission::dictionary::ObjectEntry;
 use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo};
 use crate::procedure::SdoQuirks;
+use crate::words::Words;
 use takt_sim::Drive;
 use takt_sim::yz_aim::YzAimJoint;
 
@@ -81,20 +81,12 @@ impl Family for YzAim {
         Box::pin(bring_up::shut_down(c))
     }
 
-    fn error_words(&self, code: u16) -> String {
-        format!("alarm {}", Alarm::of(code))
+    fn error_words(&self, code: u16) -> Words {
+        Alarm::of(code).words()
     }
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         Some(Alarm::of(code).advice().unwrap_or(super::error_words::UNKNOWN))
-    }
-
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        chinese::PHRASES.to_vec()
-    }
-
-    fn chinese_terms(&self) -> Vec<ChineseTerm> {
-        chinese::TERMS.to_vec()
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {

@@ -156,7 +156,7 @@ pub fn seed(section: &mut Section<'_>) -> Option<u64> {
 fn identifiers(axis: &Axis) -> DriveIdentifiers {
     match axis.drive.protocol {
         Protocol::Canopen => {
-            let other = family::of(&axis.drive).other_protocol(axis.node);
+            let other = family::of(&axis.drive).other_protocol(&axis.drive, axis.node);
             let own_protocol = other.map_or_else(Vec::new, |other| vec![other.request.id(), other.answer]);
             DriveIdentifiers::Node { own_protocol }
         }

@@ -86,7 +86,7 @@ impl Recorded {
         let group = event.group.filter(|_| self.machine.groups.len() > 1);
         Cause {
             group: group.map(|group| self.machine.group_name(group)),
-            reason: words::stop(stop, &self.machine),
+            reason: words::stop(stop, &self.machine).to_string(),
             rule: words::rule_key(stop.rule()).to_owned(),
             category: Some(stop.category as u8),
             axis: stop.axis().map(|axis| self.machine.axis_name(axis)),

@@ -9,9 +9,33 @@ use std::path::{Path, PathBuf};
 use super::records::{self, Record};
 use super::{RecordedError, walk};
 use crate::config::ConfigSources;
-use crate::journal::{Journal, JournalDefect};
+use crate::journal::{BlockDefect, Journal};
 use crate::telemetry::destination::PartNames;
 use crate::telemetry::recording;
+
+/// A part of a journal that cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum JournalDefect {
+    /// A block.
+    #[error("{}: block {number} of the journal is damaged: {defect}", file.display())]
+    Block {
+        /// The file.
+        file: PathBuf,
+        /// The number of the block in this file, counted from 1.
+        number: u64,
+        /// The defect.
+        defect: BlockDefect,
+    },
+    /// Chunks of the file, in which blocks of the journal may be.
+    #[error("{}: {count} damaged chunks: the journal is not whole", file.display())]
+    Chunks {
+        /// The file.
+        file: PathBuf,
+        /// How many.
+        count: u64,
+    },
+}
 
 /// What a recording has for a replay.
 #[derive(Debug, Default)]
@@ -24,7 +48,7 @@ pub struct RecordedJournal {
     pub lost: Option<u64>,
     /// The first defect.
     pub defect: Option<JournalDefect>,
-    /// True if this version of takt can read the journal.
+    /// True if this version of takt cannot read the journal.
     pub is_of_other_version: bool,
     /// The file that it begins in, if that is an earlier one of the same run.
     pub begins_in: Option<PathBuf>,
@@ -80,16 +104,23 @@ fn add(
 ) -> Result<Option<(OsString, u32)>, RecordedError> {
     let mut part = None;
     let mut channels = HashSet::new();
-    walk::walk(file, |opcode, body| match records::parse(opcode, body) {
+    let mut number = 0;
+    let condition = walk::walk(file, |opcode, body| match records::parse(opcode, body) {
         Some(Ok(Record::Channel { id, metadata, .. })) => {
             if let Some(version) = metadata.get("journal") {
-                found.is_of_other_version |= version != recording::JOURNAL_VERSION;
-                channels.insert(id);
+                if version == recording::JOURNAL_VERSION {
+                    channels.insert(id);
+                } else {
+                    found.is_of_other_version = true;
+                }
             }
         }
         Some(Ok(Record::Message { channel, data, .. })) if channels.contains(&channel) => {
-            let added = found.journal.get_or_insert_default().add_block(data);
-            found.defect = found.defect.or(added.err());
+            number += 1;
+            if let Err(defect) = found.journal.get_or_insert_default().add_block(data) {
+                let file = path.to_owned();
+                found.defect.get_or_insert(JournalDefect::Block { file, number, defect });
+            }
         }
         Some(Ok(Record::Metadata { name, entries })) if name == recording::PART => {
             let first = entries.get(recording::FIRST_PART).map(OsString::from);
@@ -100,6 +131,10 @@ fn add(
         _ => {}
     })
     .map_err(|error| RecordedError::Unreadable { path: path.to_owned(), error })?;
+    if condition.damaged_chunks > 0 {
+        let (file, count) = (path.to_owned(), condition.damaged_chunks);
+        found.defect.get_or_insert(JournalDefect::Chunks { file, count });
+    }
     Ok(part)
 }
 
@@ -127,5 +162,71 @@ impl RecordedJournal {
             }
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::io::Cursor;
+
+    use mcap::records::MessageHeader;
+    use mcap::{WriteOptions, Writer};
+
+    use super::*;
+    use crate::journal::ClockAnswer;
+
+    /// A recording in which these are the blocks of a journal of this version.
+    fn file_of(version: &str, blocks: &[Vec<u8>]) -> Vec<u8> {
+        let mut file = Cursor::new(vec![]);
+        let mut writer = Writer::with_options(&mut file, WriteOptions::new().compression(None)).unwrap();
+        let metadata = BTreeMap::from([("journal".to_owned(), version.to_owned())]);
+        let channel_id = writer.add_channel(0, "/journal", "takt-journal", &metadata).unwrap();
+        for block in blocks {
+            let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+            writer.write_to_known_channel(&header, block).unwrap();
+        }
+        writer.finish().unwrap();
+        drop(writer);
+        file.into_inner()
+    }
+
+    fn read(file: &[u8]) -> RecordedJournal {
+        journal_in_memory(Path::new("run.mcap"), file).unwrap()
+    }
+
+    fn block() -> Vec<u8> {
+        let mut journal = Journal::default();
+        journal.add_clock(ClockAnswer::Now(1_000_000));
+        journal.take_block().unwrap()
+    }
+
+    #[test]
+    fn a_journal_of_another_version_is_not_read() {
+        let found = read(&file_of("2", &[b"a block of version 2".to_vec()]));
+        assert!(found.is_of_other_version && found.journal.is_none() && found.defect.is_none());
+        assert!(!read(&file_of(recording::JOURNAL_VERSION, &[block()])).is_of_other_version);
+    }
+
+    #[test]
+    fn the_first_damaged_block_is_named_with_its_file_its_number_and_the_reason() {
+        let damaged = b"no block".to_vec();
+        let found = read(&file_of(recording::JOURNAL_VERSION, &[block(), damaged.clone(), damaged]));
+        assert_eq!(
+            found.defect.map(|defect| defect.to_string()).as_deref(),
+            Some("run.mcap: block 2 of the journal is damaged: it cannot be decoded")
+        );
+        assert_eq!(found.journal.map(|journal| journal.clock.len()), Some(1));
+    }
+
+    #[test]
+    fn a_journal_is_not_whole_if_a_chunk_of_the_file_is_damaged() {
+        let block = block();
+        let mut file = file_of(recording::JOURNAL_VERSION, std::slice::from_ref(&block));
+        assert_eq!(read(&file).defect, None);
+        let at = file.windows(block.len()).position(|bytes| bytes == block).unwrap();
+        file[at] ^= 1;
+        let defect = JournalDefect::Chunks { file: "run.mcap".into(), count: 1 };
+        assert_eq!(read(&file).defect, Some(defect));
     }
 }

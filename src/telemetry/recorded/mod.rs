@@ -32,7 +32,7 @@ use takt_wire::printable::printable;
 pub use cause::Cause;
 pub use event::RecordedEvent;
 pub use frames::{RecordedFrame, RecordedFrames, frames};
-pub use journal::{RecordedJournal, journal, journal_in_memory};
+pub use journal::{JournalDefect, RecordedJournal, journal, journal_in_memory};
 pub use walk::WalkError;
 
 /// Why a file cannot be read.

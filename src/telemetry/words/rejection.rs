@@ -3,8 +3,10 @@
 use takt_rt::{MappedObject, RejectReason, RequestError, RequestKind};
 use takt_wire::printable::Shown;
 
-use super::{mode, phase, rule_key};
+use super::{mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
+use crate::words;
+use crate::words::Words;
 
 /// The name of a request: "the move".
 pub const fn request(kind: RequestKind) -> &'static str {
@@ -34,136 +36,164 @@ pub const fn request(kind: RequestKind) -> &'static str {
 
 /// The rejected request and the reason: "the move was rejected while holding: shoulder cannot go to 3.5000 rad, beyond its position
 /// limit of 2.9671 rad".
-pub fn rejection(rejected: &RequestError, machine: &Machine) -> String {
-    let (what, during) = (request(rejected.request), phase(rejected.phase));
+pub fn rejection(rejected: &RequestError, machine: &Machine) -> Words {
+    let (what, phase) = (Words::from(request(rejected.request)), Words::from(phase(rejected.phase)));
     match rejected.reason {
-        RejectReason::Phase => format!("{what} was rejected: not possible while {during}"),
-        _ => format!("{what} was rejected while {during}: {}", reason(rejected, machine)),
+        RejectReason::Phase => words!("{what} was rejected: not possible while {phase}", what, phase),
+        _ => {
+            let reason = reason(rejected, machine);
+            words!("{what} was rejected while {phase}: {reason}", what, phase, reason)
+        }
     }
 }
 
-fn reason(rejected: &RequestError, machine: &Machine) -> String {
-    let axis = rejected.axis.map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
+fn reason(rejected: &RequestError, machine: &Machine) -> Words {
+    let axis = &rejected.axis.map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
     let unit = rejected.axis.map_or(Unit::Radian, |axis| machine.axis_unit(axis));
-    let (length, force) = (unit.symbol(), unit.effort_symbol());
+    let (unit, force) = (unit.symbol(), unit.effort_symbol());
+    let length = |value| format!("{:.4} {unit}", Shown(value));
+    let exact_length = |value| format!("{:.6} {unit}", Shown(value));
+    let speed = |value| format!("{:.3} {unit}/s", Shown(value));
+    let torque_of = |value| format!("{:.2} {force}", Shown(value));
     match rejected.reason {
-        RejectReason::Phase => format!("not possible while {}", phase(rejected.phase)),
-        RejectReason::StopLatched { rule } if rejected.axis.is_some() => {
-            let rule = rule_key(rule);
-            format!("the group has stopped for a fault of {axis} ({rule}), which must be reset first")
+        RejectReason::Phase => {
+            words!("not possible while {phase}", phase = Words::from(phase(rejected.phase)))
         }
-        RejectReason::StopLatched { rule } => {
-            format!("the group has stopped for a fault ({}), which must be reset first", rule_key(rule))
-        }
-        RejectReason::EnableInhibited => "the run is ending".to_owned(),
-        RejectReason::MissedSlots { missed, limit } => {
-            format!(
-                "{missed} slots were missed recently, and a stream or a callback needs fewer than {limit}"
-            )
-        }
+        RejectReason::StopLatched { rule } if rejected.axis.is_some() => words!(
+            "the group has stopped for a fault of {axis} ({rule}), which must be reset first",
+            axis,
+            rule = Words::from(rule.key())
+        ),
+        RejectReason::StopLatched { rule } => words!(
+            "the group has stopped for a fault ({rule}), which must be reset first",
+            rule = Words::from(rule.key())
+        ),
+        RejectReason::EnableInhibited => "the run is ending".into(),
+        RejectReason::MissedSlots { missed, limit } => words!(
+            "{missed} slots were missed recently, and a stream or a callback needs fewer than {limit}",
+            missed,
+            limit
+        ),
         RejectReason::UnknownAxis { axis, axes } => {
-            format!("there is no axis {axis}: there are {axes}, counted from 0")
+            words!("there is no axis {axis}: there are {axes}, counted from 0", axis, axes)
         }
         RejectReason::WrongMode { mode: present } => {
-            format!("{axis} is in {}, which takes no such target", mode((present as i8).into()))
+            words!("{axis} is in {mode}, which takes no such target", axis, mode = mode(present as i8))
         }
-        RejectReason::NotFinite { value } => format!("the number given for {axis} is not finite ({value})"),
-        RejectReason::PositionLimit { position, limit } => format!(
-            "{axis} cannot go to {position:.4} {length}, beyond its position limit of {limit:.4} {length}",
-            position = Shown(position),
-            limit = Shown(limit)
+        RejectReason::NotFinite { value } => {
+            words!("the number given for {axis} is not finite ({value})", axis, value)
+        }
+        RejectReason::PositionLimit { position, limit } => words!(
+            "{axis} cannot go to {position}, beyond its position limit of {limit}",
+            axis,
+            position = length(position),
+            limit = length(limit)
         ),
-        RejectReason::VelocityLimit { velocity, limit } => {
-            format!(
-                "{velocity:.3} {length}/s is beyond the velocity limit of {axis}, {limit:.3} {length}/s",
-                velocity = Shown(velocity),
-                limit = Shown(limit)
-            )
-        }
-        RejectReason::TorqueLimit { torque, limit } => {
-            format!(
-                "{torque:.2} {force} is beyond the torque limit of {axis}, {limit:.2} {force}",
-                torque = Shown(torque),
-                limit = Shown(limit)
-            )
-        }
-        RejectReason::NoRoomToStop { rest, limit } => format!(
-            "at such a speed {axis} comes to rest only at {rest:.4} {length}, beyond its position limit of \
-             {limit:.4} {length}",
-            rest = Shown(rest),
-            limit = Shown(limit)
+        RejectReason::VelocityLimit { velocity, limit } => words!(
+            "{velocity} is beyond the velocity limit of {axis}, {limit}",
+            velocity = speed(velocity),
+            axis,
+            limit = speed(limit)
+        ),
+        RejectReason::TorqueLimit { torque, limit } => words!(
+            "{torque} is beyond the torque limit of {axis}, {limit}",
+            torque = torque_of(torque),
+            axis,
+            limit = torque_of(limit)
+        ),
+        RejectReason::NoRoomToStop { rest, limit } => words!(
+            "at such a speed {axis} comes to rest only at {rest}, beyond its position limit of {limit}",
+            axis,
+            rest = length(rest),
+            limit = length(limit)
         ),
         RejectReason::VelocityScale { scale } => {
-            format!("{} is not a fraction of the velocity limits, above 0 up to 1", Shown(scale))
+            words!("{scale} is not a fraction of the velocity limits, above 0 up to 1", scale = Shown(scale))
         }
-        RejectReason::AccelerationScale { scale } => {
-            format!("{} is not a fraction of the acceleration limits, above 0 up to 1", Shown(scale))
-        }
+        RejectReason::AccelerationScale { scale } => words!(
+            "{scale} is not a fraction of the acceleration limits, above 0 up to 1",
+            scale = Shown(scale)
+        ),
         RejectReason::MinimumDuration { duration_s } => {
-            format!("{} s is not a possible shortest duration", Shown(duration_s))
+            words!("{duration} s is not a possible shortest duration", duration = Shown(duration_s))
         }
         RejectReason::UnknownGroup { group, groups } => {
-            format!("there is no group {group}: there are {groups}, counted from 0")
+            words!("there is no group {group}: there are {groups}, counted from 0", group, groups)
         }
         RejectReason::GroupNotNamed { .. } => {
-            format!("it is for one group, and must name it: {}", machine.groups.join(", "))
+            words!("it is for one group, and must name it: {groups}", groups = machine.groups.join(", "))
         }
-        RejectReason::OtherGroup { asked, of_axis } => format!(
-            "{axis} is in the group {}, not in {}",
-            machine.group_name(of_axis),
-            machine.group_name(asked)
+        RejectReason::OtherGroup { asked, of_axis } => words!(
+            "{axis} is in the group {of_axis}, not in {asked}",
+            axis,
+            of_axis = machine.group_name(of_axis),
+            asked = machine.group_name(asked)
         ),
-        RejectReason::NoTrajectory => format!("no trajectory within the limits of {axis} leads there"),
-        RejectReason::RatedTorque { torque } => {
-            format!("{} {force} is not a possible rated torque of {axis}", Shown(torque))
-        }
-        RejectReason::NoProcessData => format!("{axis} would have no PDO in one direction"),
-        RejectReason::TooManyObjects => format!("a PDO of {axis} has too many objects"),
-        RejectReason::Mapping { object: MappedObject { index, subindex, bits } } => {
-            format!("{index:04X}:{subindex:02X} of {bits} bits cannot be in a PDO of {axis}")
-        }
-        RejectReason::IdTaken { id } => format!("identifier {id:?} for {axis} is in use"),
-        RejectReason::TooManyFrames { frames, limit } => {
-            format!("the bus of {axis} would need {frames} frames in a cycle, and {limit} fit")
-        }
-        RejectReason::NoTime => "the drives are not told the time (`time` of [master])".to_owned(),
-        RejectReason::UnknownTrajectory => "there is no such trajectory".to_owned(),
-        RejectReason::UnknownCallback => "there is no such callback".to_owned(),
-        RejectReason::StartMismatch { position, present } => format!(
-            "it begins at {position:.6} {length} while {axis} is at {present:.6} {length}, or at another velocity",
-            position = Shown(position),
-            present = Shown(present)
+        RejectReason::NoTrajectory => words!("no trajectory within the limits of {axis} leads there", axis),
+        RejectReason::RatedTorque { torque } => words!(
+            "{torque} is not a possible rated torque of {axis}",
+            torque = format!("{} {force}", Shown(torque)),
+            axis
         ),
-        RejectReason::TooLate => "the cycle at which it was to begin has passed".to_owned(),
-        RejectReason::ModeChanging => "the mode of operation is being changed".to_owned(),
+        RejectReason::NoProcessData => words!("{axis} would have no PDO in one direction", axis),
+        RejectReason::TooManyObjects => words!("a PDO of {axis} has too many objects", axis),
+        RejectReason::Mapping { object: MappedObject { index, subindex, bits } } => words!(
+            "{object} of {bits} bits cannot be in a PDO of {axis}",
+            object = format!("{index:04X}:{subindex:02X}"),
+            bits,
+            axis
+        ),
+        RejectReason::IdTaken { id } => {
+            words!("identifier {id} for {axis} is in use", id = format!("{id:?}"), axis)
+        }
+        RejectReason::TooManyFrames { frames, limit } => words!(
+            "the bus of {axis} would need {frames} frames in a cycle, and {limit} fit",
+            axis,
+            frames,
+            limit
+        ),
+        RejectReason::NoTime => "the drives are not told the time (`time` of [master])".into(),
+        RejectReason::UnknownTrajectory => "there is no such trajectory".into(),
+        RejectReason::UnknownCallback => "there is no such callback".into(),
+        RejectReason::StartMismatch { position, present } => words!(
+            "it begins at {position} while {axis} is at {present}, or at another velocity",
+            position = exact_length(position),
+            axis,
+            present = exact_length(present)
+        ),
+        RejectReason::TooLate => "the cycle at which it was to begin has passed".into(),
+        RejectReason::ModeChanging => "the mode of operation is being changed".into(),
         RejectReason::UnknownMode { mode: wanted } => {
-            format!("{axis} cannot be in {}: it is not among its `modes`", mode((wanted as i8).into()))
+            words!("{axis} cannot be in {mode}: it is not among its `modes`", axis, mode = mode(wanted as i8))
         }
-        RejectReason::ObjectNotMapped { object } => {
-            format!("{object} is not in the PDOs of {axis}, and a change of its mode needs it")
-        }
-        RejectReason::NotBroughtUp => {
-            "the last bring-up of the drives has failed or is not finished: call `bring_up`".to_owned()
-        }
-        RejectReason::NotDisabled => format!("the drive of {axis} must be disabled for it"),
-        RejectReason::NotAtRest { velocity } => {
-            format!(
-                "{axis} is not at rest, or has not been for some cycles ({velocity:.4} {length}/s)",
-                velocity = Shown(velocity)
-            )
-        }
-        RejectReason::OffSetPoint { distance, limit } => format!(
-            "{axis} is {distance:.6} {length} from its set-point (allowed: {limit:.6} {length}), and would be pulled there",
-            distance = Shown(distance),
-            limit = Shown(limit)
+        RejectReason::ObjectNotMapped { object } => words!(
+            "{object} is not in the PDOs of {axis}, and a change of its mode needs it",
+            object = object.to_string(),
+            axis
         ),
-        RejectReason::BeyondCounter { position, limit } => format!(
-            "{axis} is at {position:.4} {length}, where the count of its drive may have wrapped: turn it by hand to its limit of {limit:.4} {length}",
-            position = Shown(position),
-            limit = Shown(limit)
+        RejectReason::NotBroughtUp => {
+            "the last bring-up of the drives has failed or is not finished: call `bring_up`".into()
+        }
+        RejectReason::NotDisabled => words!("the drive of {axis} must be disabled for it", axis),
+        RejectReason::NotAtRest { velocity } => words!(
+            "{axis} is not at rest, or has not been for some cycles ({velocity})",
+            axis,
+            velocity = format!("{}/s", length(velocity))
+        ),
+        RejectReason::OffSetPoint { distance, limit } => words!(
+            "{axis} is {distance} from its set-point (allowed: {limit}), and would be pulled there",
+            axis,
+            distance = exact_length(distance),
+            limit = exact_length(limit)
+        ),
+        RejectReason::BeyondCounter { position, limit } => words!(
+            "{axis} is at {position}, where the count of its drive may have wrapped: turn it by hand to its limit of {limit}",
+            axis,
+            position = length(position),
+            limit = length(limit)
         ),
         RejectReason::SuccessorPending => {
-            "another trajectory is already to take the place of the present one".to_owned()
+            "another trajectory is already to take the place of the present one".into()
         }
     }
 }
@@ -192,7 +222,7 @@ mod tests {
 
     fn text(reason: RejectReason, axis: Option<u8>) -> String {
         let rejected = RequestError { request: RequestKind::Move, reason, axis, phase: Phase::Holding };
-        rejection(&rejected, &machine())
+        rejection(&rejected, &machine()).to_string()
     }
 
     #[test]

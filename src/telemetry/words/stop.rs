@@ -5,6 +5,8 @@ use takt_wire::printable::Shown;
 
 use super::{category, mode, phase};
 use crate::telemetry::machine::{Machine, Unit};
+use crate::words;
+use crate::words::Words;
 
 /// Returns `true` if this is the identifier of an SDO request to a node (CiA 301, 7.3.3).
 fn is_sdo_request(id: Id) -> bool {
@@ -12,228 +14,256 @@ fn is_sdo_request(id: Id) -> bool {
 }
 
 /// The cause of a stop, without phase and category: "joint3 was 0.0214 rad from its set-point (allowed: 0.0200 rad)".
-pub fn stop_cause(stop: &StopReason, machine: &Machine) -> String {
-    let axis = stop.axis().map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
-    let bus =
-        stop.origin.bus().map_or_else(|| "a bus".to_owned(), |bus| format!("bus {}", machine.bus_name(bus)));
+pub fn stop_cause(stop: &StopReason, machine: &Machine) -> Words {
+    let axis = &stop.axis().map_or_else(|| "an axis".to_owned(), |axis| machine.axis_name(axis));
+    let bus = || match stop.origin.bus() {
+        Some(bus) => words!("bus {name}", name = machine.bus_name(bus)),
+        None => "a bus".into(),
+    };
     let unit = stop.axis().map_or(Unit::Radian, |axis| machine.axis_unit(axis));
     let (unit, effort) = (unit.symbol(), unit.effort_symbol());
-    let StopCause::Fault(fault) = stop.cause else { return "a stop was requested".to_owned() };
+    let length = |value| format!("{:.4} {unit}", Shown(value));
+    let speed = |value| format!("{:.3} {unit}/s", Shown(value));
+    let torque_of = |value| format!("{:.2} {effort}", Shown(value));
+    let rounded = |value| format!("{:.3}", Shown(value));
+    let error_of = |code| machine.drive_error(stop.axis().unwrap_or(u8::MAX), code);
+    let StopCause::Fault(fault) = stop.cause else { return "a stop was requested".into() };
     // No set-point is sent to a drive that plans its own profile: its measured motion is checked.
     let is_measured = stop.axis().is_some_and(|axis| machine.plans_own_profile(axis));
     match fault {
-        Fault::PositionLimit { position, limit } if is_measured => format!(
-            "{axis} would come to rest at {position:.4} {unit}, outside its position limit of {limit:.4} {unit}",
-            position = Shown(position),
-            limit = Shown(limit)
+        Fault::PositionLimit { position, limit } if is_measured => words!(
+            "{axis} would come to rest at {position}, outside its position limit of {limit}",
+            axis,
+            position = length(position),
+            limit = length(limit)
         ),
         Fault::FollowingError { .. } if is_measured => {
-            format!("{axis} stood still, and its drive had not reached its target")
+            words!("{axis} stood still, and its drive had not reached its target", axis)
         }
         Fault::NotFinite { position } => {
-            format!("the set-point of {axis} was not a finite number ({position})")
+            words!("the set-point of {axis} was not a finite number ({position})", axis, position)
         }
-        Fault::PositionLimit { position, limit } => format!(
-            "the set-point of {axis}, {position:.4} {unit}, was outside its position limit of {limit:.4} {unit}",
-            position = Shown(position),
-            limit = Shown(limit)
+        Fault::PositionLimit { position, limit } => words!(
+            "the set-point of {axis}, {position}, was outside its position limit of {limit}",
+            axis,
+            position = length(position),
+            limit = length(limit)
         ),
-        Fault::VelocityLimit { velocity, limit } => {
-            format!(
-                "the set-point of {axis} asked for {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)",
-                velocity = Shown(velocity),
-                limit = Shown(limit)
-            )
+        Fault::VelocityLimit { velocity: wanted, limit } => asked_for(axis, speed(wanted), speed(limit)),
+        Fault::AccelerationLimit { acceleration: wanted, limit } => {
+            let acceleration = |value| format!("{:.2} {unit}/s²", Shown(value));
+            asked_for(axis, acceleration(wanted), acceleration(limit))
         }
-        Fault::AccelerationLimit { acceleration, limit } => format!(
-            "the set-point of {axis} asked for {acceleration:.2} {unit}/s² (allowed: {limit:.2} {unit}/s²)",
-            acceleration = Shown(acceleration),
-            limit = Shown(limit)
+        Fault::JerkLimit { jerk: wanted, limit } => {
+            let jerk = |value| format!("{:.1} {unit}/s³", Shown(value));
+            asked_for(axis, jerk(wanted), jerk(limit))
+        }
+        Fault::FollowingError { error, limit } => words!(
+            "{axis} was {error} from its set-point (allowed: {limit})",
+            axis,
+            error = length(error),
+            limit = length(limit)
         ),
-        Fault::JerkLimit { jerk, limit } => {
-            format!(
-                "the set-point of {axis} asked for {jerk:.1} {unit}/s³ (allowed: {limit:.1} {unit}/s³)",
-                jerk = Shown(jerk),
-                limit = Shown(limit)
-            )
-        }
-        Fault::FollowingError { error, limit } => {
-            format!(
-                "{axis} was {error:.4} {unit} from its set-point (allowed: {limit:.4} {unit})",
-                error = Shown(error),
-                limit = Shown(limit)
-            )
-        }
-        Fault::StartPose { distance, limit } => format!(
-            "the stream of set-points began {distance:.4} {unit} from where {axis} is (allowed: {limit:.4} {unit})",
-            distance = Shown(distance),
-            limit = Shown(limit)
+        Fault::StartPose { distance, limit } => words!(
+            "the stream of set-points began {distance} from where {axis} is (allowed: {limit})",
+            axis,
+            distance = length(distance),
+            limit = length(limit)
         ),
-        Fault::ImplausibleFeedback { distance, reachable } => format!(
-            "{axis} was reported {distance:.4} {unit} from where it was, farther than it can have moved ({reachable:.4} {unit})",
-            distance = Shown(distance),
-            reachable = Shown(reachable)
+        Fault::ImplausibleFeedback { distance, reachable } => words!(
+            "{axis} was reported {distance} from where it was, farther than it can have moved ({reachable})",
+            axis,
+            distance = length(distance),
+            reachable = length(reachable)
         ),
         Fault::StaleCommand { .. } if stop.axis().is_some() => {
-            format!("the velocity or torque of {axis} expired and was not renewed")
+            words!("the velocity or torque of {axis} expired and was not renewed", axis)
         }
         Fault::StaleCommand { .. } => {
-            "the stream of set-points ended: its last command expired and no newer one came".to_owned()
+            "the stream of set-points ended: its last command expired and no newer one came".into()
         }
         Fault::StreamNotBegun { limit, .. } => {
-            format!("the stream of set-points did not begin within {}", cycles(limit))
+            words!("the stream of set-points did not begin within {cycles}", cycles = cycles(limit))
         }
-        Fault::MissedFeedback { cycles: missed, limit } => {
-            format!("{axis} has not reported in time for {} (allowed: {limit})", cycles(missed))
-        }
+        Fault::MissedFeedback { cycles: missed, limit } => words!(
+            "{axis} has not reported in time for {cycles} (allowed: {limit})",
+            axis,
+            cycles = cycles(missed),
+            limit
+        ),
         Fault::LateFeedback { cycles: late } => {
-            format!("the drive of {axis} always answers {} late", cycles(late))
+            words!("the drive of {axis} always answers {cycles} late", axis, cycles = cycles(late))
         }
         Fault::DriveFault { error_code: 0 } => {
-            format!("the drive of {axis} reports a fault without an error code")
+            words!("the drive of {axis} reports a fault without an error code", axis)
         }
         Fault::DriveFault { error_code } => {
-            format!("the drive of {axis} reports fault {}", drive_error(stop, machine, error_code))
+            words!("the drive of {axis} reports fault {error}", axis, error = error_of(error_code))
         }
-        Fault::DriveDisabled { statusword } => {
-            let statusword = machine.statusword(stop.axis(), statusword);
-            format!("the drive of {axis} is no longer in operation enabled{statusword}")
-        }
-        Fault::NotDisabled { state, silent_cycles: 0 } => {
-            format!("the drive of {axis} was to be disabled and still shows {}", state.name())
-        }
-        Fault::NotDisabled { state, silent_cycles } => format!(
-            "the drive of {axis} has not confirmed that it is disabled: no report for {}, and {} before",
-            cycles(silent_cycles),
-            state.name()
+        Fault::DriveDisabled { statusword } => words!(
+            "the drive of {axis} is no longer in operation enabled{statusword}",
+            axis,
+            statusword = machine.statusword(stop.axis(), statusword)
         ),
-        Fault::DriveEnabled { state } => format!(
-            "the drive of {axis} shows {} although its group is disabled: something else has enabled it",
-            state.name()
+        Fault::NotDisabled { state, silent_cycles: 0 } => words!(
+            "the drive of {axis} was to be disabled and still shows {state}",
+            axis,
+            state = Words::from(state.name())
         ),
-        Fault::DriveLocal { statusword } => format!(
-            "the drive of {axis} does not obey the bus any more: it has cleared its remote bit (statusword 0x{statusword:04X})"
+        Fault::NotDisabled { state, silent_cycles } => words!(
+            "the drive of {axis} has not confirmed that it is disabled: no report for {cycles}, and {state} before",
+            axis,
+            cycles = cycles(silent_cycles),
+            state = Words::from(state.name())
         ),
-        Fault::MeasuredPosition { position, limit } => {
-            format!(
-                "{axis} was at {position:.4} {unit}, beyond its position limit of {limit:.4} {unit}",
-                position = Shown(position),
-                limit = Shown(limit)
-            )
-        }
-        Fault::MeasuredVelocity { velocity, limit } => {
-            format!(
-                "{axis} moved at {velocity:.3} {unit}/s (allowed: {limit:.3} {unit}/s)",
-                velocity = Shown(velocity),
-                limit = Shown(limit)
-            )
-        }
-        Fault::MeasuredTorque { torque, limit } => {
-            format!(
-                "the drive of {axis} exerted {torque:.2} {effort} (allowed: {limit:.2} {effort})",
-                torque = Shown(torque),
-                limit = Shown(limit)
-            )
-        }
-        Fault::ModeChanged { shown, expected } => format!(
-            "the drive of {axis} shows {} instead of {}",
-            mode(shown.into()),
-            mode((expected as i8).into())
+        Fault::DriveEnabled { state } => words!(
+            "the drive of {axis} shows {state} although its group is disabled: something else has enabled it",
+            axis,
+            state = Words::from(state.name())
         ),
-        Fault::ModeNotShown { shown, expected } => format!(
-            "the drive of {axis} has not changed to {} in time: it shows {}",
-            mode((expected as i8).into()),
-            mode(shown.into())
+        Fault::DriveLocal { statusword } => words!(
+            "the drive of {axis} does not obey the bus any more: it has cleared its remote bit (statusword {statusword})",
+            axis,
+            statusword = format!("0x{statusword:04X}")
         ),
-        Fault::NoTorqueInMode { mode: own } => format!(
-            "a torque or an impedance was wanted of {axis}, which is in {} and takes them in CST alone",
-            mode((own as i8).into())
+        Fault::MeasuredPosition { position, limit } => words!(
+            "{axis} was at {position}, beyond its position limit of {limit}",
+            axis,
+            position = length(position),
+            limit = length(limit)
         ),
-        Fault::StiffnessLimit { stiffness, limit } => {
-            format!(
-                "a stiffness of {stiffness:.3} was wanted of {axis} (allowed: 0 to {limit:.3})",
-                stiffness = Shown(stiffness),
-                limit = Shown(limit)
-            )
-        }
-        Fault::DampingLimit { damping, limit } => {
-            format!(
-                "a damping of {damping:.3} was wanted of {axis} (allowed: 0 to {limit:.3})",
-                damping = Shown(damping),
-                limit = Shown(limit)
-            )
-        }
-        Fault::NotAcknowledged { limit, .. } => {
-            format!("the drive of {axis} did not acknowledge its target within {}", cycles(limit))
-        }
-        Fault::NodeLost { cycles: silent, limit } => {
-            format!("no heartbeat of {axis} has come for {} (allowed: {limit})", cycles(silent))
-        }
-        Fault::NodeNotOperational { state } => {
-            format!("the node of {axis} is no longer operational: its heartbeat shows state 0x{state:02X}")
-        }
-        Fault::UnexpectedBootUp => format!("the drive of {axis} started anew during its work"),
-        Fault::EmergencyMessage { code } => {
-            let error = drive_error(stop, machine, code);
-            format!("the drive of {axis} sent emergency message {error} and shows no fault")
-        }
-        Fault::DuplicateNode { node } => {
-            format!("two nodes answer with the node ID of {axis}, {node}: its feedback comes twice")
-        }
-        Fault::ForeignMaster { id } if is_sdo_request(id) => format!(
-            "another master writes to the drive of node {} on {bus}: an SDO request with identifier 0x{id:?} is not from this controller",
-            id.value() & 0x7F
+        Fault::MeasuredVelocity { velocity, limit } => words!(
+            "{axis} moved at {velocity} (allowed: {limit})",
+            axis,
+            velocity = speed(velocity),
+            limit = speed(limit)
         ),
-        Fault::ForeignMaster { id } => {
-            format!(
-                "another master sends on {bus}: a frame with identifier 0x{id:?} is not from this controller"
-            )
-        }
-        Fault::TimingUnfit { missed, limit } => {
-            format!("the controller misses its slots too often: {missed} recently (allowed: {limit})")
-        }
-        Fault::Suspended { suspended_ns } => {
-            format!("the computer was suspended for {:.1} s", suspended_ns as f64 * 1e-9)
-        }
-        Fault::CallbackOverrun { spent_ns, budget_ns } => format!(
-            "the callback took {:.1} µs (allowed: {:.1} µs)",
-            spent_ns as f64 * 1e-3,
-            budget_ns as f64 * 1e-3
+        Fault::MeasuredTorque { torque, limit } => words!(
+            "the drive of {axis} exerted {torque} (allowed: {limit})",
+            axis,
+            torque = torque_of(torque),
+            limit = torque_of(limit)
         ),
-        Fault::CallbackPanicked => "the callback panicked".to_owned(),
-        Fault::BusErrorPassive => format!("{bus} is error-passive: almost no frame gets through"),
-        Fault::BusOff => format!("{bus} is bus-off: too many of its frames had errors"),
-        Fault::BusDown => format!("the interface of {bus} is down, or has gone"),
-        Fault::NotAtRest { velocity, limit } => format!(
-            "{axis} did not come to rest to be enabled: it moved at {velocity:.4} {unit}/s (at rest: below {limit:.4} {unit}/s)",
-            velocity = Shown(velocity),
-            limit = Shown(limit)
+        Fault::ModeChanged { shown, expected } => words!(
+            "the drive of {axis} shows {shown} instead of {expected}",
+            axis,
+            shown = mode(shown),
+            expected = mode(expected as i8)
         ),
-        Fault::EnableTimeout { limit, .. } => format!(
-            "the drive of {axis} did not reach operation enabled within {} ({:.1} s)",
-            cycles(limit),
-            f64::from(limit) * machine.cycle_ns as f64 * 1e-9
+        Fault::ModeNotShown { shown, expected } => words!(
+            "the drive of {axis} has not changed to {expected} in time: it shows {shown}",
+            axis,
+            expected = mode(expected as i8),
+            shown = mode(shown)
+        ),
+        Fault::NoTorqueInMode { mode: own } => words!(
+            "a torque or an impedance was wanted of {axis}, which is in {mode} and takes them in CST alone",
+            axis,
+            mode = mode(own as i8)
+        ),
+        Fault::StiffnessLimit { stiffness, limit } => words!(
+            "a stiffness of {stiffness} was wanted of {axis} (allowed: 0 to {limit})",
+            axis,
+            stiffness = rounded(stiffness),
+            limit = rounded(limit)
+        ),
+        Fault::DampingLimit { damping, limit } => words!(
+            "a damping of {damping} was wanted of {axis} (allowed: 0 to {limit})",
+            axis,
+            damping = rounded(damping),
+            limit = rounded(limit)
+        ),
+        Fault::NotAcknowledged { limit, .. } => words!(
+            "the drive of {axis} did not acknowledge its target within {cycles}",
+            axis,
+            cycles = cycles(limit)
+        ),
+        Fault::NodeLost { cycles: silent, limit } => words!(
+            "no heartbeat of {axis} has come for {cycles} (allowed: {limit})",
+            axis,
+            cycles = cycles(silent),
+            limit
+        ),
+        Fault::NodeNotOperational { state } => words!(
+            "the node of {axis} is no longer operational: its heartbeat shows state {state}",
+            axis,
+            state = format!("0x{state:02X}")
+        ),
+        Fault::UnexpectedBootUp => words!("the drive of {axis} started anew during its work", axis),
+        Fault::EmergencyMessage { code } => words!(
+            "the drive of {axis} sent emergency message {error} and shows no fault",
+            axis,
+            error = error_of(code)
+        ),
+        Fault::DuplicateNode { node } => words!(
+            "two nodes answer with the node ID of {axis}, {node}: its feedback comes twice",
+            axis,
+            node
+        ),
+        Fault::ForeignMaster { id } if is_sdo_request(id) => words!(
+            "another master writes to the drive of node {node} on {bus}: an SDO request with identifier {id} is not from this controller",
+            node = id.value() & 0x7F,
+            bus = bus(),
+            id = format!("0x{id:?}")
+        ),
+        Fault::ForeignMaster { id } => words!(
+            "another master sends on {bus}: a frame with identifier {id} is not from this controller",
+            bus = bus(),
+            id = format!("0x{id:?}")
+        ),
+        Fault::TimingUnfit { missed, limit } => words!(
+            "the controller misses its slots too often: {missed} recently (allowed: {limit})",
+            missed,
+            limit
+        ),
+        Fault::Suspended { suspended_ns } => words!(
+            "the computer was suspended for {seconds} s",
+            seconds = format!("{:.1}", suspended_ns as f64 * 1e-9)
+        ),
+        Fault::CallbackOverrun { spent_ns, budget_ns } => words!(
+            "the callback took {spent} µs (allowed: {budget} µs)",
+            spent = format!("{:.1}", spent_ns as f64 * 1e-3),
+            budget = format!("{:.1}", budget_ns as f64 * 1e-3)
+        ),
+        Fault::CallbackPanicked => "the callback panicked".into(),
+        Fault::BusErrorPassive => {
+            words!("{bus} is error-passive: almost no frame gets through", bus = bus())
+        }
+        Fault::BusOff => words!("{bus} is bus-off: too many of its frames had errors", bus = bus()),
+        Fault::BusDown => words!("the interface of {bus} is down, or has gone", bus = bus()),
+        Fault::NotAtRest { velocity, limit } => words!(
+            "{axis} did not come to rest to be enabled: it moved at {velocity}/s (at rest: below {limit}/s)",
+            axis,
+            velocity = length(velocity),
+            limit = length(limit)
+        ),
+        Fault::EnableTimeout { limit, .. } => words!(
+            "the drive of {axis} did not reach operation enabled within {cycles} ({seconds} s)",
+            axis,
+            cycles = cycles(limit),
+            seconds = format!("{:.1}", f64::from(limit) * machine.cycle_ns as f64 * 1e-9)
         ),
         Fault::NoTrajectory if stop.axis().is_some() => {
-            format!("no trajectory within the limits of {axis} leads to its target")
+            words!("no trajectory within the limits of {axis} leads to its target", axis)
         }
-        Fault::NoTrajectory => "no trajectory within the limits leads to the target".to_owned(),
-        Fault::NotTransmitted { cycles: blocked, .. } => {
-            format!("set-points on {bus} were not transmitted for {}", cycles(blocked))
-        }
+        Fault::NoTrajectory => "no trajectory within the limits leads to the target".into(),
+        Fault::NotTransmitted { cycles: blocked, .. } => words!(
+            "set-points on {bus} were not transmitted for {cycles}",
+            bus = bus(),
+            cycles = cycles(blocked)
+        ),
     }
 }
 
-fn cycles(count: impl Into<u32>) -> String {
+fn asked_for(axis: &str, wanted: String, limit: String) -> Words {
+    words!("the set-point of {axis} asked for {wanted} (allowed: {limit})", axis, wanted, limit)
+}
+
+fn cycles(count: impl Into<u32>) -> Words {
     match count.into() {
-        1 => "1 cycle".to_owned(),
-        count => format!("{count} cycles"),
+        1 => "1 cycle".into(),
+        count => words!("{count} cycles", count),
     }
-}
-
-/// An error code of the drive that stopped the group.
-fn drive_error(stop: &StopReason, machine: &Machine, code: u16) -> String {
-    machine.drive_error(stop.axis().unwrap_or(u8::MAX), code)
 }
 
 /// What to do about the fault of a stop: the cure of the drive's error where it is known. `None` for a stop that was asked for.
@@ -249,12 +279,12 @@ pub fn stop_cure(stop: &StopReason, machine: &Machine) -> Option<&'static str> {
 }
 
 /// The full text of a stop: cause, phase, category, and the cure of a fault.
-pub fn stop(stop: &StopReason, machine: &Machine) -> String {
-    let text =
-        format!("{} while {}; {}", stop_cause(stop, machine), phase(stop.phase), category(stop.category));
-    match stop_cure(stop, machine) {
-        Some(cure) => format!("{text}; try: {cure}"),
-        None => text,
+pub fn stop(stop: &StopReason, machine: &Machine) -> Words {
+    let (cause, phase) = (stop_cause(stop, machine), Words::from(phase(stop.phase)));
+    let category = Words::from(category(stop.category));
+    match stop_cure(stop, machine).map(Words::from) {
+        Some(cure) => words!("{cause} while {phase}; {category}; try: {cure}", cause, phase, category, cure),
+        None => words!("{cause} while {phase}; {category}", cause, phase, category),
     }
 }
 
@@ -509,21 +539,23 @@ mod tests {
             ),
         ];
         for (rule, origin, value, limit, words) in cases {
-            assert_eq!(stop_cause(&reason(rule, origin, value, limit), &machine()), words);
+            assert_eq!(stop_cause(&reason(rule, origin, value, limit), &machine()).to_string(), words);
         }
     }
 
     #[test]
     fn the_text_of_a_stop_has_cause_phase_and_category() {
         assert_eq!(
-            stop(&reason(Rule::Requested, Origin::Group, 0.0, 0.0), &machine()),
+            stop(&reason(Rule::Requested, Origin::Group, 0.0, 0.0), &machine()).to_string(),
             "a stop was requested while moving; category 1: decelerate, then remove power"
         );
     }
 
     #[test]
     fn the_text_of_a_stop_for_a_drive_fault_ends_with_its_cure() {
-        let text = |code: u16| stop(&reason(Rule::DriveFault, Origin::Axis(0), code.into(), 0.0), &machine());
+        let text = |code: u16| {
+            stop(&reason(Rule::DriveFault, Origin::Axis(0), code.into(), 0.0), &machine()).to_string()
+        };
         assert!(text(0x730F).ends_with("the joint's zero must be set again"), "{}", text(0x730F));
         assert!(text(0x8611).contains("; try: look for a blocked or overloaded joint"), "{}", text(0x8611));
         assert!(text(0).contains("; try: `takt drive … info` reads"), "{}", text(0));
@@ -532,7 +564,7 @@ mod tests {
     #[test]
     fn the_text_of_a_stop_for_a_drive_with_torque_that_it_should_not_have_ends_with_what_to_do() {
         for rule in [Rule::NotDisabled, Rule::DriveEnabled, Rule::DriveLocal] {
-            let text = stop(&reason(rule, Origin::Axis(0), 4.0, 0.0), &machine());
+            let text = stop(&reason(rule, Origin::Axis(0), 4.0, 0.0), &machine()).to_string();
             assert!(text.contains("; try: keep away from the joint"), "{text}");
         }
     }
@@ -541,7 +573,9 @@ mod tests {
     fn for_a_drive_that_plans_its_own_profile_the_measured_motion_is_named_and_no_set_point() {
         let mut machine = machine();
         machine.axes[1].plans_own_profile = true;
-        let text = |rule, value, limit| stop_cause(&reason(rule, Origin::Axis(1), value, limit), &machine);
+        let text = |rule, value, limit| {
+            stop_cause(&reason(rule, Origin::Axis(1), value, limit), &machine).to_string()
+        };
         assert_eq!(
             text(Rule::PositionLimit, 1.25, 1.0),
             "slide would come to rest at 1.2500 m, outside its position limit of 1.0000 m"
@@ -554,7 +588,8 @@ mod tests {
 
     #[test]
     fn no_two_rules_share_a_key_or_a_cause() {
-        let causes = Rule::ALL.map(|rule| stop_cause(&reason(rule, Origin::Axis(0), 1.0, 8.0), &machine()));
+        let causes = Rule::ALL
+            .map(|rule| stop_cause(&reason(rule, Origin::Axis(0), 1.0, 8.0), &machine()).to_string());
         let keys = Rule::ALL.map(rule_key);
         for (index, rule) in Rule::ALL.into_iter().enumerate() {
             assert!(!causes[..index].contains(&causes[index]), "{rule:?}");

@@ -197,6 +197,7 @@ fn a_drive_without_a_rated_torque_cannot_be_commanded_in_torque() {
     world.drive().set(0x6076, 0, &[0; 4]);
     let facts = world.run(&mut BringUp::new(&config)).unwrap();
     assert_eq!(facts[0].rated_torque, None, "in position it does not matter");
+    config.axes[0].joint.rated_torque = None;
     config.axes[0].control = Control::Torque {
         stiffness: 1.0,
         damping: 1.0,

@@ -118,7 +118,16 @@ fn the_facts_are_read_from_the_drive_and_converted_to_si_units() {
     assert_eq!(facts.texts.device_name.as_deref(), Some("eRob80H120I-BM-18CN"));
     assert_eq!((facts.supported_modes, facts.statusword), (909, 0x12C0));
     assert_eq!((facts.fault(), facts.restarts), (None, 0));
-    let absent = [(0x1009, 0), (0x100A, 0), (0x6072, 0), (0x605A, 0), (0x607D, 1), (0x607D, 2), (0x6080, 0)];
+    let absent = [
+        (0x1009, 0),
+        (0x100A, 0),
+        (0x6072, 0),
+        (0x605A, 0),
+        (0x607D, 1),
+        (0x607D, 2),
+        (0x6080, 0),
+        (0x6007, 0),
+    ];
     assert_eq!(facts.absent, absent.map(|(index, subindex)| at(index, subindex)));
 }
 

@@ -2,7 +2,7 @@
 
 use takt::Outcome;
 use takt::config::Config;
-use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::cia402::{Cia402Drive, Cia402Parameters};
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_rt::{DriveState, Phase, ProfileMove, ProfileTarget, Request, RequestId, Rule, StopCategory};
 
@@ -10,11 +10,10 @@ use crate::drive_modes::wire::word;
 use crate::drive_modes::world::{World, load};
 
 /// One eRob that differs from what the configuration says of it.
-fn erob_with(config: Config, change: impl Fn(&mut ErobParameters)) -> (Config, Vec<SimulatedBus>) {
-    let mut parameters =
-        takt::family::erob_canopen::simulated_parameters(&config.axes[0], &config.simulation);
+fn erob_with(config: Config, change: impl Fn(&mut Cia402Parameters)) -> (Config, Vec<SimulatedBus>) {
+    let mut parameters = takt::family::cia402::simulated_parameters(&config.axes[0], &config);
     change(&mut parameters);
-    let drive: Box<dyn Drive> = Box::new(ErobJoint::new(parameters));
+    let drive: Box<dyn Drive> = Box::new(Cia402Drive::new(parameters).unwrap());
     let rates = WireBitRates { nominal: 1_000_000, data: None };
     let bus = SimulatedBus::with_drives(rates, config.simulation.longest_gap_ns, vec![drive]);
     (config, vec![bus])
@@ -28,7 +27,7 @@ fn last_torque(world: &mut World) -> i16 {
 fn torque_is_converted_by_the_rated_torque_that_the_drive_reports() {
     let config = load("erob-modes/erob-pt.toml");
     let configured = config.axes[0].rated_torque();
-    let (config, buses) = erob_with(config, |parameters| parameters.rated_torque = 2.0 * configured);
+    let (config, buses) = erob_with(config, |parameters| parameters.axes[0].rated_torque = 2.0 * configured);
     let mut world = World::holding_on(config, buses);
     world.drive_to(0, ProfileTarget::Torque(2.0));
     // The drive has a ramp of its own to the torque.
@@ -123,8 +122,8 @@ fn a_stop_of_category_2_in_motion_becomes_one_of_category_1() {
 /// A joint that hardly anything slows: at 20 deg/s it coasts for radians.
 fn without_friction() -> World {
     let (config, buses) = erob_with(load("erob-modes/erob-pt.toml"), |parameters| {
-        parameters.joint.viscous_friction = 0.01;
-        parameters.joint.coulomb_friction = 0.02;
+        parameters.axes[0].joint.viscous_friction = 0.01;
+        parameters.axes[0].joint.coulomb_friction = 0.02;
     });
     World::holding_on(config, buses)
 }
@@ -193,12 +192,12 @@ fn a_joint_that_a_load_pulls_away_while_the_group_holds_is_slowed_by_the_drive_b
 #[test]
 fn firmware_without_interpolated_position_is_named() {
     let config = load("erob-modes/erob-ip.toml");
-    let (config, buses) = erob_with(config, |parameters| parameters.has_interpolated_position = false);
+    let (config, buses) = erob_with(config, |parameters| parameters.quirks.undeclared_modes.clear());
     let mut world = World::on(config, buses);
     let outcome = world.run_to_the_end(|_| ());
     let Outcome::BringUpFailed(error) = outcome else { panic!("{outcome:?}") };
     let text = error.to_string();
-    for part in ["firmware", "interpolated position", "6502", "mode = \"csp\""] {
+    for part in ["firmware", "6061:00 (modes of operation display): expected 7", "6502", "mode = \"csp\""] {
         assert!(text.contains(part), "{part} is not in: {text}");
     }
 }

@@ -39,8 +39,8 @@ const OF_THE_TABLE: [(&str, Rule, f64); 17] = [
     ("kind = \"corrupt\"\ndirection = \"received\"\npart = \"identifier\"", Rule::MissedFeedback, MISSED_MS),
     ("kind = \"silent-node\"", Rule::MissedFeedback, MISSED_MS),
     ("kind = \"stuck-sdo\"", Rule::MissedFeedback, MISSED_MS),
-    // It answers again before a round is over, without torque.
-    ("kind = \"reboot\"", Rule::DriveDisabled, 60.0),
+    // It answers again before a round is over, without torque. A request that is lost costs a reply timeout.
+    ("kind = \"reboot\"", Rule::DriveDisabled, 110.0),
     ("kind = \"torque-off\"", Rule::DriveDisabled, 100.0),
     ("kind = \"stall\"", Rule::FollowingError, 500.0),
     ("kind = \"encoder-jump\"\nby = \"40 deg\"", Rule::ImplausibleFeedback, 60.0),

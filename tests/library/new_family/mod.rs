@@ -48,6 +48,6 @@ fn a_second_family_of_the_same_name_is_refused() {
 #[test]
 fn its_error_codes_have_its_own_words_and_cures() {
     register();
-    assert_eq!(family::error_words(Some("belt-servo"), 0xFF01), "0xFF01 (belt torn)");
+    assert_eq!(family::error_words(Some("belt-servo"), 0xFF01).to_string(), "0xFF01 (belt torn)");
     assert!(family::error_cure(Some("belt-servo"), 0xFF01).contains("new belt"));
 }

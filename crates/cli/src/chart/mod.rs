@@ -3,11 +3,11 @@
 mod palette;
 mod ticks;
 
-use std::fmt::Write as _;
-
 pub use palette::{COLOURS, SHADED_WORDS};
 use palette::{FILE, PAGE, Palette};
 pub use ticks::ticks;
+
+use crate::svg::{Svg, escaped};
 
 /// The widths of a file, and of a chart on a page, where the letters are larger on a small screen.
 const FILE_WIDTH: f64 = 900.0;
@@ -78,25 +78,16 @@ impl Chart {
         let title = title_lines(&self.title);
         let top = if title.is_empty() { 0.0 } else { GAP + TITLE_LINE * (title.len() - 1) as f64 };
         let height = top + self.panels.len() as f64 * (PANEL + GAP) + 0.5 * GAP;
-        let mut svg = format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" \
-             font-size=\"12\" fill=\"{}\">\n",
-            palette.words
-        );
-        // Writing to a string cannot fail.
-        if let Some(background) = palette.background {
-            let _ = writeln!(svg, "<rect width=\"{width}\" height=\"{height}\" fill=\"{background}\"/>");
-        }
+        let mut svg = Svg::new((width, height), palette.words, palette.background);
         for (number, line) in title.iter().enumerate() {
             let y = 24.0 + TITLE_LINE * number as f64;
-            let _ = writeln!(svg, "<text x=\"20\" y=\"{y}\" font-size=\"14\">{}</text>", escaped(line));
+            svg.text((20.0, y), "start", "font-size=\"14\"", line);
         }
         for (index, panel) in self.panels.iter().enumerate() {
             let top = top + GAP * 0.75 + index as f64 * (PANEL + GAP);
             Drawing { chart: self, panel, palette, top, right: width - RIGHT_MARGIN }.draw(&mut svg);
         }
-        svg.push_str("</svg>\n");
-        svg
+        svg.into_text()
     }
 }
 
@@ -143,95 +134,62 @@ impl Drawing<'_> {
         Scale { low, high, top: self.top }
     }
 
-    fn draw(&self, svg: &mut String) {
-        let Self { panel, palette, top, right, .. } = self;
+    fn draw(&self, svg: &mut Svg) {
+        let Self { chart, panel, palette, top, right } = *self;
         let (scale, bottom) = (self.scale(), top + PANEL);
         for (from, to) in &panel.shaded {
             // A single cycle is visible, too.
             let (x, width) = (self.x(*from), (self.x(*to) - self.x(*from)).max(1.0));
-            // Writing to a string cannot fail.
-            let _ = writeln!(
-                svg,
-                "<rect x=\"{x:.2}\" y=\"{top}\" width=\"{width:.2}\" height=\"{PANEL}\" fill=\"{}\"/>",
-                palette.shade
-            );
+            svg.rect((x, top), (width, PANEL), format_args!("fill=\"{}\"", palette.shade));
         }
         self.draw_values(svg, scale);
         self.draw_times(svg);
-        let _ = writeln!(
-            svg,
-            "<path d=\"M{LEFT} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"{}\"/>\
-             <text x=\"{LEFT}\" y=\"{}\">{}</text>",
-            palette.frame,
-            top - 6.0,
-            escaped(&panel.name),
-        );
+        for end in [(LEFT, top), (right, bottom)] {
+            svg.line((LEFT, bottom), end, format_args!("stroke=\"{}\"", palette.frame));
+        }
+        svg.text((LEFT, top - 6.0), "start", "", &panel.name);
         self.draw_legend(svg);
-        if let Some(mark_s) = self.chart.mark_s {
+        if let Some(mark_s) = chart.mark_s {
             let x = self.x(mark_s);
-            let _ = writeln!(svg, "<path d=\"M{x:.2} {top}V{bottom}\" stroke=\"{}\"/>", palette.mark);
+            svg.line((x, top), (x, bottom), format_args!("stroke=\"{}\"", palette.mark));
         }
         for (limit, colour) in panel.limits.iter().filter(|(limit, _)| limit.is_finite()) {
-            let _ = writeln!(
-                svg,
-                "<path d=\"M{LEFT} {:.2}H{right}\" stroke=\"{}\" stroke-dasharray=\"4 4\" opacity=\"0.5\"/>",
-                scale.y(*limit),
-                palette.of(colour)
-            );
+            let (y, colour) = (scale.y(*limit), palette.of(colour));
+            let dashed = format_args!("stroke=\"{colour}\" stroke-dasharray=\"4 4\" opacity=\"0.5\"");
+            svg.line((LEFT, y), (right, y), dashed);
         }
         panel.curves.iter().for_each(|curve| self.draw_curve(svg, curve, scale));
     }
 
-    fn draw_values(&self, svg: &mut String, scale: Scale) {
+    fn draw_values(&self, svg: &mut Svg, scale: Scale) {
         for tick in ticks(scale.low, scale.high, VALUES) {
-            let (y, x) = (scale.y(tick.value), LEFT - 6.0);
-            let _ = writeln!(
-                svg,
-                "<path d=\"M{LEFT} {y:.2}H{}\" stroke=\"{}\"/>\
-                 <text x=\"{x}\" y=\"{:.2}\" text-anchor=\"end\">{}</text>",
-                self.right,
-                self.palette.grid,
-                y + 4.0,
-                tick.label
-            );
+            let y = scale.y(tick.value);
+            svg.line((LEFT, y), (self.right, y), format_args!("stroke=\"{}\"", self.palette.grid));
+            svg.text((LEFT - 6.0, y + 4.0), "end", "", &tick.label);
         }
     }
 
-    fn draw_times(&self, svg: &mut String) {
+    fn draw_times(&self, svg: &mut Svg) {
         let (bottom, (from, to)) = (self.top + PANEL, self.chart.span_s);
         for tick in ticks(from, to, ((self.right - LEFT) / TIME_ROOM) as usize) {
             let x = self.x(tick.value);
-            let _ = writeln!(
-                svg,
-                "<path d=\"M{x:.2} {}V{bottom}\" stroke=\"{}\"/>\
-                 <text x=\"{x:.2}\" y=\"{}\" text-anchor=\"middle\">{} s</text>",
-                self.top,
-                self.palette.grid,
-                bottom + 15.0,
-                tick.label
-            );
+            svg.line((x, self.top), (x, bottom), format_args!("stroke=\"{}\"", self.palette.grid));
+            svg.text((x, bottom + 15.0), "middle", "", format_args!("{} s", tick.label));
         }
     }
 
-    fn draw_curve(&self, svg: &mut String, Curve { colour, points }: &Curve, scale: Scale) {
+    fn draw_curve(&self, svg: &mut Svg, Curve { colour, points }: &Curve, scale: Scale) {
         let colour = self.palette.of(colour);
         // Points without a value between them are one line.
         let lines = points.split(|(_, value)| !value.is_finite()).filter(|line| !line.is_empty());
         for line in lines {
-            let points: String = line.iter().fold(String::new(), |mut points, (time_s, value)| {
-                let _ = write!(points, "{:.1},{:.1} ", self.x(*time_s), scale.y(*value));
-                points
-            });
-            let _ = writeln!(
-                svg,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"/>",
-                points.trim_end()
-            );
+            let points = line.iter().map(|(time_s, value)| (self.x(*time_s), scale.y(*value)));
+            svg.polyline(points, format_args!("stroke=\"{colour}\" stroke-width=\"1.5\""));
         }
     }
 
     /// The names at the right, so that the heading keeps its place.
-    fn draw_legend(&self, svg: &mut String) {
+    fn draw_legend(&self, svg: &mut Svg) {
         let names = self.panel.legend.iter().filter(|(name, _)| !name.is_empty());
         let words: Vec<String> = names
             .map(|(name, colour)| {
@@ -239,9 +197,7 @@ impl Drawing<'_> {
             })
             .collect();
         if !words.is_empty() {
-            let (x, y) = (self.right, self.top - 6.0);
-            let words = words.join("&#160;&#160; ");
-            let _ = writeln!(svg, "<text x=\"{x}\" y=\"{y}\" text-anchor=\"end\">{words}</text>");
+            svg.markup((self.right, self.top - 6.0), "end", "", &words.join("&#160;&#160; "));
         }
     }
 }
@@ -259,11 +215,6 @@ fn title_lines(title: &str) -> Vec<String> {
     }
     lines.retain(|line| !line.is_empty());
     lines
-}
-
-/// Words as a part of a page or a drawing.
-pub fn escaped(words: &str) -> String {
-    words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

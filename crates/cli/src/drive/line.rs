@@ -11,7 +11,7 @@ use takt_tools::commission::{DriveTask, Failure, ProcedureError, Report, TargetD
 use super::super::exit::Exit;
 use super::super::interruption;
 use super::super::usage_error::UsageError;
-use super::Options;
+use super::options::Options;
 use super::output::Output;
 use super::target::Line;
 

@@ -5,6 +5,7 @@ mod inspection;
 mod keys;
 mod line;
 mod motion;
+mod options;
 mod output;
 mod pulse_width;
 mod session;
@@ -17,6 +18,7 @@ use takt_tools::commission::{Failure, TargetDrive, Task};
 
 use super::exit::Exit;
 use super::ownership::if_owned;
+use options::Options;
 use target::Place;
 
 pub use target::USUAL_LINE_RATE;
@@ -46,23 +48,6 @@ pub struct Arguments {
     take_over: bool,
     #[command(subcommand)]
     action: Action,
-}
-
-/// Options of every action.
-#[derive(Args, Clone, Copy, Debug)]
-struct Options {
-    /// Values are whole numbers in the drive's own units
-    #[arg(long, global = true)]
-    raw: bool,
-    /// Show every step and every frame with its meaning
-    #[arg(short, long, global = true)]
-    verbose: bool,
-    /// Print the result as one JSON object (watch: one for each reading)
-    #[arg(long, global = true)]
-    json: bool,
-    /// Run the time of a simulated bus as fast as possible
-    #[arg(long, global = true)]
-    fast: bool,
 }
 
 #[derive(Subcommand, Debug)]

@@ -16,7 +16,7 @@ use takt_tools::commission::{
 use super::super::columns::{columns, paragraph};
 use super::super::exit::Exit;
 use super::super::print;
-use super::Options;
+use super::options::Options;
 
 /// Bytes of an answer to a question.
 const LONGEST_ANSWER: u64 = 100;

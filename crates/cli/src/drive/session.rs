@@ -17,7 +17,7 @@ use super::super::exit::Exit;
 use super::super::interruption;
 use super::super::ownership;
 use super::super::usage_error::UsageError;
-use super::Options;
+use super::options::Options;
 use super::output::Output;
 
 /// Runs a task on a drive. The error is the end of the program: there was no bus to run it on.

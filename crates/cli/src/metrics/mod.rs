@@ -1,21 +1,18 @@
 //! `takt run --metrics`: what a run counts, for Prometheus.
 //!
-//! The logger's thread counts, the session's thread shows the state ten times a second, and a thread of its own answers. None of them is
-//! real-time, and an answer is made of a copy.
+//! The logger's thread counts, the session's thread shows the state ten times a second, and the thread of [`takt_panel::MetricsServer`]
+//! answers. None of them is real-time, and an answer is made of a copy.
 
-mod request;
-mod server;
 mod text;
 
 use std::collections::BTreeMap;
 use std::net::{SocketAddr, ToSocketAddrs};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use takt_rt::{
     BusState, CycleRecord, DriveState, Event, EventKind, Phase, Snapshot, StopCategory, TimingLevel,
 };
 
-pub use server::Server;
 use takt::telemetry::{BusReport, LoopTiming, Machine, Unit, words};
 use text::{Exposition, Kind, seconds};
 
@@ -65,15 +62,6 @@ impl Metrics {
             emergencies: BTreeMap::new(),
         };
         Self { machine, counts: Mutex::new(counts) }
-    }
-
-    /// Answers at an address until the server is dropped.
-    ///
-    /// # Errors
-    /// The address cannot be listened at.
-    pub fn serve(self: &Arc<Self>, address: SocketAddr) -> std::io::Result<(Server, SocketAddr)> {
-        let metrics = Arc::clone(self);
-        Server::start(address, move || metrics.text())
     }
 
     fn counts(&self) -> MutexGuard<'_, Counts> {

@@ -5,9 +5,8 @@ use std::str::FromStr;
 
 use clap::Args;
 
-use super::bit_rate;
 use crate::usage_error::UsageError;
-use takt::config::DriveFamily;
+use takt::config::{DriveFamily, Quantity};
 use takt::family;
 use takt::family::cia402::{self, Device};
 use takt_tools::monitor::NamedDrive;
@@ -27,6 +26,12 @@ pub struct DriveOptions {
     /// The bit rate of the data phase of CAN FD without a configuration
     #[arg(long, value_name = "RATE", value_parser = bit_rate)]
     pub data_bit_rate: Option<u32>,
+}
+
+/// A bit rate of an interface.
+pub fn bit_rate(text: &str) -> Result<u32, String> {
+    let rate = Quantity::BIT_RATE.parse(text).ok().filter(|rate| (10_000.0..=8_000_000.0).contains(rate));
+    rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 8 Mbit/s".to_owned())
 }
 
 /// Something of one node, or of all the others.

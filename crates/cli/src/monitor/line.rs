@@ -1,10 +1,10 @@
 //! A frame in one line, for people and for programs.
 
+use clap::ValueEnum;
 use serde_json::json;
 use takt_rt::{Frame, FrameKind, Nanoseconds};
 use takt_wire::bus_log::Direction;
 
-use super::TimeStyle;
 use crate::columns::columns;
 use crate::print;
 use takt::telemetry::{Emphasis, WallClock};
@@ -80,6 +80,17 @@ impl Line<'_> {
         text.push_str(&object.to_string());
         text.push('\n');
     }
+}
+
+/// What the time of a frame is counted from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TimeStyle {
+    /// The first frame
+    Start,
+    /// The frame before it
+    Delta,
+    /// The time of day (UTC)
+    Clock,
 }
 
 /// How lines look.

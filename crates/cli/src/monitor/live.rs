@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusPort, BusState, Clock, Frame, Nanoseconds, ReceiveBatch};
 
-use super::DriveOptions;
+use super::drives::DriveOptions;
 use super::session::Session;
 use crate::ownership;
 use crate::usage_error::UsageError;

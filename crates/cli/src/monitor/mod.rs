@@ -13,18 +13,19 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use takt_wire::bus_log::{LogFormat, LogWriter};
 
-use takt::config::{Config, Quantity};
+use takt::config::Config;
 use takt_tools::monitor::{FrameFilter, IdFilter, ServiceKind};
 
 use super::configuration;
 use super::exit::Exit;
 use super::interruption;
 use super::usage_error::UsageError;
-pub use drives::DriveOptions;
-pub use line::{Line, LineStyle};
+use drives::DriveOptions;
+pub use drives::bit_rate;
+pub use line::{Line, LineStyle, TimeStyle};
 use session::{Session, SessionOptions};
 
 /// Show every frame of a bus with its meaning, live or from a file
@@ -87,23 +88,6 @@ struct Filter {
 
 fn id_filter(text: &str) -> Result<IdFilter, String> {
     text.parse().map_err(|error: takt_tools::monitor::IdFilterError| error.to_string())
-}
-
-/// What the time of a frame is counted from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum TimeStyle {
-    /// The first frame
-    Start,
-    /// The frame before it
-    Delta,
-    /// The time of day (UTC)
-    Clock,
-}
-
-/// A bit rate of an interface.
-pub fn bit_rate(text: &str) -> Result<u32, String> {
-    let rate = Quantity::BIT_RATE.parse(text).ok().filter(|rate| (10_000.0..=8_000_000.0).contains(rate));
-    rate.map(|rate| rate as u32).ok_or_else(|| "write it as \"500 kbit/s\", at most 8 Mbit/s".to_owned())
 }
 
 /// What is watched.

@@ -9,8 +9,7 @@ use std::time::Duration;
 use takt_rt::{BusState, Frame, Nanoseconds};
 use takt_wire::bus_log::{Direction, LogWriter, LoggedFrame};
 
-use super::TimeStyle;
-use super::line::{Line, LineStyle};
+use super::line::{Line, LineStyle, TimeStyle};
 use super::statistics;
 use super::watched_bus::WatchedBus;
 use crate::exit::Exit;

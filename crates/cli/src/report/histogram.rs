@@ -1,8 +1,8 @@
 //! The distribution of a time as a drawing on a page: six bars in each decade, with logarithmic heights.
 
-use std::fmt::Write as _;
-
 use takt::telemetry::LatencyReport;
+
+use crate::svg::Svg;
 
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 220.0;
@@ -27,46 +27,31 @@ pub fn draw(latency: &LatencyReport) -> Option<String> {
     let x = |range: f64| LEFT + (RIGHT - LEFT) * range / ranges as f64;
     // A single cycle is visible, too: it is half a decade above nothing.
     let y = |count: f64| BOTTOM - (BOTTOM - TOP) * (count.log10() + 0.5) / (powers + 0.5);
-    let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\" \
-         fill=\"var(--words)\">\n"
-    );
-    // Writing to a string cannot fail.
+    let mut svg = Svg::new((WIDTH, HEIGHT), "var(--words)", None);
     for power in 0..=powers as i32 {
-        let _ = writeln!(
-            svg,
-            "<path d=\"M{LEFT} {0:.1}H{RIGHT}\" stroke=\"var(--grid)\"/><text x=\"{1}\" y=\"{2:.1}\" text-anchor=\"end\">{3}</text>",
-            y(10_f64.powi(power)),
-            LEFT - 6.0,
-            y(10_f64.powi(power)) + 4.0,
-            if power < 4 { 10_u64.pow(power as u32).to_string() } else { format!("1e{power}") },
-        );
+        let y = y(10_f64.powi(power));
+        let label = if power < 4 { 10_u64.pow(power as u32).to_string() } else { format!("1e{power}") };
+        svg.line((LEFT, y), (RIGHT, y), format_args!("stroke=\"var(--grid)\""));
+        svg.text((LEFT - 6.0, y + 4.0), "end", "", label);
     }
     let shown = counts.iter().skip(first * RANGES_PER_DECADE).take(ranges);
     for (range, count) in shown.enumerate().filter(|(_, count)| **count > 0) {
         let (left, right, top) = (x(range as f64) + 1.0, x(range as f64 + 1.0) - 1.0, y(*count as f64));
-        let _ = writeln!(
-            svg,
-            "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"var(--c0)\"><title>{count}</title></rect>",
-            right - left,
-            BOTTOM - top
-        );
+        svg.element(format_args!("<g><title>{count}</title>"));
+        svg.rect((left, top), (right - left, BOTTOM - top), format_args!("fill=\"var(--c0)\""));
+        svg.element(format_args!("</g>"));
     }
-    let _ =
-        writeln!(svg, "<path d=\"M{LEFT} {TOP}V{BOTTOM}H{RIGHT}\" fill=\"none\" stroke=\"var(--frame)\"/>");
+    for end in [(LEFT, TOP), (RIGHT, BOTTOM)] {
+        svg.line((LEFT, BOTTOM), end, format_args!("stroke=\"var(--frame)\""));
+    }
     for (number, decade) in DECADES.iter().enumerate().skip(first).take(last - first + 2) {
         let (x, anchor) = match number - first {
             count if count > last - first => (RIGHT, "end"),
             count => (x((count * RANGES_PER_DECADE) as f64), "middle"),
         };
-        let _ = writeln!(
-            svg,
-            "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"{anchor}\">{decade}</text>",
-            BOTTOM + 18.0
-        );
+        svg.text((x, BOTTOM + 18.0), anchor, "", decade);
     }
-    svg.push_str("</svg>\n");
-    Some(svg)
+    Some(svg.into_text())
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! `takt report`: evaluates a recording or a black box.
 
+mod charts;
 mod curves;
 mod histogram;
 mod page;
-mod svg;
 mod timeline;
 
 use std::fs;
@@ -69,7 +69,7 @@ fn tell(arguments: &Arguments) -> Result<Exit, UsageError> {
     }
     if let Some(path) = &arguments.svg {
         let is_whole = arguments.from.is_some() || arguments.to.is_some();
-        let drawing = svg::render(&recorded, axis, is_whole).map_err(words)?;
+        let drawing = charts::render(&recorded, axis, is_whole).map_err(words)?;
         is_written &= write(path, drawing.as_bytes());
     }
     let exit = if is_written { Exit::Done } else { Exit::Stopped };

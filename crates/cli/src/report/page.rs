@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 
 use takt_rt::Rule;
 
+use super::charts::{axis_panels, load_panel, timing_panel};
 use super::curves::Curves;
 use super::histogram;
-use super::svg::{axis_panels, load_panel, timing_panel};
 use super::timeline::{self, severity_word};
-use crate::chart::{Chart, Panel, escaped};
+use crate::chart::{Chart, Panel};
+use crate::svg::escaped;
 use takt::telemetry::missed_slots::counted_once;
 use takt::telemetry::words::rule_key;
 use takt::telemetry::{

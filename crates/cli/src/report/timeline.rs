@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use takt_rt::Phase;
 
 use super::curves::Curves;
-use crate::chart::{escaped, ticks};
+use crate::chart::ticks;
+use crate::svg::escaped;
 use takt::telemetry::{Recorded, RecordedEvent, Severity, phase_words};
 
 /// Events that lie closer together than this part of the line are one mark, that of the most serious one.

@@ -16,7 +16,7 @@ use takt::controller::{Controller, StartFailure};
 use takt::faults::{FaultInjector, Scenario, ScenarioError, ScenarioFault};
 use takt::schedule;
 use takt::telemetry::{EachCycle, Machine, Notice, RecordingDestination, RecordingOptions};
-use takt_panel::{FrameSource, Listening, PanelError};
+use takt_panel::{FrameSource, Listening, MetricsServer, PanelError};
 use takt_remote::{Claim, ServeError, ServeOptions};
 use takt_rt::Snapshot;
 use takt_tools::monitor::BusDecoder;
@@ -149,10 +149,11 @@ fn run_or_refuse(arguments: Arguments) -> Result<Exit, UsageError> {
 }
 
 /// Begins to answer scrapers.
-fn answer_at((address, metrics): (SocketAddr, &Arc<Metrics>)) -> Result<metrics::Server, UsageError> {
-    let (server, bound) = metrics
-        .serve(address)
+fn answer_at((address, metrics): (SocketAddr, &Arc<Metrics>)) -> Result<MetricsServer, UsageError> {
+    let metrics = Arc::clone(metrics);
+    let server = MetricsServer::begin(address, move || metrics.text())
         .map_err(|error| format!("the metrics cannot be served at {address}: {error}"))?;
+    let bound = server.address();
     if !bound.ip().is_loopback() {
         say!("takt: whoever reaches {bound} can read the metrics");
     }

@@ -129,7 +129,7 @@ fn drive_errors(session: &Session) -> Vec<DriveError> {
     let errors = errors.filter(|(axis, code)| !is_told(*axis, *code));
     let error = |(axis, code)| DriveError {
         axis: machine.axis_name(axis),
-        error: machine.drive_error(axis, code),
+        error: machine.drive_error(axis, code).to_string(),
         cure: machine.drive_cure(axis, code),
     };
     errors.map(error).collect()

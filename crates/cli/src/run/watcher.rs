@@ -168,7 +168,9 @@ pub(super) fn notices(
         }
         let text = match notice {
             Notice::NotWritten(text) => format!("takt: {text}"),
-            Notice::Event(event) if is_urgent(event, has_duration) => words::event(event, &machine),
+            Notice::Event(event) if is_urgent(event, has_duration) => {
+                words::event(event, &machine).to_string()
+            }
             _ => return,
         };
         bar.suspend(|| say!("{text}"));

@@ -3,8 +3,8 @@
 use takt_rt::linux::MonotonicClock;
 use takt_rt::{BusHealth, BusPort, Frame, Nanoseconds, ReceiveBatch};
 
+use super::interruption::Interruption;
 use super::output::Watcher;
-use super::{Interruption, place};
 use takt::command::CommandError;
 use takt::family;
 use takt::family::scan::{Answered, BusScan, FoundDevice, PlaceOfScan, Scanned};
@@ -80,7 +80,8 @@ impl Owner {
         self.name_drives(drives, &mut found);
         let bus = self.client.machine().buses.get(self.bus);
         let bit_rate = bus.and_then(|bus| bus.bit_rate).unwrap_or(1_000_000);
-        (place(interface, bit_rate, bus.and_then(|bus| bus.data_bit_rate)), found)
+        let data_bit_rate = bus.and_then(|bus| bus.data_bit_rate);
+        (PlaceOfScan { interface: interface.to_string(), bit_rate, data_bit_rate }, found)
     }
 
     /// The drives of the controller on this bus. Two axes of one node are one.

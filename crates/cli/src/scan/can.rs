@@ -6,8 +6,10 @@ use takt_rt::linux::MonotonicClock;
 
 use super::super::ownership;
 use super::super::usage_error::UsageError;
+use super::arguments::Arguments;
+use super::beside;
+use super::interruption::Interruption;
 use super::output::Watcher;
-use super::{Arguments, Interruption, beside, place};
 use takt::family::scan::{BusScan, PlaceOfScan, Scanned};
 use takt::link::ownership::{BusClaim, ClaimError, IfOwned, MasterTraffic, Ownership, Role};
 use takt::link::{InterfaceSettings, RealInterface, SocketCanOptions, open_interface, open_to_listen};
@@ -78,7 +80,7 @@ pub fn scan(
         &mut is_interrupted,
         &mut |at_ns, event| watcher.see(at_ns, &event),
     );
-    Ok((place(interface, bit_rate, data_bit_rate), found))
+    Ok((PlaceOfScan { interface: name, bit_rate, data_bit_rate }, found))
 }
 
 /// The controller that has the interface and sends the questions.

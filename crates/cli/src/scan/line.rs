@@ -3,8 +3,9 @@
 use std::cell::Cell;
 
 use super::super::usage_error::UsageError;
+use super::arguments::Arguments;
+use super::interruption::Interruption;
 use super::output::Watcher;
-use super::{Arguments, Interruption, place};
 use takt::config::SerialDevice;
 use takt::family::scan::{LineScan, PlaceOfScan, Scanned, scan_line};
 use takt::link::RealInterface;
@@ -59,5 +60,6 @@ pub fn scan(
     }
     let rate = first_rate.or(rates.first().copied()).unwrap_or(USUAL_RATE);
     let named = SerialDevice { device: device.device.clone(), bit_rate: None };
-    Ok((place(&RealInterface::Serial(named), rate, None), all))
+    let interface = RealInterface::Serial(named).to_string();
+    Ok((PlaceOfScan { interface, bit_rate: rate, data_bit_rate: None }, all))
 }

@@ -139,7 +139,7 @@ fn of_silence(bus: &str) -> &'static str {
 fn by_protocol(devices: &[FoundDevice]) -> String {
     let mut counts = BTreeMap::new();
     for device in devices {
-        *counts.entry(device.answered.words()).or_insert(0) += 1;
+        *counts.entry(device.answered.words().to_string()).or_insert(0) += 1;
     }
     if counts.len() < 2 {
         return String::new();
@@ -167,7 +167,7 @@ fn table(devices: &[FoundDevice]) -> String {
             shown(&device.product),
             shown(&device.firmware),
             shown(&device.serial),
-            device.answered.words(),
+            device.answered.words().to_string(),
             device.drive.map_or_else(dash, |drive| format!("\"{drive}\"")),
         ]);
     }
@@ -224,7 +224,7 @@ pub fn json(buses: &[ScannedBus], is_interrupted: bool) -> Value {
             "product": device.product,
             "firmware": device.firmware,
             "serial": device.serial,
-            "answered": device.answered.words(),
+            "answered": device.answered.words().to_string(),
             "identity": device.identity.map(|identity| json!({
                 "device_type": identity.device_type,
                 "vendor": identity.vendor,

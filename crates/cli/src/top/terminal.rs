@@ -22,8 +22,8 @@ use super::request::Request;
 use super::view::{self, Palette};
 use crate::exit::Exit;
 use crate::interruption;
-use takt::command::RunningController;
-use takt_remote::{Client, ClientEvents, connect, now_ns};
+use takt::command::Events;
+use takt_remote::{Client, connect, now_ns};
 
 /// From one picture to the next one, if no key comes.
 const FRAME: Duration = Duration::from_millis(50);
@@ -97,7 +97,8 @@ pub fn look(client: &Client) -> Seen {
 fn model_of(name: &str, client: &Client) -> Model {
     let machine = client.machine().clone();
     let limits = (0..machine.axes.len()).map(|axis| client.limits(axis)).collect();
-    let groups = (0u8..).zip(&machine.groups).map(|(group, _)| client.axes_of(RequestTarget::Group(group)));
+    let groups =
+        (0u8..).zip(&machine.groups).map(|(group, _)| client.of(RequestTarget::Group(group)).axis_numbers());
     let groups = groups.collect();
     let seen = (look(client), now_ns());
     Model::new(name, machine, (limits, groups), std::process::id(), seen)
@@ -105,7 +106,7 @@ fn model_of(name: &str, client: &Client) -> Model {
 
 struct View {
     client: Client,
-    events: ClientEvents,
+    events: Events,
     model: Model,
     asker: Asker,
     retried: Instant,
@@ -179,8 +180,7 @@ impl View {
             match request {
                 Request::Quit => return false,
                 Request::Stop { target, category } => {
-                    let answer =
-                        self.client.request_stop(target, category).map_err(|error| error.to_string());
+                    let answer = self.client.of(target).stop(category).map_err(|error| error.to_string());
                     self.model.answered(now_ns(), &request, answer);
                 }
                 request => {
@@ -297,18 +297,18 @@ fn ask(client: &Client, request: &Request) -> Result<(), String> {
         return Err("the controller answers too slowly to be jogged".to_owned());
     }
     let result = match request {
-        Request::Stop { target, category } => client.request_stop(*target, *category),
+        Request::Stop { target, category } => client.of(*target).stop(*category),
         Request::TakeLease | Request::RenewLease => client.take_lease(),
         Request::TakeOver => client.take_over(),
         Request::Release => client.release(),
-        Request::Enable(target) => client.begin_enable(*target),
-        Request::Disable(target) => client.begin_disable(*target),
-        Request::ClearFaults(target) => client.clear_faults(*target),
-        Request::BeginStream(target) => client.begin_streaming(*target),
+        Request::Enable(target) => client.of(*target).enable(),
+        Request::Disable(target) => client.of(*target).disable(),
+        Request::ClearFaults(target) => client.of(*target).reset_faults(),
+        Request::BeginStream(target) => client.of(*target).begin_stream(),
         Request::Velocities { target, at_ns, velocities } => {
             let axes: Vec<AxisPoint> =
                 velocities.iter().map(|velocity| AxisPoint::Velocity(*velocity)).collect();
-            return client.push_point(*target, *at_ns, &axes).map_err(|error| error.to_string());
+            return client.of(*target).stream().push(*at_ns, &axes).map_err(|error| error.to_string());
         }
         Request::ProfileVelocity { axis, velocity, valid_for, .. } => {
             client.velocity(*axis, *velocity, *valid_for).map(|_| ())

@@ -12,8 +12,8 @@ use super::jog::Jog;
 use super::model::{Key, Model, SILENT, Seen};
 use super::request::Request;
 use super::view::{self, Palette};
+use takt::command::Events;
 use takt::command::LeaseHolder;
-use takt::command::{EventSource, RunningController};
 use takt::config::Config;
 use takt::controller::VirtualController;
 
@@ -26,7 +26,7 @@ const LOOK_MS: u64 = 10;
 
 struct Bench {
     arm: VirtualController,
-    events: Box<dyn EventSource>,
+    events: Events,
     model: Model,
     lease: Option<LeaseHolder>,
     silent_for: Duration,
@@ -50,16 +50,17 @@ impl Bench {
     fn new(config: &str) -> Self {
         let config = Config::load(&Path::new("../../configs").join(config)).unwrap();
         let arm = VirtualController::start(&config, None).unwrap();
-        let handle: &dyn RunningController = &arm.handle();
+        let handle = arm.handle();
         let machine = handle.machine().clone();
         let limits =
             (0..machine.axes.len()).map(|axis| handle.axis_properties(axis).map(|own| own.limits)).collect();
-        let groups =
-            (0u8..).zip(&machine.groups).map(|(group, _)| handle.axes_of(RequestTarget::Group(group)));
+        let groups = (0u8..)
+            .zip(&machine.groups)
+            .map(|(group, _)| handle.of(RequestTarget::Group(group)).axis_numbers());
         let groups = groups.collect();
         let now = (seen(&arm, None, Duration::ZERO), arm.handle().now_ns());
         let model = Model::new("arm", machine, (limits, groups), OWN, now);
-        let events = handle.event_source();
+        let events = handle.events();
         Self {
             arm,
             events,
@@ -88,7 +89,7 @@ impl Bench {
             }
             let arm = self.arm.handle();
             let answer = match &request {
-                Request::Stop { target, category } => arm.request_stop(*target, *category),
+                Request::Stop { target, category } => arm.of(*target).stop(*category),
                 Request::TakeLease | Request::TakeOver | Request::RenewLease => {
                     self.lease = held_by(OWN);
                     Ok(())
@@ -97,13 +98,13 @@ impl Bench {
                     self.lease = None;
                     Ok(())
                 }
-                Request::Enable(target) => arm.begin_enable(*target),
-                Request::Disable(target) => arm.begin_disable(*target),
-                Request::ClearFaults(target) => arm.clear_faults(*target),
-                Request::BeginStream(target) => arm.begin_streaming(*target),
+                Request::Enable(target) => arm.of(*target).enable(),
+                Request::Disable(target) => arm.of(*target).disable(),
+                Request::ClearFaults(target) => arm.of(*target).reset_faults(),
+                Request::BeginStream(target) => arm.of(*target).begin_stream(),
                 Request::Velocities { target, at_ns, velocities } => {
                     let axes: Vec<AxisPoint> = velocities.iter().map(|v| AxisPoint::Velocity(*v)).collect();
-                    arm.push_point(*target, *at_ns, &axes).unwrap();
+                    arm.of(*target).stream().push(*at_ns, &axes).unwrap();
                     Ok(())
                 }
                 Request::ProfileVelocity { axis, velocity, valid_for, .. } => {
@@ -344,7 +345,7 @@ fn a_group_is_jogged_and_commanded_apart_from_the_others() {
     let of_arm = |request: &Request| match request {
         Request::Velocities { target, velocities, .. } => {
             *target == RequestTarget::Group(0)
-                && velocities.len() == bench.arm.group("arm").unwrap().axes().len()
+                && velocities.len() == bench.arm.group("arm").unwrap().axis_numbers().len()
         }
         _ => true,
     };

@@ -90,7 +90,7 @@ fn people_get_tables_and_histograms_and_an_svg() {
     let svg = fs::read_to_string(path).unwrap();
     assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>\n"));
     // Two histograms with a curve for each kind of pacing.
-    assert_eq!(svg.matches("<path ").count(), 4);
+    assert_eq!(svg.matches("<polygon ").count(), 4);
 }
 
 #[test]

@@ -149,7 +149,7 @@ fn a_scan_lists_who_is_there_and_an_unknown_drive_can_be_added_by_its_family() {
     until(&page, "a scan that has found something", |state| state["version"] == 2);
     let machine = bench.machine();
     let found = &machine["drives"][0]["found"];
-    assert_eq!(found["protocol"]["en"], "CANopen SDO", "{machine}");
+    assert_eq!(found["protocol"]["text"], "CANopen SDO", "{machine}");
     assert_eq!(
         (found["vendor"].as_str(), found["product"].as_str()),
         (Some("ZeroErr"), Some("eRob")),
@@ -222,7 +222,7 @@ fn a_drive_of_each_other_protocol_is_enabled_moved_and_disabled() {
         let mut moved = task(&mut page, drive, &relative);
         // On a machine that is too busy a drive is not enabled in time.
         for _ in 0..5 {
-            if moved["failure"]["en"].as_str().is_some_and(|failure| failure.contains("timeout")) {
+            if english(&moved["failure"]).contains("timeout") {
                 moved = task(&mut page, drive, &relative);
             }
         }
@@ -343,10 +343,10 @@ fn a_frame_is_sent_and_shown_with_the_answer_but_not_while_a_drive_has_torque() 
     let before = requests();
     ask(&mut page, &send);
     let problem = page.next("problem");
-    assert!(problem["words"]["en"].as_str().unwrap().contains("has torque"), "{problem}");
+    assert!(english(&problem["words"]).contains("has torque"), "{problem}");
     assert_eq!(requests(), before);
     ask(&mut page, &json!({ "do": "send", "bus": 0, "frame": "181", "count": 1, "period_ms": 10 }));
-    assert!(page.next("problem")["words"]["en"].as_str().unwrap().contains('#'));
+    assert!(english(&page.next("problem")["words"]).contains('#'));
 }
 
 #[test]

@@ -387,10 +387,13 @@ fn a_trajectory_in_real_time_commands_what_it_commands_in_virtual_time() {
     let output = place.play(&["--trajectory", "--json", "--out", "real.csv"]);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
     let text = fs::read_to_string(place.path("real.csv")).unwrap();
-    let real: Vec<String> =
-        text.lines().skip(1).map(|line| line.split(',').nth(3).unwrap().to_owned()).collect();
-    let expected: Vec<String> = rows.iter().map(|row| row[3].to_string()).collect();
-    assert_eq!(real, expected);
+    let real = text.lines().skip(1).map(|line| line.split(',').nth(3).unwrap().parse().unwrap());
+    // A slot that is missed on a busy machine delays the motion, and the set-point before it may have two rows.
+    let without_repeats = |mut positions: Vec<f64>| {
+        positions.dedup();
+        positions
+    };
+    assert_eq!(without_repeats(real.collect()), without_repeats(rows.iter().map(|row| row[3]).collect()));
 }
 
 #[test]

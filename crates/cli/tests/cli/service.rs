@@ -145,7 +145,7 @@ fn a_scraper_gets_the_histograms_of_every_cycle_and_the_state_of_axes_and_buses(
         }
     };
     assert!(
-        text.starts_with("HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4; charset=utf-8\r\n")
+        text.starts_with("HTTP/1.1 200 OK\r\ncontent-type: text/plain; version=0.0.4; charset=utf-8\r\n")
     );
     for histogram in ["takt_wake_seconds", "takt_sync_release_seconds", "takt_compute_seconds"] {
         let all = value(&text, &format!("{histogram}_count"));

@@ -11,7 +11,7 @@ use takt::link::InterfaceError;
 use takt::link::interface::prepare_interface;
 use takt::link::socketcan::open_socketcan;
 use takt::link::{InterfaceSettings, SocketCanOptions, interface_status};
-use takt::{Controller, Outcome, Phase, Port, RunningController, SessionOptions, Snapshot};
+use takt::{Controller, Outcome, Phase, Port, SessionOptions, Snapshot};
 use takt_rt::linux::{MonotonicClock, SocketCanPort};
 use takt_rt::{BusPort, BusState, Clock, Frame, Id, Outgoing, ReceiveBatch, Received};
 
@@ -340,17 +340,18 @@ fn a_drive_recovers_and_moves_when_its_adapter_was_plugged_in_again() {
         let motion = arm.move_to(&[target]).unwrap();
         assert_eq!(arm.wait(motion, PATIENCE), Ok(()));
         let is_there = |state: &Snapshot| (state.axes()[0].position - target).abs() < 0.01;
-        arm.wait_until_seen(PATIENCE, &mut |state| is_there(state)).unwrap();
+        arm.wait_until(PATIENCE, |state| is_there(state).then_some(())).unwrap();
     };
     moves_to(0.2);
     drop((drive, bus));
-    arm.wait_until_seen(PATIENCE, &mut |state| state.groups()[0].phase == Phase::Disabled).unwrap();
+    arm.wait_until(PATIENCE, |state| (state.groups()[0].phase == Phase::Disabled).then_some(())).unwrap();
     assert_eq!(arm.state().buses()[0].state, BusState::Down);
     assert!(arm.fault().is_some());
 
     let bus = VirtualCan::new("takt-again");
     let _drive = Drive::on(&bus);
-    arm.wait_until_seen(PATIENCE, &mut |state| state.buses()[0].state == BusState::ErrorActive).unwrap();
+    arm.wait_until(PATIENCE, |state| (state.buses()[0].state == BusState::ErrorActive).then_some(()))
+        .unwrap();
     arm.recover(PATIENCE).unwrap();
     moves_to(0.4);
     assert_eq!(arm.finish().unwrap().outcome, Outcome::Finished);

@@ -4,6 +4,8 @@
 use serde::Deserialize;
 use takt_rt::Nanoseconds;
 
+use takt::words;
+use takt::words::Words;
 use takt_tools::commission::{CommandValue, Failure, MotionProfile, MoveKind, TargetDrive, Task, ValueText};
 
 /// The longest time that may be named, in seconds.
@@ -159,20 +161,28 @@ pub struct AskedProfile {
 
 impl Ask {
     /// What is wrong with its numbers, in words.
-    pub fn wrong(&self) -> Option<String> {
+    pub fn wrong(&self) -> Option<Words> {
         match self {
             Self::Scan { from, to, .. } => {
                 let is_right = (1..=127).contains(from) && (*from..=127).contains(to);
-                (!is_right).then(|| "node IDs are 1 to 127".to_owned())
+                (!is_right).then(|| "node IDs are 1 to 127".into())
             }
-            Self::Add { node, .. } => (!(1..=127).contains(node)).then(|| "node IDs are 1 to 127".to_owned()),
-            Self::Watch { every_ms, .. } => (!READING_MS.contains(every_ms))
-                .then(|| format!("readings come every {} to {} ms", READING_MS.start(), READING_MS.end())),
+            Self::Add { node, .. } => (!(1..=127).contains(node)).then(|| "node IDs are 1 to 127".into()),
+            Self::Watch { every_ms, .. } => {
+                let (shortest, longest) = (READING_MS.start(), READING_MS.end());
+                (!READING_MS.contains(every_ms))
+                    .then(|| words!("readings come every {shortest} to {longest} ms", shortest, longest))
+            }
             Self::Send { count, period_ms, .. } => {
                 let is_right = (1..=FRAMES_AT_MOST).contains(count) && FRAME_PERIOD_MS.contains(period_ms);
                 (!is_right).then(|| {
                     let (shortest, longest) = (FRAME_PERIOD_MS.start(), FRAME_PERIOD_MS.end());
-                    format!("a frame is sent 1 to {FRAMES_AT_MOST} times, every {shortest} to {longest} ms")
+                    words!(
+                        "a frame is sent 1 to {most} times, every {shortest} to {longest} ms",
+                        most = FRAMES_AT_MOST,
+                        shortest,
+                        longest
+                    )
                 })
             }
             Self::Task { .. } | Self::Renew {} | Self::End {} => None,

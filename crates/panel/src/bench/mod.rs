@@ -37,6 +37,7 @@ use super::page::{self, File};
 use super::pages::{Asked, PageNumber};
 use super::view::EventView;
 use asked::{Ask, AskedTask};
+use takt::words::Words;
 use told::Told;
 
 pub use worker::{BenchBus, BenchDrive, BenchLink, Worker, Workplace};
@@ -149,7 +150,7 @@ impl Bench {
         !self.gate.has_ended() && self.gate.pages().may_move(page, Instant::now())
     }
 
-    fn tell(&self, level: &'static str, words: String) {
+    fn tell(&self, level: &'static str, words: Words) {
         self.gate.tell(None, |number| message("event", &EventView::said(number, level, words)));
     }
 

@@ -4,10 +4,10 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use takt_rt::BusHealth;
 
-use super::super::chinese::Words;
 use super::super::pages::PageNumber;
 use super::super::view::{bus_state, rounded};
 use takt::family::scan::FoundDevice;
+use takt::words::Words;
 use takt_tools::commission::{AxisReading, Failure, ProcedureError, Report, ReportItem, TargetDrive};
 
 /// A drive as pages see it.
@@ -51,13 +51,13 @@ impl FoundView {
 
     pub fn of(found: &FoundDevice) -> Self {
         Self {
-            protocol: Words::of(found.answered.words()),
-            kind: Words::of(&*found.kind),
+            protocol: found.answered.words(),
+            kind: found.kind.clone().into(),
             vendor: found.vendor.clone(),
             product: found.product.clone(),
             firmware: found.firmware.clone(),
             serial: found.serial.clone(),
-            remarks: found.remarks.iter().map(|remark| Words::of(&**remark)).collect(),
+            remarks: found.remarks.iter().cloned().map(Words::from).collect(),
         }
     }
 }
@@ -216,19 +216,19 @@ pub fn outcome(
     let items: Vec<Value> = outcome.as_ref().map_or_else(
         |_| vec![],
         |report| {
-            let item = |item: &ReportItem| json!({ "key": item.key, "label": item.label, "text": Words::of(&*item.text) });
+            let item = |item: &ReportItem| json!({ "key": item.key, "label": item.label, "text": item.text });
             report.items().iter().map(item).collect()
         },
     );
-    let notes: Vec<Words> = notes.iter().map(|note| Words::of(&**note)).collect();
+    let notes: Vec<Words> = notes.iter().cloned().map(Words::from).collect();
     let consequence = match failed.map(|failed| &failed.failure) {
-        Some(Failure::NeedsConsent { consequence, .. }) => Some(Words::of(*consequence)),
+        Some(Failure::NeedsConsent { consequence, .. }) => Some(Words::from(*consequence)),
         _ => None,
     };
     json!({
         "drive": drive, "action": action, "ended": ended, "step": failed.map(|failed| failed.step),
-        "failure": failed.map(|failed| Words::of(failed.failure.to_string())),
-        "advice": failed.and_then(|failed| failed.failure.advice()).map(Words::of),
+        "failure": failed.map(|failed| failed.failure.words()),
+        "advice": failed.and_then(|failed| failed.failure.advice()).map(Words::from),
         "consequence": consequence, "items": items, "notes": notes,
     })
 }

@@ -1,7 +1,6 @@
 //! A controller of simulated drives, as a page sees and commands it.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
@@ -12,8 +11,9 @@ use super::breakage::Breakage;
 use crate::command::{Command, ProblemView, target_of};
 use crate::motions::{LOOK, Motions, Problem};
 use crate::view::{EventView, MachineView, Viewer};
+use takt::command::{AnyHandle, Events};
 use takt::config::{Config, ConfigSources};
-use takt::controller::{Events, VirtualController, assemble};
+use takt::controller::{VirtualController, assemble};
 use takt::telemetry::{
     BlackBox, Emphasis, FilesInMemory, Logger, LoggerOptions, Machine, Recorded, RecordingOptions,
     RecordingReport, WallClock,
@@ -103,7 +103,7 @@ impl SimulatedArm {
         let controller =
             VirtualController::start_logged(&config, logger).map_err(|error| format!("{error:?}"))?;
         Ok(Self {
-            motions: Motions::new(Arc::new(controller.handle())),
+            motions: Motions::new(controller.handle().into()),
             viewer: Viewer::default(),
             events: controller.events(),
             told: Told::default(),
@@ -115,9 +115,13 @@ impl SimulatedArm {
         })
     }
 
+    fn handle(&self) -> AnyHandle {
+        self.controller.handle().into()
+    }
+
     /// What does not change, as the panel tells it.
     pub fn machine(&self) -> String {
-        text(&MachineView::of(&self.controller.handle(), false))
+        text(&MachineView::of(&self.handle(), false))
     }
 
     /// The number and the name by which the page is greeted.
@@ -134,15 +138,16 @@ impl SimulatedArm {
             let left_ns = self.due_ns.saturating_sub(self.controller.now_ns());
             self.controller.pass(LOOK.min(Duration::from_nanos(left_ns)));
             let problems = std::cell::RefCell::new(String::new());
+            let machine = self.controller.machine();
             self.motions.look(|Problem { refusal, .. }| {
-                problems.borrow_mut().push_str(&message("problem", &refusal.view()));
+                problems.borrow_mut().push_str(&message("problem", &refusal.view(Some(machine))));
             });
             messages.push_str(&problems.into_inner());
         }
         // A command may have let time pass, too.
         self.due_ns = self.due_ns.max(self.controller.now_ns());
         messages.push_str(&self.news());
-        let state = self.viewer.view(&self.controller.handle(), Some(PAGE), 1, self.time_ms());
+        let state = self.viewer.view(&self.handle(), Some(PAGE), 1, self.time_ms());
         messages.push_str(&message("state", &state));
         messages
     }
@@ -154,7 +159,7 @@ impl SimulatedArm {
     pub fn command(&mut self, command: &str) -> Result<(), String> {
         let command: Command = read(command)?;
         let carried_out = self.motions.carry_out(PAGE, command, self.motions.stops(), &|| true);
-        carried_out.map_err(|refusal| text(&refusal.view()))
+        carried_out.map_err(|refusal| text(&refusal.view(Some(self.controller.machine()))))
     }
 
     /// Stops a group, or all: `{"group": null, "category": 1}`.
@@ -171,7 +176,7 @@ impl SimulatedArm {
         };
         let stopped = target_of(group, self.controller.machine())
             .and_then(|target| self.motions.stop(target, category));
-        stopped.map_err(|refusal| text(&refusal.view()))
+        stopped.map_err(|refusal| text(&refusal.view(Some(self.controller.machine()))))
     }
 
     /// Breaks something, or mends it: `{"what": "silent", "axis": 2, "is_broken": true}`.

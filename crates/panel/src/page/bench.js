@@ -294,7 +294,7 @@ async function showOutcome(outcome) {
   result = outcome;
   if (["failed", "refused"].includes(outcome.ended)) say(howEnded(outcome));
   const cycle = outcome.items.find(({ key }) => key === "value" || key === "1006:00");
-  if (outcome.action === "cycle" && cycle && outcome.drive === chosen) find("cycle").value = cycle.text.en.replace(/[^\d].*$/, "");
+  if (outcome.action === "cycle" && cycle && outcome.drive === chosen) find("cycle").value = told(cycle.text, "en").replace(/[^\d].*$/, "");
   showResult();
 }
 

@@ -138,7 +138,7 @@ export class Connection {
       throw { error: "unreachable", words: null };
     }
     const told = await answer.json().catch(() => ({}));
-    if (!answer.ok) throw { error: told.error ?? "unreachable", words: told.words ?? { en: `HTTP ${answer.status}`, zh: `HTTP ${answer.status}` } };
+    if (!answer.ok) throw { error: told.error ?? "unreachable", words: told.words ?? { text: `HTTP ${answer.status}` } };
   }
 
   // Each of these throws { error, words } when it is refused.

@@ -1,7 +1,7 @@
 // The monitor: the frames of the buses with their meaning, with pause, clear, filter and export.
 
 import { find } from "./frame.js";
-import { element, put, text, toldElement } from "./texts.js";
+import { element, put, text } from "./texts.js";
 
 const ASK_EVERY_MS = 250;
 const KEPT = 5000;
@@ -82,7 +82,7 @@ export class Monitor {
   #chosen() {
     const filter = this.#filter;
     if (filter === "") return this.#frames;
-    return this.#frames.filter(({ frame, words }) => [words.en, words.zh].some((said) => `${frame} ${said}`.toLowerCase().includes(filter)));
+    return this.#frames.filter(({ frame, words }) => `${frame} ${words}`.toLowerCase().includes(filter));
   }
 
   #show() {
@@ -92,7 +92,7 @@ export class Monitor {
         {},
         element("time", {}, clock(time)),
         element("code", {}, `${this.#busNames.length > 1 ? `${this.#busNames[bus]} ` : ""}${direction} ${frame}`),
-        toldElement("span", {}, words),
+        element("span", { lang: "en" }, words),
       ),
     );
     this.#list.replaceChildren(...rows);

@@ -1,5 +1,7 @@
 // Every text of the page, in English and Chinese: one row a text. {0} and {1} are filled in.
 
+import { CHINESE } from "./chinese.js";
+
 export const TEXTS = {
   connecting: ["Connecting …", "正在连接…"],
   live: ["Live", "实时"],
@@ -380,14 +382,21 @@ export function text(key, ...parts) {
 // The text of a key that may not be there.
 export const textOr = (key, otherwise) => (TEXTS[key] ? text(key) : otherwise);
 
-// What takt says itself comes in both languages.
-export const told = (words) => words[language];
+// What takt says itself comes as an English template with its fields: names and numbers, and further words. A family may have the Chinese one
+// beside it; the reason of a rejection may be a rule. What has no Chinese template stays English.
+export function told({ text: template, zh, fields = {} }, to = language) {
+  const words = to === "zh" ? (zh ?? CHINESE[template] ?? TEXTS[`rule_${template}`]?.[1] ?? template) : template;
+  return words.replace(/\{(\w+)\}/g, (place, name) => {
+    const field = Object.hasOwn(fields, name) ? fields[name] : place;
+    return typeof field === "object" ? told(field, to) : field;
+  });
+}
 
 // Sentences, one after the other.
 export const sentences = (...all) => all.filter(Boolean).join(isChinese() ? "。" : ". ");
 
 // An element with what takt says, in the language that the page has and will have.
-export const toldElement = (tag, attributes, words) => element(tag, { ...attributes, "data-en": words.en, "data-zh": words.zh }, told(words));
+export const toldElement = (tag, attributes, words) => element(tag, { ...attributes, "data-en": told(words, "en"), "data-zh": told(words, "zh") }, told(words));
 
 // Fills in the texts of a part of the page.
 export function fill(root) {

@@ -19,6 +19,7 @@ fn every_file_of_the_page_is_there_and_may_load_nothing_from_elsewhere() {
         "/page.js",
         "/connection.js",
         "/texts.js",
+        "/chinese.js",
         "/frame.js",
         "/units.js",
         "/axes.js",
@@ -96,7 +97,7 @@ fn a_page_that_asks_too_often_is_told_so_and_may_still_stop() {
         (0..200).map(|_| page.command(&json!({ "do": "clear_faults" }))).find(|(status, _)| *status != 200);
     let (status, value) = refused.expect("200 commands at once were taken");
     assert_eq!((status, &value["error"]), (429, &json!("too_often")));
-    assert!(value["words"]["en"].as_str().unwrap().contains("10 a second"), "{value}");
+    assert!(english(&value["words"]).contains("10 a second"), "{value}");
     for _ in 0..100 {
         assert_eq!(post(shown.address(), "/api/stop", "", r#"{"category":2}"#).0, 200);
     }

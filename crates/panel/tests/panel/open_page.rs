@@ -202,7 +202,7 @@ impl Page {
     pub fn is_refused(&mut self, command: &Value, with: u16, key: &str) -> String {
         let (status, value) = self.command(command);
         assert_eq!((status, value["error"].as_str()), (with, Some(key)), "{command}: {value}");
-        value["words"]["en"].as_str().unwrap().to_owned()
+        english(&value["words"])
     }
 
     /// The next message of this kind.
@@ -270,13 +270,22 @@ pub fn hold_until(shown: &Shown, page: &mut Page, velocity: f64, is_so: impl Fn(
             true => page.command(&json!({ "do": "renew", "axis": 0, "value": velocity })),
             false => page.command(&jog(0, velocity)),
         };
-        let words = value["words"]["en"].as_str().unwrap_or_default();
+        let words = english(&value["words"]);
         // A busy machine misses slots as well, and begins no stream then.
         let is_late = value["error"] == "nothing_to_renew" || words.contains("slots were missed");
         assert!(status == 200 || value["error"] == "too_often" || is_late, "{value}");
         is_held = status == 200;
         thread::sleep(Duration::from_millis(40));
     }
+}
+
+/// Words as a page in English shows them.
+pub fn english(words: &Value) -> String {
+    let text = words["text"].as_str().unwrap_or_default().to_owned();
+    words["fields"].as_object().into_iter().flatten().fold(text, |text, (name, field)| {
+        let field = field.as_str().map_or_else(|| english(field), str::to_owned);
+        text.replace(&format!("{{{name}}}"), &field)
+    })
 }
 
 pub fn jog(axis: usize, velocity: f64) -> Value {

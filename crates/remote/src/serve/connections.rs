@@ -12,12 +12,12 @@ use nix::unistd::geteuid;
 use takt::command::LeaseError;
 use takt_rt::RequestTarget;
 
-use super::Served;
 use super::lease::Claimant;
+use super::served::Served;
 use super::worker::Worker;
 use crate::commands::StopRequest;
 use crate::memory::Memory;
-use crate::replies::{Answer, Reply};
+use crate::replies::{Answer, Replied};
 use crate::shown::now_ns;
 use crate::socket::{Listener, PACKET_BYTES, Packets, Received, Role, accept};
 
@@ -175,7 +175,7 @@ impl Connections {
                     Some(stop) if self.is_known(stop.target) => {
                         self.served.stops.note(stop.target, now_ns());
                         // It fails only when the controller has ended.
-                        let _ = self.served.controller.request_stop(stop.target, stop.category);
+                        let _ = self.served.controller.backend().stop(stop.target, stop.category);
                         *taken += 1;
                         // A client that does not receive it loses nothing but its own order.
                         let _ = peer.connection.send(&taken.to_ne_bytes());
@@ -188,7 +188,7 @@ impl Connections {
     }
 
     fn is_known(&self, target: RequestTarget) -> bool {
-        target == RequestTarget::All || !self.served.controller.axes_of(target).is_empty()
+        target == RequestTarget::All || !self.served.controller.backend().axes_of(target).is_empty()
     }
 
     fn has_room(&self, places: usize, user: u32, is_of_kind: impl Fn(Kind) -> bool) -> bool {
@@ -201,7 +201,7 @@ impl Connections {
         self.workers.retain(|worker| !worker.connection.is_closed());
         let refuse = |connection: &Packets| {
             // The client may be gone already.
-            let reply = Reply::lease(LeaseError::TooManyClients);
+            let reply = Replied::Command(Err(LeaseError::TooManyClients.into()));
             let _ = connection.send(&Answer { number: u64::MAX, slot: 0, reply }.packet());
         };
         let has_place = self.working.load(Ordering::Acquire) < WORKERS

@@ -13,24 +13,24 @@
 mod connections;
 mod lease;
 mod publisher;
+mod served;
 mod worker;
 
 use std::fmt;
 use std::io;
 use std::os::fd::OwnedFd;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use takt::command::RunningController;
-use takt_rt::{Nanoseconds, RequestTarget};
+use takt::command::AnyHandle;
+use takt_rt::RequestTarget;
 
-use crate::layout::{Description, STOP_WORDS};
+use crate::layout::Description;
 use crate::shown::ShownWriter;
 use crate::socket::{Claimed, NameError, Names, SocketError};
 use connections::Connections;
-use lease::Lease;
+use served::Served;
 
 /// How a controller is served.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,52 +119,6 @@ impl From<io::Error> for ServeError {
     }
 }
 
-/// What the threads share.
-struct Served {
-    controller: Arc<dyn RunningController>,
-    lease: Mutex<Lease>,
-    stops: Stops,
-    has_ended: AtomicBool,
-}
-
-impl Served {
-    fn lease(&self) -> MutexGuard<'_, Lease> {
-        // A panic of another holder of the lock leaves the lease consistent.
-        self.lease.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn has_ended(&self) -> bool {
-        self.has_ended.load(Ordering::Acquire)
-    }
-}
-
-/// When the newest stop came, of a client or of this process, by `CLOCK_MONOTONIC`: of all axes, and of each group.
-#[derive(Default)]
-struct Stops([AtomicU64; STOP_WORDS]);
-
-impl Stops {
-    fn note(&self, target: RequestTarget, at_ns: Nanoseconds) {
-        let place = match target {
-            RequestTarget::All => 0,
-            RequestTarget::Group(group) => 1 + usize::from(group),
-        };
-        if let Some(newest_ns) = self.0.get(place) {
-            newest_ns.fetch_max(at_ns, Ordering::AcqRel);
-        }
-    }
-
-    /// True if a stop that concerns a target has come after a time.
-    fn came_after(&self, target: RequestTarget, at_ns: Nanoseconds) -> bool {
-        self.0.iter().enumerate().any(|(place, newest_ns)| {
-            let is_concerned = match target {
-                RequestTarget::All => true,
-                RequestTarget::Group(group) => place == 0 || place == 1 + usize::from(group),
-            };
-            is_concerned && newest_ns.load(Ordering::Acquire) > at_ns
-        })
-    }
-}
-
 /// Offers a running controller to other processes as long as it lives. When it is dropped, its clients' calls say that it has ended. The
 /// controller goes on.
 pub struct Server {
@@ -189,7 +143,7 @@ pub struct Server {
 /// # Errors
 /// See [`ServeError`].
 pub fn serve(
-    controller: impl RunningController + 'static,
+    controller: impl Into<AnyHandle>,
     name: &str,
     options: ServeOptions,
 ) -> Result<Server, ServeError> {
@@ -219,17 +173,12 @@ impl Claim {
     }
 
     /// See [`serve()`].
-    pub fn serve(self, controller: impl RunningController + 'static) -> Result<Server, ServeError> {
-        let Self { claimed, options } = self;
+    pub fn serve(self, controller: impl Into<AnyHandle>) -> Result<Server, ServeError> {
+        let (Self { claimed, options }, controller) = (self, controller.into());
         let shown = ShownWriter::new(&description(&controller))?;
         let memory = shown.memory();
         let listener = claimed.listen(options.mode)?;
-        let served = Arc::new(Served {
-            controller: Arc::new(controller),
-            lease: Mutex::new(Lease::new(options.lease)),
-            stops: Stops::default(),
-            has_ended: AtomicBool::new(false),
-        });
+        let served = Arc::new(Served::new(controller, options.lease));
         let (wake, waker) = nix::unistd::pipe().map_err(io::Error::from)?;
         let mut server = Server { served: Arc::clone(&served), waker: Some(waker), threads: vec![] };
         // The first state is there before a client can connect.
@@ -250,7 +199,7 @@ impl Server {
 
 impl Drop for Server {
     fn drop(&mut self) {
-        self.served.has_ended.store(true, Ordering::Release);
+        self.served.end();
         self.waker = None;
         for thread in self.threads.drain(..) {
             // A thread that has panicked has told so.
@@ -259,11 +208,11 @@ impl Drop for Server {
     }
 }
 
-fn description(controller: &dyn RunningController) -> Description {
+fn description(controller: &AnyHandle) -> Description {
     let machine = controller.machine().clone();
     let groups = (0u8..)
         .zip(&machine.groups)
-        .map(|(group, _)| controller.axes_of(RequestTarget::Group(group)))
+        .map(|(group, _)| controller.of(RequestTarget::Group(group)).axis_numbers())
         .collect();
     let axes = (0..machine.axes.len()).filter_map(|axis| controller.axis_properties(axis)).collect();
     Description { machine, groups, axes }

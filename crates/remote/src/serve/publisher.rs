@@ -6,7 +6,7 @@ use std::time::Duration;
 use takt::command::{EventSource, WaitError};
 use takt_rt::{RequestId, RequestTarget};
 
-use super::Served;
+use super::served::Served;
 use crate::layout::LeaseShown;
 use crate::shown::{ShownWriter, now_ns};
 
@@ -29,7 +29,7 @@ pub struct Publisher {
 impl Publisher {
     /// A publisher that has shown nothing.
     pub fn new(served: Arc<Served>, shown: ShownWriter) -> Self {
-        let events = served.controller.event_source();
+        let events = Arc::clone(served.controller.backend()).events();
         Self { served, shown, events, newest_stops: vec![], slot: 0 }
     }
 
@@ -43,7 +43,7 @@ impl Publisher {
         self.shown.events_lost(self.events.missed());
         self.shown.timing(self.served.controller.timing());
         self.shown.lease(self.lease());
-        self.shown.state(&state, |target| self.served.controller.newest_stop(target));
+        self.shown.state(&state, |target| self.served.controller.backend().newest_stop(target));
         self.slot = state.slot;
         self.note_stops(state.groups().len());
     }
@@ -52,7 +52,7 @@ impl Publisher {
     fn note_stops(&mut self, groups: usize) {
         let targets = (0..groups).filter_map(|group| u8::try_from(group).ok()).map(RequestTarget::Group);
         let newest: Vec<_> =
-            targets.map(|target| (target, self.served.controller.newest_stop(target))).collect();
+            targets.map(|target| (target, self.served.controller.backend().newest_stop(target))).collect();
         let seen_ns = now_ns().saturating_sub(SEEN_WITHIN.as_nanos() as u64);
         for ((target, newest), before) in newest.iter().zip(&self.newest_stops) {
             if newest != before {

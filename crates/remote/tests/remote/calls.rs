@@ -77,7 +77,9 @@ fn a_client_sees_and_moves_the_arm_with_the_calls_of_a_handle() {
 fn what_is_refused_has_the_same_words_as_in_the_own_process() {
     for name in ["arm6-erob.toml", "erob-modes/erob-pv.toml"] {
         let served = Served::start(name);
-        let (client, own) = (served.connect(), &served.controller.handle());
+        let client = served.connect();
+        let (any_client, own): (AnyHandle, AnyHandle) =
+            (client.clone().into(), served.controller.handle().into());
         let axes = client.machine().axes.len();
         let here = positions(&client);
         let far: Vec<f64> = here.iter().map(|position| position + 1e3).collect();
@@ -99,50 +101,47 @@ fn what_is_refused_has_the_same_words_as_in_the_own_process() {
         ];
         let motion = client.move_to(&here).unwrap();
         client.wait(motion, LONG).unwrap();
-        let ask = |asked: &dyn RunningController| -> Vec<Option<String>> {
-            let all = RequestTarget::All;
+        let ask = |asked: &AnyHandle| -> Vec<Option<String>> {
             let mut errors = vec![
-                asked.begin_move(all, &far, MoveOptions::default()).err(),
-                asked.begin_move(all, &[0.0; 40], MoveOptions::default()).err(),
+                asked.move_with(&far, MoveOptions::default()).err(),
+                asked.move_with(&[0.0; 40], MoveOptions::default()).err(),
                 asked.velocity(0, 1e3, LONG).err(),
                 asked.torque(0, f64::INFINITY, LONG).err(),
                 asked.velocity(77, 0.1, LONG).err(),
                 asked.change_axis_mode(99, OperationMode::Homing).err(),
                 asked.set_speed(motion, 2.0).err(),
                 asked.pause(motion).err(),
-                asked.begin_enable(all).err(),
+                asked.enable().err(),
             ];
-            errors.extend(trajectories.iter().map(|points| asked.begin_trajectory(all, points).err()));
+            errors.extend(trajectories.iter().map(|points| asked.execute(points).err()));
             errors.extend([
-                asked.begin_through(all, std::slice::from_ref(&far)).err(),
-                asked.begin_through(all, &[]).err(),
+                asked.move_through(std::slice::from_ref(&far)).err(),
+                asked.move_through(&[]).err(),
             ]);
             let refused =
-                asked.begin_move(all, &here, MoveOptions { velocity_scale: 7.0, ..MoveOptions::default() });
+                asked.move_with(&here, MoveOptions { velocity_scale: 7.0, ..MoveOptions::default() });
             let result = asked.wait(refused.unwrap(), LONG);
             let Err(MotionError::Refused(refused)) = result else { panic!("{name}: {result:?}") };
             errors.push(Some(refused.into()));
             // A number that is none is not equal to itself.
             errors.into_iter().map(|error| error.map(|error: CommandError| error.to_string())).collect()
         };
-        let (of_client, of_handle) = (ask(&client), ask(own));
+        let (of_client, of_handle) = (ask(&any_client), ask(&own));
         assert_eq!(of_client, of_handle, "{name}");
         assert!(of_client.iter().all(Option::is_some), "{name}: {of_client:?}");
-        let push = |asked: &dyn RunningController, entries: &[AxisPoint]| {
-            asked.push_point(RequestTarget::All, 1, entries).err()
-        };
+        let push = |asked: &AnyHandle, entries: &[AxisPoint]| asked.stream().push(1, entries).err();
         for entries in [
             vec![AxisPoint::default(); axes + 1],
             vec![AxisPoint::Torque(1.0); axes],
             vec![AxisPoint::position(0.0).with_torque(1.0); axes],
             vec![AxisPoint::position(0.0).with_impedance(-1.0, 0.0); axes],
         ] {
-            let of_client = push(&client, &entries);
+            let of_client = push(&any_client, &entries);
             assert!(of_client.is_some());
-            assert_eq!(of_client, push(own, &entries), "{name}");
+            assert_eq!(of_client, push(&own, &entries), "{name}");
         }
-        let NotFinite(of_client) = NotFinite::of(push(&client, &vec![f64::NAN.into(); axes]));
-        assert_eq!(of_client, NotFinite::of(push(own, &vec![f64::NAN.into(); axes])).0);
+        let NotFinite(of_client) = NotFinite::of(push(&any_client, &vec![f64::NAN.into(); axes]));
+        assert_eq!(of_client, NotFinite::of(push(&own, &vec![f64::NAN.into(); axes])).0);
     }
 }
 
@@ -162,13 +161,13 @@ fn groups_are_moved_apart_and_named_alike() {
     let served = Served::start("arm-and-gripper.toml");
     let client = served.connect();
     let arm = client.group("arm").unwrap();
-    assert_eq!(arm.axes(), served.controller.group("arm").unwrap().axes());
+    assert_eq!(arm.axis_numbers(), served.controller.group("arm").unwrap().axis_numbers());
     assert_eq!(client.group("leg").err(), served.controller.group("leg").err());
     let several = client.execute(&[]).unwrap_err();
     assert!(matches!(several, CommandError::SeveralGroups { .. }));
     assert_eq!(several, served.controller.execute(&[]).unwrap_err());
     let motion = arm.move_to(&[0.1, -0.1, 0.1]).unwrap();
-    assert_eq!(arm.state().phase, served.controller.group("arm").unwrap().state().phase);
+    assert_eq!(arm.group_state().phase, served.controller.group("arm").unwrap().group_state().phase);
     client.group("gripper").unwrap().stop(StopCategory::Two).unwrap();
     assert_eq!(client.wait(motion, LONG), Ok(()));
     let motion = arm.move_to(&[0.5, -0.1, 0.1]).unwrap();
@@ -204,12 +203,9 @@ fn a_stream_of_a_client_that_stops_sending_comes_to_rest_and_goes_on_without_a_s
     assert!(gone && stream.report().counts.points >= 200);
 
     let chunk: Vec<Vec<f64>> = (0..300).map(|_| positions(&client)).collect();
-    stream.push_chunk(ClientStream::now_ns(), Duration::from_millis(1), &chunk[..100]).unwrap();
+    stream.push_chunk(now_ns(), Duration::from_millis(1), &chunk[..100]).unwrap();
     let too_many = vec![positions(&client); 20_000];
-    assert_eq!(
-        stream.push_chunk(ClientStream::now_ns(), Duration::from_millis(1), &too_many),
-        Err(StreamError::Full)
-    );
+    assert_eq!(stream.push_chunk(now_ns(), Duration::from_millis(1), &too_many), Err(StreamError::Full));
 }
 
 #[test]

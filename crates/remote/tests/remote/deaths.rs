@@ -81,7 +81,7 @@ fn command_without_end() {
             3 => client.begin_stream(),
             4 => {
                 let chunk: Vec<Vec<f64>> = (0..40).map(|_| target.clone()).collect();
-                let _ = client.stream().push_chunk(ClientStream::now_ns(), Duration::from_millis(5), &chunk);
+                let _ = client.stream().push_chunk(now_ns(), Duration::from_millis(5), &chunk);
                 Ok(())
             }
             _ => client.stop(StopCategory::Two),
@@ -132,7 +132,7 @@ fn command_in_every_way() {
     let _ = client.execute(&[point]);
     let _ = client.begin_stream();
     let _ = client.stream().push_now(&[0.0]);
-    let _ = client.stream().push_chunk(ClientStream::now_ns(), Duration::from_millis(5), &[[0.0]; 20]);
+    let _ = client.stream().push_chunk(now_ns(), Duration::from_millis(5), &[[0.0]; 20]);
     let _ = client.release();
 }
 

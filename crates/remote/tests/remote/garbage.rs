@@ -60,22 +60,26 @@ fn garbage(random: &mut Random, home: &[f64], role: Role) -> Vec<u8> {
     let axes: Vec<AxisPoint> =
         home.iter().map(|position| AxisPoint::position(position + 0.05 * random.below(100) as f64)).collect();
     let (target, options, positions) = (RequestTarget::All, MoveOptions::default(), vec![0.0; 6]);
-    let (asked_ns, interval) = (ClientStream::now_ns(), Duration::from_millis(1));
-    let command = match random.below(5) {
-        0 => packets::Command::Point { target, at_ns: asked_ns, axes },
-        1 => packets::Command::Chunk { target, from_ns: asked_ns, interval, points: vec![axes] },
-        2 => packets::Command::Lease { is_taken_over: true },
-        3 => packets::Command::MoveBy { target, options, distances: positions },
-        _ => packets::Command::Move { target, options, positions },
+    let (asked_ns, interval) = (now_ns(), Duration::from_millis(1));
+    let asked = match random.below(5) {
+        0 => Asked::Point { target, at_ns: asked_ns, axes },
+        1 => Asked::Chunk { target, from_ns: asked_ns, interval, points: vec![axes] },
+        2 => takt::Command::Lease { is_taken_over: true }.into(),
+        3 => takt::Command::MoveBy { target, options, distances: positions }.into(),
+        _ => takt::Command::Move { target, options, positions }.into(),
     };
-    let kind = mem::discriminant(&command);
-    let packet = Demand { number: 1, asked_ns, command }.packet();
+    let kind_of = |asked: &Asked| match asked {
+        Asked::Command(command) => (mem::discriminant(asked), Some(mem::discriminant(command))),
+        asked => (mem::discriminant(asked), None),
+    };
+    let kind = kind_of(&asked);
+    let packet = Demand { number: 1, asked_ns, asked }.packet();
     let mut turned = packet.clone();
     for _ in 0..random.below(4) {
         let at = random.below(packet.len() as u64) as usize;
         turned[at] ^= 1 << random.below(8);
     }
     // Neither disabling nor another mode.
-    let is_other = Demand::of(&turned).is_some_and(|demand| mem::discriminant(&demand.command) != kind);
+    let is_other = Demand::of(&turned).is_some_and(|demand| kind_of(&demand.asked) != kind);
     if is_other { packet } else { turned }
 }

@@ -76,8 +76,8 @@ fn any_client_stops_the_arm_without_the_lease_and_past_commands_that_wait() {
     let flooding =
         Packets::connect_as(Path::new(&format!("{}.command", served.name())), Role::Commands).unwrap();
     let mut number = 0;
-    let command = packets::Command::Lease { is_taken_over: false };
-    while flooding.send(&Demand { number, asked_ns: 0, command: command.clone() }.packet()).is_ok() {
+    let asked = Asked::from(takt::Command::Lease { is_taken_over: false });
+    while flooding.send(&Demand { number, asked_ns: 0, asked: asked.clone() }.packet()).is_ok() {
         number += 1;
     }
     let motion = commanding.take_over().and_then(|()| commanding.move_to(&moved(&commanding, 0.8))).unwrap();

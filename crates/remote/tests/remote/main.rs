@@ -20,12 +20,14 @@ use std::time::{Duration, Instant};
 
 use nix::unistd::geteuid;
 use takt::{
-    AxisPoint, CommandError, Config, Controller, EventKind, LeaseError, MotionError, MoveOptions,
-    OperationMode, Phase, RunningController, SessionOptions, StopCategory, StreamError, StreamState,
-    TrajectoryPoint, WaitError,
+    AnyHandle, AxisPoint, CommandError, Config, Controller, EventKind, LeaseError, MotionError, MoveOptions,
+    OperationMode, Phase, Reply, SessionOptions, StopCategory, StreamError, StreamState, TrajectoryPoint,
+    WaitError,
 };
-use takt_remote::packets::{self, Answer, Demand, PACKET_BYTES, Packets, Received, Reply, Role, StopRequest};
-use takt_remote::{Client, ClientStream, ConnectError, ServeError, ServeOptions, Server, connect, serve};
+use takt_remote::packets::{
+    Answer, Asked, Demand, PACKET_BYTES, Packets, Received, Replied, Role, StopRequest,
+};
+use takt_remote::{Client, ConnectError, ServeError, ServeOptions, Server, connect, now_ns, serve};
 use takt_rt::{Frame, Id, RequestTarget};
 use tempfile::TempDir;
 

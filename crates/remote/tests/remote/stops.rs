@@ -16,8 +16,9 @@ impl Raw {
         Self { connection, client: served.connect() }
     }
 
-    fn ask(&self, asked_ns: u64, command: packets::Command) -> Reply {
-        self.connection.send(&Demand { number: 1, asked_ns, command }.packet()).unwrap();
+    fn ask(&self, asked_ns: u64, asked: impl Into<Asked>) -> Replied {
+        let asked = asked.into();
+        self.connection.send(&Demand { number: 1, asked_ns, asked }.packet()).unwrap();
         let mut packet = [0; PACKET_BYTES];
         let Received::Bytes(count) = self.connection.receive(&mut packet, true) else { panic!() };
         Answer::of(&packet[..count]).unwrap().reply
@@ -33,52 +34,48 @@ fn a_stop_overtakes_the_packets_that_wait() {
     let commands = || {
         let (options, positions) = (MoveOptions::default(), vec![0.2; 6]);
         [
-            packets::Command::Move { target: all, options, positions },
-            packets::Command::BeginStream(all),
-            packets::Command::Execute { target: all, points: 0 },
-            packets::Command::Velocity { axis: 0, velocity: 0.1, valid_for: LONG },
+            Asked::from(takt::Command::Move { target: all, options, positions }),
+            takt::Command::BeginStream(all).into(),
+            Asked::Trajectory { target: all, points: 0, is_timed: true },
+            takt::Command::Velocity { axis: 0, velocity: 0.1, valid_for: LONG }.into(),
         ]
     };
-    let point = || packets::Command::Point {
-        target: all,
-        at_ns: ClientStream::now_ns(),
-        axes: vec![AxisPoint::position(0.2); 6],
-    };
+    let point = || Asked::Point { target: all, at_ns: now_ns(), axes: vec![AxisPoint::position(0.2); 6] };
     for target in [all, RequestTarget::Group(0)] {
-        let asked_ns = ClientStream::now_ns();
-        raw.client.request_stop(target, StopCategory::Two).unwrap();
+        let asked_ns = now_ns();
+        raw.client.of(target).stop(StopCategory::Two).unwrap();
         // The stop has been taken when this returns.
         raw.client.next_cycle(LONG).unwrap();
         for command in commands() {
-            assert_eq!(raw.ask(asked_ns, command), Reply::Refused(CommandError::Overtaken));
+            assert_eq!(raw.ask(asked_ns, command), Replied::Command(Err(CommandError::Overtaken)));
         }
-        assert_eq!(raw.ask(asked_ns, point()), Reply::NotTaken(StreamError::NotStreaming));
+        assert_eq!(raw.ask(asked_ns, point()), Replied::Points(Err(StreamError::NotStreaming)));
     }
     raw.client.wait_for(Phase::Holding, LONG).unwrap();
     assert_eq!(positions(&raw.client), home);
-    let [stream, ..] = [packets::Command::BeginStream(all)];
-    assert_eq!(raw.ask(ClientStream::now_ns(), stream), Reply::Done);
-    assert_eq!(raw.ask(ClientStream::now_ns(), point()), Reply::Done);
+    let stream = takt::Command::BeginStream(all);
+    assert_eq!(raw.ask(now_ns(), stream), Replied::Command(Ok(Reply::Done)));
+    assert_eq!(raw.ask(now_ns(), point()), Replied::Points(Ok(())));
 }
 
 #[test]
 fn a_stop_of_the_own_process_overtakes_the_packets_that_wait() {
     let served = Served::start("arm6-erob.toml");
     let raw = Raw::connect(&served);
-    let command = || packets::Command::Move {
+    let command = || takt::Command::Move {
         target: RequestTarget::All,
         options: MoveOptions::default(),
         positions: positions(&raw.client),
     };
     let own = served.controller.handle();
-    let asked_ns = ClientStream::now_ns();
+    let asked_ns = now_ns();
     thread::sleep(Duration::from_secs(1));
     own.stop(StopCategory::Two).unwrap();
     raw.client.cycle_after(own.state().slot + 5, LONG).unwrap();
-    assert_eq!(raw.ask(asked_ns, command()), Reply::Refused(CommandError::Overtaken));
+    assert_eq!(raw.ask(asked_ns, command()), Replied::Command(Err(CommandError::Overtaken)));
     own.wait_for(Phase::Holding, LONG).unwrap();
-    let reply = raw.ask(ClientStream::now_ns(), command());
-    assert!(matches!(reply, Reply::Motion(_)), "{reply:?}");
+    let reply = raw.ask(now_ns(), command());
+    assert!(matches!(reply, Replied::Command(Ok(Reply::Motion(_)))), "{reply:?}");
 }
 
 #[test]
@@ -102,7 +99,7 @@ fn points_of_a_client_are_taken_while_it_streams_and_refused_at_any_other_time()
     let chunk = vec![home.clone(); 3];
     let refused = |client: &Client| {
         assert_eq!(stream.push_now(&home), Err(StreamError::NotStreaming));
-        let chunk = stream.push_chunk(ClientStream::now_ns(), Duration::from_millis(5), &chunk);
+        let chunk = stream.push_chunk(now_ns(), Duration::from_millis(5), &chunk);
         assert_eq!(chunk, Err(StreamError::NotStreaming));
         assert_eq!(client.state().groups()[0].stop.map(|stop| stop.is_requested()), Some(true));
     };
@@ -120,11 +117,11 @@ fn points_of_a_client_are_taken_while_it_streams_and_refused_at_any_other_time()
 fn points_of_a_trajectory_for_other_axes_than_those_of_the_group_are_refused_when_they_come() {
     let served = Served::start("arm6-erob.toml");
     let raw = Raw::connect(&served);
-    let points = |count| packets::Command::Points {
+    let points = |count| Asked::Points {
         target: RequestTarget::All,
         points: vec![TrajectoryPoint { positions: vec![0.0; count], ..TrajectoryPoint::default() }; 1],
     };
-    assert_eq!(raw.ask(ClientStream::now_ns(), points(6)), Reply::Done);
-    let Reply::Refused(refused) = raw.ask(ClientStream::now_ns(), points(8_000)) else { panic!() };
+    assert_eq!(raw.ask(now_ns(), points(6)), Replied::Command(Ok(Reply::Done)));
+    let Replied::Command(Err(refused)) = raw.ask(now_ns(), points(8_000)) else { panic!() };
     assert_eq!(refused.to_string(), "point 1: 8000 values of position are given for 6 axes");
 }

@@ -1,7 +1,7 @@
 //! One axis of the drive: its objects, its state machine, its set-points, its loops and its joint.
 
 use takt_rt::{DriveState, NANOSECONDS_PER_SECOND, Nanoseconds, OperationMode};
-use takt_wire::quirks::Quirks;
+use takt_wire::quirks::{MeasuredObject, MeasuredQuantity, Quirks};
 
 use crate::defect::Disobedience;
 use crate::errors::DeviceError;
@@ -15,7 +15,7 @@ use super::Cia402AxisParameters;
 use super::device::{Change, Device, FaultReaction};
 use super::homing::HomingStep;
 use super::motion::Motion;
-use super::places::Places;
+use super::places::{self, Places};
 use super::profile::Profile;
 use super::units::{CommissionedScale, Units, units_per_turn};
 
@@ -48,6 +48,15 @@ pub struct Axis {
     units: Units,
     modes: u32,
     mode_change_ns: Nanoseconds,
+    keeps_mode_with_torque: bool,
+    interpolates_over_sync: bool,
+    moves_in_interpolation: bool,
+    /// Objects of the vendor that show measured values, by their places.
+    measured: Vec<(Option<usize>, MeasuredObject)>,
+    /// True after a fault that has cost it its turn count, until that is cleared.
+    has_lost_turns: bool,
+    /// Bits of the statusword that are always 1, always 0, and 1 unless it is enabled.
+    status_bits: [u16; 3],
     device: Device,
     motion: Motion,
     servo: Servo,
@@ -72,9 +81,17 @@ impl Axis {
         dictionary: &mut SimulatedDictionary,
         quirks: &Quirks,
     ) -> Self {
-        let places = Places::of(dictionary, number);
+        let mut places = Places::of(dictionary, number);
+        if let Some(target) = quirks.interpolation_target {
+            places.interpolation_data =
+                dictionary.place(target.index + number * places::AXIS_OFFSET, target.subindex);
+        }
         let Cia402AxisParameters { rated_torque, peak_torque, .. } = parameters;
         commission(dictionary, places.rated_torque, (1000.0 * rated_torque).round());
+        if let Some(torque_per_ampere) = quirks.simulated.torque_per_ampere {
+            let milliamperes = (1000.0 * rated_torque / torque_per_ampere).round();
+            commission(dictionary, places.rated_current, milliamperes);
+        }
         for limit in [places.max_torque, places.positive_torque_limit, places.negative_torque_limit] {
             commission_open(dictionary, limit, (1000.0 * peak_torque / rated_torque).round());
         }
@@ -94,8 +111,14 @@ impl Axis {
             // The velocity mode of frequency converters is not simulated.
             modes: modes_of(dictionary, &places, quirks) & !OperationMode::Velocity.supported_bit(),
             mode_change_ns: quirks.delays.mode_change_ns.unwrap_or(super::MODE_CHANGE_NS),
-            device: Device::starting(),
-            motion: Motion::new(),
+            keeps_mode_with_torque: quirks.keeps_mode_with_torque,
+            interpolates_over_sync: quirks.simulated.interpolates_over_sync,
+            moves_in_interpolation: quirks.simulated.moves_in_interpolation,
+            measured: measured_objects(dictionary, number, quirks),
+            has_lost_turns: false,
+            status_bits: [quirks.statusword_set, quirks.statusword_clear, quirks.statusword_set_disabled],
+            device: Device::starting(quirks.delays.fault_reset_ns.unwrap_or(0)),
+            motion: Motion::new(quirks.simulated.moves_in_interpolation),
             servo,
             joint,
             defects: JointDefects::default(),
@@ -111,7 +134,7 @@ impl Axis {
     /// Restarts everything except the joint.
     pub fn restart(&mut self, dictionary: &mut SimulatedDictionary, quirks: &Quirks) {
         self.device = self.device.restarted();
-        self.motion = Motion::new();
+        self.motion = Motion::new(self.moves_in_interpolation);
         self.servo.reset();
         (self.torque, self.mode, self.coming_mode, self.mode_bits) = (0.0, None, None, 0);
         self.set_units(dictionary, quirks);
@@ -138,8 +161,38 @@ impl Axis {
 
     /// Its statusword.
     pub fn statusword(&self) -> u16 {
-        let bits = if self.state() == DriveState::OperationEnabled { self.mode_bits } else { 0 };
-        self.device.statusword(bits)
+        let [set, clear, set_disabled] = self.status_bits;
+        let bits = if self.state() == DriveState::OperationEnabled { self.mode_bits } else { set_disabled };
+        self.device.statusword(bits) & !clear | set
+    }
+
+    /// Returns `true` if it now refuses to take another mode.
+    pub fn keeps_mode(&self) -> bool {
+        self.keeps_mode_with_torque && self.device.state().has_torque()
+    }
+
+    /// From now on its turn count is lost.
+    pub fn lose_turns(&mut self) {
+        self.has_lost_turns = true;
+    }
+
+    /// Returns `true` if its turn count is lost.
+    pub fn has_lost_turns(&self) -> bool {
+        self.has_lost_turns
+    }
+
+    /// Clears its turn count, and ends the loss of it.
+    pub fn clear_turns(&mut self) {
+        self.has_lost_turns = false;
+        self.zero_turns();
+    }
+
+    /// Sets its turn count to 0. The position within a turn stays.
+    pub fn zero_turns(&mut self) {
+        let position = self.position();
+        let within_turn = position.rem_euclid(self.parameters.counts_per_turn.abs().max(1.0));
+        self.offset += within_turn - position;
+        self.motion.shift(within_turn - position);
     }
 
     /// Its mode of operation, as in 6061; 0 for none.
@@ -179,6 +232,7 @@ impl Axis {
             units: &self.units,
             dictionary,
             highest_velocity: self.parameters.highest_velocity * self.units.position.abs(),
+            interpolates_over_sync: self.interpolates_over_sync,
         }
     }
 
@@ -207,6 +261,9 @@ impl Axis {
 
     /// 6061 follows 6060 after a moment, if the axis has the mode.
     pub fn follow_mode(&mut self, dictionary: &SimulatedDictionary, now_ns: Nanoseconds) {
+        if self.keeps_mode() {
+            return self.coming_mode = None;
+        }
         let number = dictionary.number_at(self.places.mode).unwrap_or(0) as i8;
         let wanted = OperationMode::from_number(number).filter(|mode| self.modes & mode.supported_bit() != 0);
         self.coming_mode = match (wanted, self.coming_mode) {
@@ -220,6 +277,9 @@ impl Axis {
     fn take_coming_mode(&mut self, dictionary: &SimulatedDictionary, now_ns: Nanoseconds) {
         let Some(coming) = self.coming_mode.filter(|coming| coming.due_ns <= now_ns) else { return };
         self.coming_mode = None;
+        if self.keeps_mode() {
+            return;
+        }
         self.mode = Some(coming.mode);
         if self.device.state().has_torque() && self.device.stop().is_none() {
             self.engage(dictionary);
@@ -233,11 +293,11 @@ impl Axis {
     }
 
     /// Evaluates the controlword in the state machine and in the mode. Returns whether a fault was reset.
-    pub fn evaluate(&mut self, dictionary: &SimulatedDictionary) -> bool {
+    pub fn evaluate(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) -> bool {
         let word = dictionary.number_at(self.places.controlword).unwrap_or(0) as u16;
         let previous = self.device.controlword();
         let had_stop = self.device.stop().is_some();
-        let change = self.device.evaluate(word, &self.places, dictionary, true);
+        let change = self.device.evaluate(now_ns, word, &self.places, dictionary, !self.has_lost_turns);
         if change == Change::Enabled {
             self.servo.reset();
             self.engage(dictionary);
@@ -305,7 +365,7 @@ impl Axis {
     ) -> Option<AxisEvent> {
         let duration_s = duration_ns as f64 / NANOSECONDS_PER_SECOND as f64;
         self.take_coming_mode(dictionary, now_ns);
-        let mut event = self.evaluate(dictionary).then_some(AxisEvent::FaultReset);
+        let mut event = self.evaluate(now_ns, dictionary).then_some(AxisEvent::FaultReset);
         let is_driven = self.device.state().has_torque();
         if is_driven {
             self.drive(dictionary, duration_s);
@@ -386,13 +446,12 @@ impl Axis {
     }
 
     /// Writes the measured values to the dictionary.
-    pub fn measure(&self, quirks: &Quirks, dictionary: &mut SimulatedDictionary) {
+    pub fn measure(&self, dictionary: &mut SimulatedDictionary) {
         let Self { places, units, parameters, .. } = self;
         let position = self.position();
         let per_mille = 1000.0 * self.torque / parameters.rated_torque;
         let velocity = self.joint.velocity() * units.position;
-        let statusword = self.statusword() & !quirks.statusword_clear | quirks.statusword_set;
-        dictionary.set_at(places.statusword, statusword.into());
+        dictionary.set_at(places.statusword, self.statusword().into());
         dictionary.set_at(places.mode_display, self.mode_number().into());
         dictionary.set_at(places.position, position.round_ties_even() as i64);
         dictionary.set_at(places.position_increments, position.round_ties_even() as i64);
@@ -404,6 +463,15 @@ impl Axis {
         dictionary.set_real_at(places.torque_demand, per_mille);
         dictionary.set_real_at(places.following_error, self.motion.position() - position);
         dictionary.set_at(places.digital_inputs, self.inputs());
+        for (place, MeasuredObject { factor, quantity, .. }) in &self.measured {
+            match quantity {
+                MeasuredQuantity::Position => {
+                    let counts = self.joint.position() * units.position * factor;
+                    dictionary.set_at(*place, counts.round_ties_even() as i64);
+                }
+                MeasuredQuantity::Torque => dictionary.set_real_at(*place, factor * self.torque),
+            }
+        }
     }
 
     /// Object 60FD: negative limit, positive limit, home switch.
@@ -414,6 +482,16 @@ impl Axis {
         let is_closed = all.map(|switch| switch.is_some_and(|switch| switch.is_closed(at)));
         is_closed.into_iter().enumerate().map(|(bit, is_closed)| i64::from(is_closed) << bit).sum()
     }
+}
+
+/// The objects of the vendor that show measured values of an axis.
+fn measured_objects(
+    dictionary: &SimulatedDictionary,
+    number: u16,
+    quirks: &Quirks,
+) -> Vec<(Option<usize>, MeasuredObject)> {
+    let of_first = quirks.simulated.measured.iter().filter(|_| number == 0);
+    of_first.map(|shown| (dictionary.place(shown.address.index, shown.address.subindex), *shown)).collect()
 }
 
 /// Sets a rating of the motor.
@@ -430,15 +508,20 @@ fn commission_open(dictionary: &mut SimulatedDictionary, place: Option<usize>, v
     }
 }
 
-/// The modes of an axis, as bits of object 6502: by the quirks, by that object, or by the objects that only one mode has. No
-/// object tells of a cyclic mode.
+/// The modes of an axis, as bits of object 6502: by the quirks, by that object, or by the objects that only one mode has, and those
+/// that the quirks add. No object tells of a cyclic mode.
 fn modes_of(dictionary: &SimulatedDictionary, places: &Places, quirks: &Quirks) -> u32 {
-    if let Some(modes) = &quirks.modes {
-        return modes.iter().fold(0, |bits, mode| bits | mode.supported_bit());
-    }
-    if let Some(supported) = dictionary.number_at(places.supported_modes).filter(|modes| *modes != 0) {
-        return supported as u32;
-    }
+    let bits = |modes: &[OperationMode]| modes.iter().fold(0, |bits, mode| bits | mode.supported_bit());
+    let stated = dictionary.number_at(places.supported_modes).filter(|modes| *modes != 0);
+    let own = match (&quirks.modes, stated) {
+        (Some(modes), _) => bits(modes),
+        (None, Some(stated)) => stated as u32,
+        (None, None) => modes_by_objects(places),
+    };
+    own | bits(&quirks.undeclared_modes)
+}
+
+fn modes_by_objects(places: &Places) -> u32 {
     let of = |mode: OperationMode, demanded: &[Option<usize>]| {
         if demanded.iter().all(Option::is_some) { mode.supported_bit() } else { 0 }
     };

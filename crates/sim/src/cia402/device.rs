@@ -1,7 +1,7 @@
 //! The CiA 402 state machine of one axis: controlword, state, statusword, the ramps of some transitions, the option codes
 //! 605A to 605E, and the fault reaction. Where the data sheet lacks an option code, the default of the standard applies.
 
-use takt_rt::{Command, DriveState, controlword, statusword};
+use takt_rt::{Command, DriveState, Nanoseconds, controlword, statusword};
 
 use crate::defect::Disobedience;
 use crate::object_dictionary::SimulatedDictionary;
@@ -58,12 +58,22 @@ pub struct Device {
     controlword: u16,
     stop: Option<Stop>,
     disobedience: Option<Disobedience>,
+    /// How long bit 7 of the controlword must stay set to reset a fault, and since when it has been set in this one.
+    fault_reset_ns: Nanoseconds,
+    reset_since_ns: Option<Nanoseconds>,
 }
 
 impl Device {
     /// An axis that is booting.
-    pub const fn starting() -> Self {
-        Self { state: DriveState::NotReadyToSwitchOn, controlword: 0, stop: None, disobedience: None }
+    pub const fn starting(fault_reset_ns: Nanoseconds) -> Self {
+        Self {
+            state: DriveState::NotReadyToSwitchOn,
+            controlword: 0,
+            stop: None,
+            disobedience: None,
+            fault_reset_ns,
+            reset_since_ns: None,
+        }
     }
 
     /// The state.
@@ -83,7 +93,7 @@ impl Device {
 
     /// The same axis after a restart.
     pub const fn restarted(&self) -> Self {
-        Self { disobedience: self.disobedience, ..Self::starting() }
+        Self { disobedience: self.disobedience, ..Self::starting(self.fault_reset_ns) }
     }
 
     /// From now on it does not obey its controlword in this way, or obeys it again.
@@ -101,6 +111,7 @@ impl Device {
     /// Evaluates the controlword. `is_cleared`: the cause of a fault is gone.
     pub fn evaluate(
         &mut self,
+        now_ns: Nanoseconds,
         word: u16,
         places: &Places,
         dictionary: &SimulatedDictionary,
@@ -108,8 +119,15 @@ impl Device {
     ) -> Change {
         let rising = word & !self.controlword;
         self.controlword = word;
+        if self.state != DriveState::Fault || word & controlword::FAULT_RESET == 0 {
+            self.reset_since_ns = None;
+        } else if rising & controlword::FAULT_RESET != 0 {
+            self.reset_since_ns = Some(now_ns);
+        }
+        let is_held = |since_ns| now_ns.saturating_sub(since_ns) >= self.fault_reset_ns;
         match self.state {
-            DriveState::Fault if rising & controlword::FAULT_RESET != 0 && is_cleared => {
+            DriveState::Fault if is_cleared && self.reset_since_ns.is_some_and(is_held) => {
+                self.reset_since_ns = None;
                 self.state = self.state.after(Command::DisableVoltage, true);
                 Change::FaultReset
             }

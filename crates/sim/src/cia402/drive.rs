@@ -5,9 +5,9 @@ use takt_wire::canopen::object::ObjectAddress;
 use takt_wire::quirks::Quirks;
 
 use super::axis::{Axis, AxisEvent};
+use super::node::{CanopenNode, NodeDelays};
 use super::places::{AXIS_OFFSET, is_measured};
 use super::{Cia402Parameters, NotADrive, dictionary_of};
-use crate::canopen_node::{CanopenDevice, CanopenNode, NodeDelays, TakesField, ValueSource};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::{Drive, DriveFault, Observation};
 use crate::errors::DeviceError;
@@ -29,8 +29,8 @@ const SAVE_NS: Nanoseconds = 100_000_000;
 /// A simulated CiA 402 drive, made from its data sheet.
 #[derive(Clone, Debug)]
 pub struct Cia402Drive {
-    quirks: Quirks,
-    canopen: CanopenNode,
+    pub(super) quirks: Quirks,
+    pub(super) canopen: CanopenNode,
     axes: Vec<Axis>,
     /// A fault injected since the last advance.
     injected: Option<DriveFault>,
@@ -46,7 +46,12 @@ impl Cia402Drive {
     /// The data sheet describes no CiA 402 drive with so many axes.
     pub fn new(parameters: Cia402Parameters) -> Result<Self, NotADrive> {
         let mut dictionary = dictionary_of(&parameters)?;
-        let Cia402Parameters { node, quirks, axes, power_up_ns, feedback_delay_ns, seed, .. } = parameters;
+        let Cia402Parameters { node, mut quirks, axes, power_up_ns, feedback_delay_ns, seed, .. } =
+            parameters;
+        let mut random = Random::new(seed, node);
+        if quirks.statusword_set_in_some != 0 && random.next_u64() & 1 == 1 {
+            quirks.statusword_set |= quirks.statusword_set_in_some;
+        }
         let delays = NodeDelays {
             power_up_ns: quirks.delays.boot_up_ns.unwrap_or(power_up_ns),
             feedback_ns: feedback_delay_ns,
@@ -57,21 +62,30 @@ impl Cia402Drive {
         let axes = axes.collect();
         let longest_ns = quirks.delays.sdo_reply_ns.unwrap_or(LONGEST_REPLY_NS);
         let features = if quirks.refuses_blocks {
-            SdoFeatures::Segmented { is_upload_segmented: false }
+            SdoFeatures::Segmented { is_upload_segmented: quirks.simulated.segments_uploads }
         } else {
             SdoFeatures::Blocks
         };
         let latency_ns = SHORTEST_REPLY_NS.min(longest_ns)..longest_ns + 1;
-        let sdo = SdoServer::new(Random::new(seed, node), latency_ns, features);
-        let pdo_features = PdoFeatures { is_measured, watches_rpdos: true };
-        Ok(Self {
+        let sdo = SdoServer::new(random, latency_ns, features);
+        let pdo_features = PdoFeatures { is_measured, watches_rpdos: !quirks.simulated.ignores_rpdo_timers };
+        let mut drive = Self {
             canopen: CanopenNode::new(node, dictionary, quirks.power_up, sdo, pdo_features, delays),
             axes,
             quirks,
             injected: None,
             stepped_ns: 0,
             now_ns: 0,
-        })
+        };
+        drive.power_up();
+        Ok(drive)
+    }
+
+    /// Without a battery the turn count is lost.
+    fn power_up(&mut self) {
+        if self.quirks.simulated.lacks_battery {
+            self.axes.iter_mut().for_each(Axis::zero_turns);
+        }
     }
 
     /// The number of its axes.
@@ -119,9 +133,9 @@ impl Cia402Drive {
     }
 
     /// Evaluates the controlwords.
-    fn evaluate(&mut self) {
+    fn evaluate(&mut self, now_ns: Nanoseconds) {
         for index in 0..self.axes.len() {
-            if self.axes[index].evaluate(&self.canopen.dictionary) {
+            if self.axes[index].evaluate(now_ns, &self.canopen.dictionary) {
                 self.fault_reset(index);
             }
         }
@@ -153,33 +167,27 @@ impl ControlLoops for Cia402Drive {
     }
 }
 
-impl CanopenDevice for Cia402Drive {
-    const CHECKS_SYNC_LENGTH: bool = true;
-
-    fn canopen(&mut self) -> &mut CanopenNode {
-        &mut self.canopen
-    }
-
-    fn begin_rpdo(&mut self) -> TakesField {
-        |_, _| true
-    }
-
-    fn take_values(&mut self, now_ns: Nanoseconds, _: ValueSource) {
+/// What its objects mean.
+impl Cia402Drive {
+    /// Acts on the modes, controlwords and set-points in the dictionary.
+    pub(super) fn take_values(&mut self, now_ns: Nanoseconds) {
         self.follow_modes(now_ns);
-        self.evaluate();
+        self.evaluate(now_ns);
         self.latch();
     }
 
-    fn is_faulted(&self) -> bool {
+    /// Returns `true` if an axis is in a fault.
+    pub(super) fn is_faulted(&self) -> bool {
         self.axes.iter().any(|axis| axis.state().is_faulted())
     }
 
-    fn measure(&mut self) {
-        self.axes.iter().for_each(|axis| axis.measure(&self.quirks, &mut self.canopen.dictionary));
+    /// Writes the measured values to the dictionary.
+    pub(super) fn measure(&mut self) {
+        self.axes.iter().for_each(|axis| axis.measure(&mut self.canopen.dictionary));
     }
 
-    /// The torque takes the place of the position.
-    fn shown(&self) -> ShownObjects {
+    /// The objects that a defect can change in the feedback: the torque takes the place of the position.
+    pub(super) fn shown(&self) -> ShownObjects {
         let places = &self.axes[0].places;
         ShownObjects {
             statusword: places.statusword,
@@ -189,19 +197,27 @@ impl CanopenDevice for Cia402Drive {
         }
     }
 
-    fn started(&mut self, now_ns: Nanoseconds) {
-        self.axes.iter_mut().for_each(|axis| axis.started(&self.canopen.dictionary, now_ns));
+    /// The node has booted.
+    pub(super) fn started(&mut self, now_ns: Nanoseconds) {
+        for index in 0..self.axes.len() {
+            self.axes[index].started(&self.canopen.dictionary, now_ns);
+            if self.axes[index].has_lost_turns() {
+                self.fail(index, DeviceError::Fault(DriveFault::MultiTurnBattery));
+            }
+        }
     }
 
-    fn restart(&mut self, now_ns: Nanoseconds) {
+    /// Restarts everything except the joints and the saved parameters.
+    pub(super) fn restart(&mut self, now_ns: Nanoseconds) {
         self.canopen.restart(now_ns);
         for axis in &mut self.axes {
             axis.restart(&mut self.canopen.dictionary, &self.quirks);
         }
+        self.power_up();
     }
 
-    /// Every axis does what object 6007 says.
-    fn lose_master(&mut self) {
+    /// The master is lost: every axis does what object 6007 says.
+    pub(super) fn lose_master(&mut self) {
         let CanopenNode { dictionary, errors, .. } = &mut self.canopen;
         let mut is_fault = false;
         for axis in &mut self.axes {
@@ -217,21 +233,33 @@ impl CanopenDevice for Cia402Drive {
         }
     }
 
-    fn check_write(&self, _: usize) -> Result<(), AbortCode> {
-        Ok(())
+    /// Checks that SDO can write an object of the dictionary now.
+    pub(super) fn check_write(&self, place: usize) -> Result<(), AbortCode> {
+        let is_kept = self.axes.iter().any(|axis| axis.places.mode == Some(place) && axis.keeps_mode());
+        if is_kept { Err(AbortCode::DeviceState) } else { Ok(()) }
     }
 
-    fn check_value(&self, _: ObjectAddress, _: usize, _: i64) -> Result<(), AbortCode> {
-        Ok(())
+    /// Checks what the range of an object does not say of a value.
+    pub(super) fn check_value(&self, address: ObjectAddress, value: i64) -> Result<(), AbortCode> {
+        let is_remote = matches!(address.index, 0x1800..=0x19FF) && address.subindex == 2;
+        let is_refused = self.quirks.simulated.refuses_remote_pdos && is_remote && matches!(value, 252 | 253);
+        if is_refused { Err(AbortCode::Value) } else { Ok(()) }
     }
 
-    fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+    /// Applies the effects of a value that SDO has written.
+    pub(super) fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+        if self.quirks.turn_count.is_some_and(|turns| turns.clear == address) {
+            let place = self.canopen.dictionary.place(address.index, address.subindex);
+            if self.canopen.dictionary.number_at(place) == Some(1) {
+                self.axes[0].clear_turns();
+            }
+        }
         let object = match address.index {
             0x6000..=0x9FFF => 0x6000 + (address.index - 0x6000) % AXIS_OFFSET,
             _ => return,
         };
         match object {
-            0x6040 => self.evaluate(),
+            0x6040 => self.evaluate(now_ns),
             0x6060 => self.follow_modes(now_ns),
             0x607A | 0x60C1 => self.latch(),
             0x607E | 0x608F | 0x6091 | 0x6092 | 0x6096 | 0x60A9 => {
@@ -263,6 +291,9 @@ impl Drive for Cia402Drive {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
+            if fault == DriveFault::MultiTurnBattery && self.quirks.turn_count.is_some() {
+                self.axes[0].lose_turns();
+            }
             self.fail(0, DeviceError::Fault(fault));
         }
         self.advance_node(now_ns, mailbox);

@@ -3,7 +3,7 @@
 //! deviates from its file stands in its [`Quirks`].
 //!
 //! ```text
-//! data sheet ── object_dictionary ── canopen_node ──┬── sdo_server   SDO: expedited, segmented, blocks
+//! data sheet ── object_dictionary ── node, services ┬── sdo_server   SDO: expedited, segmented, blocks
 //!                                        │          ├── pdo_engine   RPDO, TPDO, transmission types
 //!                                        │          ├── network      NMT, heartbeat, guarding, SYNC producer
 //!                                        │          └── errors       emergency messages, error history
@@ -13,9 +13,10 @@
 //! ```
 //!
 //! Choices where neither the file nor the standards give an answer:
-//! - A cyclic target latched at SYNC k is reached one interpolation period later (60C2, otherwise 1006, otherwise 1 ms). The
+//! - A cyclic target latched at SYNC k is reached one interpolation period later (60C2, otherwise 1006, otherwise 1 ms; with a
+//!   quirk, 1006 before 60C2). The
 //!   difference of the last two targets is fed forward for at most two periods. Without SYNC the last target is held.
-//! - Interpolated position takes its targets from 60C1:1, or from 607A where the file lacks that.
+//! - Interpolated position takes its targets from 60C1:1, or from 607A where the file lacks that or the quirks name it.
 //! - Without 6007, the loss of the master is a fault; the NMT state changes by 1029.
 //! - Without 6083, 6084 or 609A, or where they are 0, the axis reaches its highest velocity in 0.1 s.
 //! - An axis that the file gives no unit for velocities has position units per second.
@@ -24,13 +25,16 @@
 //! - A homing method whose switches are not wired is a homing error at once.
 //! - The velocity mode (2), 607B, 60C4, 1007 and 1012 have no effect.
 
+mod access;
 mod axis;
 mod device;
 mod drive;
 mod homing;
 mod motion;
+mod node;
 mod places;
 mod profile;
+mod services;
 mod units;
 
 use takt_rt::Nanoseconds;
@@ -117,7 +121,17 @@ fn dictionary_of(parameters: &Cia402Parameters) -> Result<SimulatedDictionary, N
     }
     let is_missing = |address| quirks.is_missing(address);
     let is_constant = |address| quirks.is_constant(address);
-    let dictionary = SimulatedDictionary::of(sheet, *node, is_missing, is_constant);
+    let mut dictionary = SimulatedDictionary::of(sheet, *node, is_missing, is_constant);
+    for (address, value) in &quirks.values {
+        if let Ok(place) = dictionary.find(*address) {
+            dictionary.set_factory(place, *value);
+        }
+    }
+    for (address, range) in &quirks.simulated.ranges {
+        if let Ok(place) = dictionary.find(*address) {
+            dictionary.set_range(place, *range);
+        }
+    }
     for axis in 0..axes.len() {
         for index in [0x6040, 0x6041] {
             let address = ObjectAddress::new(index + axis as u16 * places::AXIS_OFFSET, 0);

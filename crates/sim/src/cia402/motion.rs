@@ -11,10 +11,18 @@ use crate::motion::{Actual, Demand, Generator, SetPoints};
 use super::homing::{Homing, HomingSpeed, HomingStep};
 use super::profile::Profile;
 
+/// In interpolated position mode with moves, a target up to this multiple of the longest step (profile velocity times period)
+/// belongs to a stream. A more distant one is a move.
+const STREAMED_STEPS: f64 = 1.5;
+
 /// Generates the set-points of the loops.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     mode: Option<OperationMode>,
+    /// True if a distant target of interpolated position mode is a move by the profile.
+    moves_in_interpolation: bool,
+    /// True if the targets of interpolated position mode come as a stream.
+    is_streamed: bool,
     generator: Generator,
     torque: f64,
     set_points: SetPoints,
@@ -29,9 +37,11 @@ pub struct Motion {
 
 impl Motion {
     /// A generator at standstill.
-    pub fn new() -> Self {
+    pub fn new(moves_in_interpolation: bool) -> Self {
         Self {
             mode: None,
+            moves_in_interpolation,
+            is_streamed: false,
             generator: Generator::default(),
             torque: 0.0,
             set_points: SetPoints::default(),
@@ -50,7 +60,7 @@ impl Motion {
             mode,
             generator: Generator::starting(actual),
             set_points: SetPoints::starting(actual.position),
-            ..Self::new()
+            ..Self::new(self.moves_in_interpolation)
         };
         self.latch(profile);
     }
@@ -83,10 +93,30 @@ impl Motion {
             _ => return,
         };
         let target = self.within_software_limits(wanted, profile);
-        if !self.generator.interpolates_to(target) {
+        if !self.generator.interpolates_to(target) && self.streams_to(target, profile) {
             let period_s = profile.interpolation_period_s();
             self.generator.interpolate_to(target, period_s, profile.velocity_limit());
         }
+    }
+
+    /// Returns `true` if a cyclic target is one of a stream, and not one of a move.
+    fn streams_to(&mut self, target: f64, profile: &Profile<'_>) -> bool {
+        if !self.moves_in_interpolation || self.mode != Some(OperationMode::InterpolatedPosition) {
+            return true;
+        }
+        let longest_step = profile.profile_velocity() * profile.interpolation_period_s();
+        let is_within_stream = (target - self.generator.position).abs() <= STREAMED_STEPS * longest_step;
+        if !self.is_streamed && is_within_stream {
+            self.generator.target = self.generator.position;
+        }
+        self.is_streamed = is_within_stream;
+        is_within_stream
+    }
+
+    /// Returns `true` if bit 4 of the controlword starts a move by the profile.
+    fn has_set_points(&self) -> bool {
+        self.mode == Some(OperationMode::ProfilePosition)
+            || self.mode == Some(OperationMode::InterpolatedPosition) && self.moves_in_interpolation
     }
 
     fn interpolates(&self, profile: &Profile<'_>) -> bool {
@@ -104,7 +134,7 @@ impl Motion {
     ) -> bool {
         let is_rising = word & !previous & controlword::BIT_4 != 0;
         match self.mode {
-            Some(OperationMode::ProfilePosition) => {
+            _ if self.has_set_points() => {
                 self.evaluate_set_point(word, previous, profile);
                 false
             }
@@ -152,7 +182,7 @@ impl Motion {
                 self.generator.ramp(0.0, profile.deceleration_of(profile.halt_ramp()), duration_s);
                 Demand::Position { position, velocity: self.generator.velocity, torque: 0.0 }
             }
-            Some(OperationMode::ProfilePosition) => {
+            _ if self.has_set_points() && !self.is_streamed => {
                 self.step_profile(profile, duration_s);
                 Demand::Position { position, velocity: self.generator.velocity, torque: 0.0 }
             }

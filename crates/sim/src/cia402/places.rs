@@ -50,6 +50,7 @@ places! {
     target_torque = 0x6071: 0,
     max_torque = 0x6072: 0,
     torque_demand = 0x6074: 0,
+    rated_current = 0x6075: 0,
     rated_torque = 0x6076: 0,
     torque = 0x6077: 0,
     current = 0x6078: 0,

@@ -23,6 +23,8 @@ pub struct Profile<'a> {
     pub dictionary: &'a SimulatedDictionary,
     /// The highest velocity of the motor: position units/s.
     pub highest_velocity: f64,
+    /// True if the SYNC period comes before 60C2.
+    pub interpolates_over_sync: bool,
 }
 
 impl Profile<'_> {
@@ -109,14 +111,19 @@ impl Profile<'_> {
         MotionLimits { velocity: self.velocity_limit(), positions }
     }
 
-    /// The period over which the cyclic modes interpolate: 60C2, otherwise the SYNC period 1006, otherwise 1 ms.
+    /// The period over which the cyclic modes interpolate: 60C2, otherwise the SYNC period 1006, otherwise 1 ms;
+    /// with a quirk, 1006 before 60C2.
     pub fn interpolation_period_s(&self) -> f64 {
         let exponent =
             self.dictionary.number_at(self.places.interpolation_exponent).unwrap_or(-3).clamp(-6, 0);
         let by_object = self.positive(self.places.interpolation_period);
         let by_object = by_object.map(|period| period * 10f64.powi(exponent as i32));
         let by_sync = || self.positive(self.dictionary.place(0x1006, 0)).map(|period_us| period_us * 1e-6);
-        by_object.or_else(by_sync).unwrap_or(1e-3)
+        let period_s = match self.interpolates_over_sync {
+            true => by_sync().or(by_object),
+            false => by_object.or_else(by_sync),
+        };
+        period_s.unwrap_or(1e-3)
     }
 
     /// Object 6065; `None` when it is absent or all ones, which means no window.

@@ -8,7 +8,7 @@ const FORWARD_FILTER_S: f64 = 1e-3;
 /// joint.
 const FORWARD_PERIODS: f64 = 2.0;
 /// Tolerance in counts within which a profile has reached its target.
-pub const ARRIVED: f64 = 0.01;
+const ARRIVED: f64 = 0.01;
 
 /// The demanded position and velocity of one axis, and the way to its target.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,18 +1,34 @@
 //! A bus with simulated eRob joints and a master that the test controls, in virtual time.
 
-use takt::sim::erob::{ErobJoint, ErobParameters};
+use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
+use takt::sim::homing_switches::ReferenceSwitches;
 use takt::sim::plant::{Encoder, JointParameters};
 use takt::sim::{Drive, Observation, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch, Received};
+use takt_wire::quirks::Quirks;
 
 pub const NODE: u8 = 5;
 pub const MILLISECOND_NS: u64 = 1_000_000;
 pub const COUNTS_PER_RADIAN: f64 = 524_288.0 / std::f64::consts::TAU;
 
-/// A joint of size 80H-80.
-pub fn parameters(node: u8) -> ErobParameters {
-    ErobParameters {
+/// A joint of size 80H-80, whose firmware has no interpolated position.
+pub fn parameters(node: u8) -> Cia402Parameters {
+    let file = |name| std::path::Path::new("../..").join(name);
+    let quirks = takt::config::quirks::load(&file("drives/erob-canopen.toml")).unwrap();
+    Cia402Parameters {
+        sheet: takt_wire::canopen::eds::load(&file("configs/eds/erob-canopen.eds")).unwrap().dictionary,
         node,
+        quirks: Quirks { undeclared_modes: vec![], ..quirks },
+        axes: vec![axis()],
+        power_up_ns: 5 * MILLISECOND_NS,
+        feedback_delay_ns: 20_000,
+        seed: 7,
+    }
+}
+
+/// The joint of [`parameters`].
+pub fn axis() -> Cia402AxisParameters {
+    Cia402AxisParameters {
         joint: JointParameters {
             inertia: 0.4,
             viscous_friction: 1.5,
@@ -26,13 +42,14 @@ pub fn parameters(node: u8) -> ErobParameters {
         rated_torque: 31.0,
         peak_torque: 56.0,
         highest_velocity: 4.0,
-        power_up_ns: 5 * MILLISECOND_NS,
-        feedback_delay_ns: 20_000,
-        has_battery: true,
-        has_interpolated_position: false,
-        is_upload_segmented: false,
-        seed: 7,
+        switches: ReferenceSwitches::default(),
+        end_stops: None,
     }
+}
+
+/// A drive with these parameters.
+pub fn drive(parameters: Cia402Parameters) -> Cia402Drive {
+    Cia402Drive::new(parameters).unwrap()
 }
 
 pub struct Bench {
@@ -44,12 +61,8 @@ pub struct Bench {
 
 impl Bench {
     /// A bus with these modules after their boot-up messages, which are discarded.
-    pub fn with(modules: Vec<ErobParameters>) -> Self {
-        let mut drives: Vec<Box<dyn Drive>> = vec![];
-        for module in modules {
-            drives.push(Box::new(ErobJoint::new(module)));
-        }
-        Self::of(drives)
+    pub fn with(modules: Vec<Cia402Parameters>) -> Self {
+        Self::of(modules.into_iter().map(|module| -> Box<dyn Drive> { Box::new(drive(module)) }).collect())
     }
 
     /// A bus with any drives that boot within 10 ms.

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use takt::sim::erob::{ErobJoint, ErobParameters};
-use takt::sim::plant::{Encoder, JointParameters};
+use takt::sim::cia402::Cia402Parameters;
 use takt::sim::{SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
 use takt_wire::canopen::eds;
@@ -13,8 +12,7 @@ use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 use takt_wire::canopen::pdo_reader::{PdoReadError, PdoReader};
 use takt_wire::canopen::sdo::{Completed, Expedited, SdoClient, SdoError, SdoRequest, SdoTiming, Transfer};
 
-const NODE: u8 = 5;
-const MILLISECOND_NS: u64 = 1_000_000;
+use super::bench::{MILLISECOND_NS, NODE, drive, parameters};
 
 struct Bench {
     bus: SimulatedBus,
@@ -23,28 +21,7 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        let drive = ErobJoint::new(ErobParameters {
-            node: NODE,
-            joint: JointParameters {
-                inertia: 0.3,
-                viscous_friction: 1.0,
-                coulomb_friction: 3.0,
-                friction_shape: takt::config::FrictionShape::Constant,
-                brake_torque: 60.0,
-            },
-            encoder: Encoder { counts_per_unit: 83_443.0, zero_counts: 0.0 },
-            counts_per_turn: 524_288.0,
-            initial_position: 0.0,
-            rated_torque: 31.0,
-            peak_torque: 60.0,
-            highest_velocity: 3.0,
-            power_up_ns: MILLISECOND_NS,
-            feedback_delay_ns: 20_000,
-            has_battery: true,
-            has_interpolated_position: false,
-            is_upload_segmented: false,
-            seed: 1,
-        });
+        let drive = drive(Cia402Parameters { power_up_ns: MILLISECOND_NS, ..parameters(NODE) });
         let rates = WireBitRates { nominal: 1_000_000, data: None };
         let mut bus = SimulatedBus::with_drives(rates, u64::MAX, vec![Box::new(drive)]);
         bus.send(0, &[]);

@@ -1,10 +1,10 @@
 //! The CiA 402 state machine: the statuswords of real units, faults and fault resets.
 
 use takt::sim::DriveFault;
-use takt::sim::erob::ErobParameters;
+use takt::sim::cia402::{Cia402AxisParameters, Cia402Parameters};
 use takt_rt::DriveState;
 
-use super::bench::{Bench, NODE, parameters};
+use super::bench::{Bench, NODE, axis, parameters};
 
 const TARGET_POSITION: u32 = 0x607A_0020;
 const TARGET_VELOCITY: u32 = 0x60FF_0020;
@@ -14,7 +14,7 @@ const WARNING: u16 = 0x80;
 fn statuswords_equal_those_of_real_units_with_and_without_the_warning_bit() {
     let mut warnings = std::collections::BTreeSet::new();
     for seed in 0..8 {
-        let mut bench = Bench::with(vec![ErobParameters { seed, ..parameters(NODE) }]);
+        let mut bench = Bench::with(vec![Cia402Parameters { seed, ..parameters(NODE) }]);
         bench.write(0x6060, 0, 1, 8).unwrap();
         bench.start_process_data(TARGET_POSITION);
         let mut seen = vec![bench.cycle(0, 0).0];
@@ -112,8 +112,8 @@ fn a_fault_reset_needs_a_rising_edge_held_for_several_cycles() {
 
 #[test]
 fn a_battery_fault_needs_its_own_reset_which_clears_the_turn_count() {
-    let far = ErobParameters { initial_position: 20.0, ..parameters(NODE) };
-    let mut bench = Bench::with(vec![far]);
+    let far = Cia402AxisParameters { initial_position: 20.0, ..axis() };
+    let mut bench = Bench::with(vec![Cia402Parameters { axes: vec![far], ..parameters(NODE) }]);
     let before = bench.observe().position_counts;
     assert!(before > 3 * 524_288);
     bench.bus.inject_fault(NODE, DriveFault::MultiTurnBattery).unwrap();
@@ -245,7 +245,9 @@ fn a_power_cycle_disables_the_drive_engages_the_brake_and_restarts() {
 
 #[test]
 fn without_a_battery_the_position_after_a_power_cycle_is_single_turn() {
-    let module = ErobParameters { initial_position: -20.0, has_battery: false, ..parameters(NODE) };
+    let far = Cia402AxisParameters { initial_position: -20.0, ..axis() };
+    let mut module = Cia402Parameters { axes: vec![far], ..parameters(NODE) };
+    module.quirks.simulated.lacks_battery = true;
     let mut bench = Bench::with(vec![module]);
     assert!((0..524_288).contains(&bench.observe().position_counts));
     bench.bus.power_cycle(NODE).unwrap();

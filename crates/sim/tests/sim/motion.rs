@@ -1,14 +1,18 @@
 //! The modes in which the master generates the trajectory: CSP, CSV, CST.
 
-use takt::sim::erob::ErobParameters;
+use takt::sim::cia402::{Cia402AxisParameters, Cia402Parameters};
 use takt::sim::plant::Encoder;
 use takt_rt::DriveState;
 
-use super::bench::{Bench, COUNTS_PER_RADIAN, MILLISECOND_NS, NODE, parameters};
+use super::bench::{Bench, COUNTS_PER_RADIAN, MILLISECOND_NS, NODE, axis, parameters};
 
 const TARGET_POSITION: u32 = 0x607A_0020;
 const TARGET_VELOCITY: u32 = 0x60FF_0020;
 const TARGET_TORQUE: u32 = 0x6071_0010;
+
+fn with_axis(axis: Cia402AxisParameters) -> Cia402Parameters {
+    Cia402Parameters { axes: vec![axis], ..parameters(NODE) }
+}
 
 /// A quintic of 2 rad in 2 s in counts: 1.9 rad/s, 5.8 rad/s² at most.
 fn quintic(cycle: i32) -> i32 {
@@ -69,7 +73,7 @@ fn csp_rests_within_one_count_after_many_small_and_large_moves() {
 #[test]
 fn a_reversed_joint_with_an_offset_moves_in_its_own_direction() {
     let encoder = Encoder { counts_per_unit: -COUNTS_PER_RADIAN, zero_counts: 1000.0 };
-    let mut bench = Bench::with(vec![ErobParameters { encoder, ..parameters(NODE) }]);
+    let mut bench = Bench::with(vec![with_axis(Cia402AxisParameters { encoder, ..axis() })]);
     bench.enable(8, TARGET_POSITION, 1000);
     for cycle in 0..3000 {
         bench.cycle(0x0F, 1000 + quintic(cycle));
@@ -81,7 +85,7 @@ fn a_reversed_joint_with_an_offset_moves_in_its_own_direction() {
 
 #[test]
 fn enabling_with_a_stale_target_makes_the_axis_jump() {
-    let start = ErobParameters { initial_position: 0.5, ..parameters(NODE) };
+    let start = with_axis(Cia402AxisParameters { initial_position: 0.5, ..axis() });
     let mut bench = Bench::with(vec![start]);
     bench.enable(8, TARGET_POSITION, 0);
     let mut fastest = 0.0f64;

@@ -1,6 +1,6 @@
 //! NMT, boot-up, heartbeat producer and consumer, node guarding, emergency messages.
 
-use takt::sim::erob::ErobParameters;
+use takt::sim::cia402::Cia402Parameters;
 use takt::sim::{DriveFault, NodeState};
 use takt_rt::{DriveState, Frame, Id};
 
@@ -10,7 +10,7 @@ const MASTER_HEARTBEAT: u32 = 0x701;
 
 #[test]
 fn a_drive_sends_nothing_before_its_boot_up_message() {
-    let slow = ErobParameters { power_up_ns: 8_000 * MILLISECOND_NS, ..parameters(NODE) };
+    let slow = Cia402Parameters { power_up_ns: 8_000 * MILLISECOND_NS, ..parameters(NODE) };
     let mut bench = Bench::with(vec![slow]);
     bench.send_data(0x605, [0x40, 0x00, 0x10, 0, 0, 0, 0, 0]);
     bench.send_data(0x000, [0x01, 0x00]);

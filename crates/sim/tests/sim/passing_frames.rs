@@ -1,10 +1,10 @@
 //! PDOs of other nodes, which a simulated node does not look at.
 
-use takt::sim::erob::ErobJoint;
+use takt::sim::cia402::Cia402Drive;
 use takt::sim::{Defect, Drive, DriveFault, Gravity, Mailbox, Observation, QueueOrder, Unsupported};
 use takt_rt::{Frame, Id};
 
-use super::bench::{Bench, NODE, parameters};
+use super::bench::{Bench, NODE, drive, parameters};
 
 const TARGET_POSITION: u32 = 0x607A_0020;
 /// It belongs to no service, and a node looks at it to find that out.
@@ -12,21 +12,21 @@ const UNKNOWN: u32 = 0x005;
 
 /// The same drive twice. One gets the PDOs of other nodes as they are, the other one each of them under an identifier that it looks at.
 struct Pair {
-    passing: ErobJoint,
-    looking: ErobJoint,
+    passing: Cia402Drive,
+    looking: Cia402Drive,
     passed: u32,
 }
 
 impl Pair {
     fn new() -> Self {
-        let [passing, looking] = [(); 2].map(|()| ErobJoint::new(parameters(NODE)));
+        let [passing, looking] = [(); 2].map(|()| drive(parameters(NODE)));
         let mut pair = Self { passing, looking, passed: 0 };
         pair.set_gravity(Gravity::Pendulum(7.0));
         pair
     }
 
     /// Has both do something, and compares what they send and when they act next.
-    fn both(&mut self, mailbox: &mut Mailbox, mut act: impl FnMut(&mut ErobJoint, bool, &mut Mailbox)) {
+    fn both(&mut self, mailbox: &mut Mailbox, mut act: impl FnMut(&mut Cia402Drive, bool, &mut Mailbox)) {
         let [mut sent, mut expected] = [(); 2].map(|()| Mailbox::new(QueueOrder::FirstInFirstOut, 16));
         act(&mut self.passing, true, &mut sent);
         act(&mut self.looking, false, &mut expected);

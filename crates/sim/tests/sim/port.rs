@@ -1,17 +1,16 @@
 //! The simulated bus as a port of the real-time thread: timing, pauses, counters, determinism.
 
 use takt::config::{Config, Travel};
-use takt::sim::erob::ErobJoint;
 use takt::sim::{SimulatedBus, UnknownNode, WireBitRates};
 use takt_rt::{BusPort, BusState, Frame, Id, RECEIVE_BATCH, ReceiveBatch};
 use takt_wire::wire_length::WireLength;
 
-use super::bench::{Bench, MILLISECOND_NS, NODE, parameters};
+use super::bench::{Bench, MILLISECOND_NS, NODE, drive, parameters};
 
 const RATES: WireBitRates = WireBitRates { nominal: 1_000_000, data: None };
 
 fn bus(longest_gap_ns: u64) -> SimulatedBus {
-    SimulatedBus::with_drives(RATES, longest_gap_ns, vec![Box::new(ErobJoint::new(parameters(NODE)))])
+    SimulatedBus::with_drives(RATES, longest_gap_ns, vec![Box::new(drive(parameters(NODE)))])
 }
 
 fn received(bus: &mut SimulatedBus, now_ns: u64) -> Vec<(u64, u32)> {

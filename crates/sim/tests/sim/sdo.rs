@@ -87,7 +87,8 @@ fn segments_with_a_wrong_toggle_bit_or_size_are_refused() {
 
 #[test]
 fn a_segmented_upload_announces_its_size_and_sends_it() {
-    let segmented = takt::sim::erob::ErobParameters { is_upload_segmented: true, ..parameters(NODE) };
+    let mut segmented = parameters(NODE);
+    segmented.quirks.simulated.segments_uploads = true;
     let mut bench = Bench::with(vec![segmented]);
     assert_eq!(bench.sdo([0x40, 0x18, 0x10, 2, 0, 0, 0, 0]), [0x41, 0x18, 0x10, 2, 4, 0, 0, 0]);
     assert_eq!(bench.sdo([0x60, 0, 0, 0, 0, 0, 0, 0]), [0x07, 0x52, 0x30, 0x48, 0x26, 0, 0, 0]);

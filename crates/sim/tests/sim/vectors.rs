@@ -32,10 +32,9 @@ fn rows() -> Vec<Row> {
 #[test]
 fn the_drive_answers_every_printed_canopen_exchange_as_printed() {
     // One capture shows that mode 7 is accepted, although object 6502 of other units excludes it.
-    let mut bench = Bench::with(vec![takt::sim::erob::ErobParameters {
-        has_interpolated_position: true,
-        ..parameters(2)
-    }]);
+    let mut module = parameters(2);
+    module.quirks.undeclared_modes = vec![takt_rt::OperationMode::InterpolatedPosition];
+    let mut bench = Bench::with(vec![module]);
     let rows = rows();
     assert_eq!(rows.len(), 100);
     let mut answers = 0;

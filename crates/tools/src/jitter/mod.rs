@@ -7,8 +7,6 @@
 mod measurement;
 mod render;
 mod report;
-mod svg;
 
 pub use measurement::{JitterError, JitterOptions, Measurement, Pacing, measure};
 pub use report::{JitterReport, PassReport};
-pub use svg::svg;

@@ -217,14 +217,8 @@ impl Decoded {
 
     /// Service, who is concerned, and words, in one line.
     pub fn line(&self) -> String {
-        self.line_in(": ", str::to_owned)
-    }
-
-    /// Such a line in another language: what is said for each part of it.
-    pub fn line_in(&self, separator: &str, said: impl Fn(&str) -> String) -> String {
         let parts = [self.service.name(), self.who.clone()];
-        let parts = parts.iter().filter(|part| !part.is_empty()).map(|part| said(part));
-        let head = parts.collect::<Vec<_>>().join(" ");
-        if self.words.is_empty() { head } else { format!("{head}{separator}{}", said(&self.words)) }
+        let head = parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ");
+        if self.words.is_empty() { head } else { format!("{head}: {}", self.words) }
     }
 }

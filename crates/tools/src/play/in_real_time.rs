@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use takt_rt::{CycleRecord, Nanoseconds, RequestId, Snapshot, StopCategory, StreamPoint};
+use takt_rt::{CycleRecord, Nanoseconds, RequestId, RequestTarget, Snapshot, StopCategory, StreamPoint};
 
 use super::groups::PlayedGroup;
 use super::performance::{APPROACH_SCALE, MakeTrajectory, PlayError, Stage};
 use super::set_points::{AxisMaxima, SetPointLog};
 use takt::command::MoveOptions;
 use takt::controller::session::Session;
-use takt::controller::{Controller, GroupHandle, StartFailure};
+use takt::controller::{Controller, Handle, StartFailure};
 
 /// The time from one look at the state to the next.
 const LOOK: Duration = Duration::from_millis(1);
@@ -70,8 +70,8 @@ impl<'a> RealStage<'a> {
         Self { controller, set_points, interrupted, was_interrupted: false }
     }
 
-    fn group(&self, group: &PlayedGroup) -> GroupHandle {
-        self.controller.group_of_number(group.number)
+    fn group(&self, group: &PlayedGroup) -> Handle {
+        self.controller.of(RequestTarget::Group(group.number))
     }
 
     /// Returns `true` if it was interrupted.

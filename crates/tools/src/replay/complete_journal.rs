@@ -25,7 +25,7 @@ pub fn complete_journal(path: &str, found: RecordedJournal) -> Result<Journal, S
         ));
     }
     if let Some(defect) = found.defect {
-        return Err(format!("{path}: {defect}"));
+        return Err(defect.to_string());
     }
     match (found.journal, found.lost) {
         (None, _) => Err(format!(

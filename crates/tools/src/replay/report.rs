@@ -79,7 +79,7 @@ impl ComparisonReport {
                     jerk: difference.jerk.into(),
                 })
                 .collect(),
-            stops: comparison.stops.iter().map(|(_, stop)| words::stop(stop, machine)).collect(),
+            stops: comparison.stops.iter().map(|(_, stop)| words::stop(stop, machine).to_string()).collect(),
             last_motion_s: comparison.last_motion_s.into(),
         }
     }

@@ -39,18 +39,18 @@ impl ErrorCode {
         Self::NO_BRAKE,
     ];
 
-    /// What the code means; `None` if the manual does not list it.
-    pub const fn words(self) -> Option<&'static str> {
+    /// The meaning of the code in English and in Chinese; `None` if the manual does not list it.
+    pub const fn bilingual(self) -> Option<(&'static str, &'static str)> {
         Some(match self {
-            Self::MOVING => "not allowed while the motor moves",
-            Self::ENABLED => "not allowed while the motor is enabled",
-            Self::NO_COMMUTATION => "the commutation is not complete after power-on",
-            Self::DISABLED => "no motion can start while the motor is disabled",
-            Self::NO_MOTION_MODE => "no motion can start in this motion mode",
-            Self::ARGUMENT_MISSING => "the command needs an argument",
-            Self::ARGUMENT_NOT_TAKEN => "the command takes no argument",
-            Self::RELAY_NOT_ACTIVE => "the relay is not active yet",
-            Self::NO_BRAKE => "the drive controls no brake",
+            Self::MOVING => ("not allowed while the motor moves", "电机运动时不允许"),
+            Self::ENABLED => ("not allowed while the motor is enabled", "电机使能时不允许"),
+            Self::NO_COMMUTATION => ("the commutation is not complete after power-on", "上电后换相尚未完成"),
+            Self::DISABLED => ("no motion can start while the motor is disabled", "电机未使能时不能开始运动"),
+            Self::NO_MOTION_MODE => ("no motion can start in this motion mode", "该运动模式下不能开始运动"),
+            Self::ARGUMENT_MISSING => ("the command needs an argument", "该命令需要参数"),
+            Self::ARGUMENT_NOT_TAKEN => ("the command takes no argument", "该命令不带参数"),
+            Self::RELAY_NOT_ACTIVE => ("the relay is not active yet", "继电器尚未吸合"),
+            Self::NO_BRAKE => ("the drive controls no brake", "驱动器未控制制动器"),
             _ => return None,
         })
     }
@@ -84,6 +84,6 @@ impl ErrorCode {
 impl fmt::Display for ErrorCode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "error 0x{:04X}", self.0)?;
-        self.words().map_or(Ok(()), |words| write!(f, ", {words}"))
+        self.bilingual().map_or(Ok(()), |(words, _)| write!(f, ", {words}"))
     }
 }

@@ -3,8 +3,8 @@
 use arrayvec::ArrayVec;
 
 use super::super::errno;
+use super::descriptor::{DescriptorError, duplicate};
 use super::link::bound_interface;
-use super::port::{DescriptorError, duplicate};
 
 /// The most filters that a socket takes (`CAN_RAW_FILTER_MAX`).
 const FILTERS: usize = 512;

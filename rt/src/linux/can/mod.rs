@@ -17,6 +17,7 @@ mod arrival_time;
 mod attachment;
 mod batch;
 mod bus_port;
+mod descriptor;
 mod error_frame;
 mod in_flight;
 mod link;
@@ -26,4 +27,5 @@ mod together;
 mod wire_format;
 
 pub use attachment::Attachment;
-pub use port::{DescriptorError, SocketCanPort};
+pub use descriptor::DescriptorError;
+pub use port::SocketCanPort;

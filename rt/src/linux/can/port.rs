@@ -1,10 +1,10 @@
 //! The socket of a bus.
 
 use super::super::clock::timespec_of;
-use super::super::errno;
 use super::accounting::TxRxAccounting;
 use super::attachment::Attachment;
 use super::batch::{self, Destination, SEND_BATCH, SocketSource};
+use super::descriptor::{DescriptorError, duplicate};
 use super::link::Link;
 use crate::frame::Frame;
 use crate::port::BusState;
@@ -38,30 +38,6 @@ pub struct SocketCanPort {
     pub(super) accounting: TxRxAccounting,
     /// True if the bus is set up for CAN FD frames.
     takes_fd: bool,
-}
-
-/// A socket descriptor that cannot be duplicated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct DescriptorError {
-    /// The descriptor that was handed in.
-    pub descriptor: i32,
-    /// The error number of the system (errno(3)).
-    pub errno: i32,
-}
-
-impl core::fmt::Display for DescriptorError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "file descriptor {} cannot be duplicated: system error {}", self.descriptor, self.errno)
-    }
-}
-
-impl core::error::Error for DescriptorError {}
-
-/// Duplicates a descriptor.
-pub(super) fn duplicate(descriptor: libc::c_int) -> Result<libc::c_int, DescriptorError> {
-    // SAFETY: the call takes numbers only, and refuses a number that is no descriptor.
-    let own = unsafe { libc::fcntl(descriptor, libc::F_DUPFD_CLOEXEC, 0) };
-    if own < 0 { Err(DescriptorError { descriptor, errno: errno() }) } else { Ok(own) }
 }
 
 impl SocketCanPort {

@@ -8,9 +8,9 @@ use arrayvec::ArrayVec;
 
 use super::batch::{self, Destination, SEND_BATCH};
 use super::port::SocketCanPort;
+use crate::capacity::MAX_BUSES;
 use crate::frame::Frame;
 use crate::port::Outgoing;
-use crate::record::MAX_BUSES;
 
 /// Sends in one call for all buses that are not behind. A bus that is behind sends on its own socket: frames that wait for
 /// the wire take room in the buffer of the socket that sent them, and must not take it from other buses.

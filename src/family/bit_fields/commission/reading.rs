@@ -92,7 +92,7 @@ pub async fn info(task: &FieldTask) -> Result<Report, Failure> {
     drop(client);
     if let Some(error) = error {
         let code = error as u16;
-        let words = if code == 0 { "none".to_owned() } else { s.error_words(code) };
+        let words = if code == 0 { "none".into() } else { s.error_words(code) };
         report.add("error_code", "error", code, words);
         if code != 0 {
             task.c.note(s.error_cure(code));

@@ -4,7 +4,6 @@
 //! - `registers`: drives whose registers can be read.
 //! - `heartbeat`: drives that send heartbeats by themselves.
 
-mod chinese;
 mod heartbeat;
 mod registers;
 
@@ -14,7 +13,6 @@ use takt_rt::{CommandValue, FieldMode};
 
 use super::{FROM_FILE, SHIPPED, shipped};
 use crate::family::scan::{FoundDevice, OwnProtocol, StartingKeys};
-pub use chinese::PHRASES as CHINESE_PHRASES;
 use heartbeat::HeartbeatDrives;
 use registers::RegisterDrives;
 use takt_wire::bit_fields::{DescribedScan, Description, FieldDevice, Settings};

@@ -6,7 +6,8 @@ use takt_wire::canopen::objects::*;
 
 use super::access::read_if_there;
 use super::motion::{POLL_NS, with_torque};
-use super::objects::{HOMING_METHOD, HOMING_SPEED_SWITCH, HOMING_SPEED_ZERO};
+use super::objects::{HOME_OFFSET, HOMING_METHOD, HOMING_SPEED_SWITCH, HOMING_SPEED_ZERO};
+use super::words::modes_words;
 use super::{enabling, reading};
 use crate::family::commission::contact;
 use crate::family::commission::failure::Failure;
@@ -45,7 +46,15 @@ pub async fn home(
             instead: "set `zero_counts` in the configuration, if its encoder is absolute".to_owned(),
         });
     }
+    let method = method.or(s.lacks_switches().then_some(PRESENT_POSITION[0]));
+    if let Some(method) = method.filter(|method| s.lacks_switches() && !PRESENT_POSITION.contains(method)) {
+        return Err(Failure::Unsupported {
+            what: format!("homing method {method} needs switches, which this drive does not have"),
+            instead: "method 35 or 37 takes the present position as zero".to_owned(),
+        });
+    }
     contact::connect_family(c, s).await?;
+    check_declares_homing(c, s).await?;
     c.step("homing method");
     let method = match method {
         Some(method) => method,
@@ -57,7 +66,22 @@ pub async fn home(
     if !PRESENT_POSITION.contains(&method) {
         check_speeds(c, s).await?;
     }
-    with_torque(c, s, false, run(c, s, method, None, within_ns)).await
+    let offset = s.lacks_switches().then_some((HOME_OFFSET, 0));
+    with_torque(c, s, false, run(c, s, method, offset, within_ns)).await
+}
+
+/// Refuses homing where the drive names its modes (6502), and homing is not one of them.
+async fn check_declares_homing(c: &SdoSession, s: &TargetDrive) -> Result<(), Failure> {
+    c.step("supported modes");
+    let supported = read_if_there(c, s, &SUPPORTED_DRIVE_MODES).await?.unwrap_or(0) as u32;
+    let homing = OperationMode::Homing;
+    if supported == 0 || supported & homing.supported_bit() != 0 || s.adds_mode(homing) {
+        return Ok(());
+    }
+    Err(Failure::Unsupported {
+        what: format!("this drive does not declare homing: 6502 names {}", modes_words(supported)),
+        instead: "set `zero_counts` in the configuration, if its encoder is absolute".to_owned(),
+    })
 }
 
 /// Prepares the drive, and runs the method. With an offset, the home position gets this value (607C).

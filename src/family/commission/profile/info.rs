@@ -87,6 +87,9 @@ async fn condition(
         let volts = millivolts as f64 / 1000.0;
         report.add("voltage_v", "DC link voltage", volts, format!("{volts} V"));
     }
+    if let Some(degrees) = reading.temperature_c {
+        report.add("temperature_c", "temperature", degrees, format!("{degrees} °C"));
+    }
     Ok(())
 }
 
@@ -109,7 +112,7 @@ async fn errors(c: &SdoSession, s: &TargetDrive, report: &mut Report) -> Result<
             history.push(value as u16);
         }
     }
-    let words: Vec<String> = history.iter().map(|code| s.error_words(*code)).collect();
+    let words: Vec<String> = history.iter().map(|code| s.error_words(*code).to_string()).collect();
     let text = if words.is_empty() { "empty".to_owned() } else { words.join(", ") };
     report.add("error_history", "error history", json!(history), text);
     Ok(())

@@ -160,8 +160,8 @@ pub fn meaning(drive: &DriveFamily, object: &Object, value: i64) -> Option<Strin
             Some(mode.name().to_owned())
         }
         0x6502 => Some(modes_words(value as u32)),
-        0x603F => Some(drive_error_words(drive, value as u16)),
-        0x1003 if object.address.subindex > 0 => Some(drive_error_words(drive, value as u16)),
+        0x603F => Some(drive_error_words(drive, value as u16).to_string()),
+        0x1003 if object.address.subindex > 0 => Some(drive_error_words(drive, value as u16).to_string()),
         0x1001 => Some(ErrorRegister(value as u8).to_string()),
         0x1016 if object.address.subindex == 1 => Some(match value & 0xFFFF {
             0 => "heartbeat watchdog off".to_owned(),

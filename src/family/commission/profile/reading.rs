@@ -32,6 +32,10 @@ pub async fn read(c: &SdoSession, s: &TargetDrive, rated: Option<f64>) -> Result
     let counts = c.read(&POSITION_ACTUAL_VALUE).await?;
     let velocity = read_if_there(c, s, &VELOCITY_ACTUAL_VALUE).await?;
     let per_mille = read_if_there(c, s, &TORQUE_ACTUAL_VALUE).await?;
+    let temperature = match s.temperature() {
+        Some(object) => c.read_optional(&object).await?,
+        None => None,
+    };
     let word = c.read(&STATUSWORD).await? as u16;
     Ok(AxisReading {
         at_ns: c.now_ns(),
@@ -40,7 +44,7 @@ pub async fn read(c: &SdoSession, s: &TargetDrive, rated: Option<f64>) -> Result
         velocity: velocity.map_or(f64::NAN, |velocity| s.velocity(velocity as f64)),
         torque: per_mille.and_then(|per_mille| torque(s, rated, per_mille)),
         current_a: None,
-        temperature_c: None,
+        temperature_c: temperature.map(|degrees| degrees as f64),
         statusword: Some(word),
         state: DriveState::decode(word).name(),
     })

@@ -114,7 +114,7 @@ pub async fn clear_fault(c: &ErobCanSession, s: &TargetDrive) -> Result<Report, 
         });
     }
     let mut report = Report::new();
-    let words = if before == 0 { "there was no error".to_owned() } else { s.error_words(before as u16) };
+    let words = if before == 0 { "there was no error".into() } else { s.error_words(before as u16) };
     report.add("cleared", "cleared", before, words);
     Ok(report)
 }

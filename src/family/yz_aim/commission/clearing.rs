@@ -54,7 +54,7 @@ pub async fn clear(c: &SdoSession, s: &TargetDrive, is_confirmed: bool) -> Resul
     c.step("verification");
     if !is_gone(c).await? {
         let alarm = reading::alarm(c).await?;
-        return Err(Failure::FaultPersists { what: format!("alarm {alarm}"), advice: alarm.advice() });
+        return Err(Failure::FaultPersists { what: alarm.words(), advice: alarm.advice() });
     }
     report.add("cleared", "cleared", true, "yes");
     report.append(reading::summary(c, s).await?);
@@ -74,7 +74,8 @@ async fn reset(c: &SdoSession, alarm: Alarm) -> Result<(), Failure> {
     if alarm == Alarm::OverVoltage {
         let voltage = c.read(&VOLTAGE).await? as f64 / 327.0;
         if voltage > HIGHEST_VOLTAGE {
-            let what = format!("alarm {alarm}, the supply is at {voltage:.1} V");
+            let voltage = format!("{voltage:.1}");
+            let what = crate::words!("{alarm}, the supply is at {voltage} V", alarm = alarm.words(), voltage);
             return Err(Failure::FaultPersists { what, advice: alarm.advice() });
         }
     }

@@ -56,7 +56,7 @@ pub async fn alarm(c: &SdoSession) -> Result<Alarm, Failure> {
 
 /// The failure for an alarm.
 pub fn faulted(alarm: Alarm) -> Failure {
-    Failure::Faulted { what: format!("alarm {alarm}"), advice: alarm.advice() }
+    Failure::Faulted { what: alarm.words(), advice: alarm.advice() }
 }
 
 /// `watch`, with the temperature.

@@ -13,11 +13,13 @@ use takt::family::bring_up::{
     pdo_mapping,
 };
 use takt::family::commission::{DriveTask, Failure, TargetDrive, Task};
-use takt::family::{ChinesePhrase, Family, SettingUp};
+use takt::family::{Family, SettingUp, standard_error};
 use takt::rt::{Frame, controlword};
 use takt::sim::Drive;
 use takt::sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
 use takt::sim::plant::{Encoder, JointParameters};
+use takt::words;
+use takt::words::Words;
 
 /// The family.
 #[derive(Debug)]
@@ -93,16 +95,13 @@ impl Family for BeltServo {
         Box::pin(shut_down(c))
     }
 
-    fn error_words(&self, code: u16) -> String {
-        if code == 0xFF01 { "0xFF01 (belt torn)".to_owned() } else { format!("0x{code:04X}") }
+    fn error_words(&self, code: u16) -> Words {
+        let name = Words::bilingual(("belt torn", "皮带断裂"));
+        if code == 0xFF01 { words!("0xFF01 ({name})", name) } else { standard_error(code) }
     }
 
     fn error_cure(&self, code: u16) -> Option<&'static str> {
         (code == 0xFF01).then_some("put a new belt on")
-    }
-
-    fn chinese_phrases(&self) -> Vec<ChinesePhrase> {
-        vec![("belt torn", "皮带断裂"), ("put a new belt on", "更换新的皮带")]
     }
 
     fn commission(&self, _: TargetDrive, _: Task) -> Result<DriveTask<Frame>, Failure> {

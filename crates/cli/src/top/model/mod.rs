@@ -177,7 +177,7 @@ impl Model {
                 | EventKind::Rejected(_)
                 | EventKind::MissedSlots { .. }
         );
-        let text = words::event(event, &self.machine);
+        let text = words::event(event, &self.machine).to_string();
         let text = printable(&text);
         if let Some(last) = self.events.back_mut().filter(|last| last.words == text) {
             (last.at_ns, last.times) = (event.at_ns, last.times + 1);

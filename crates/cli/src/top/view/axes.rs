@@ -7,7 +7,7 @@ use ratatui::text::Line;
 use ratatui::widgets::{Paragraph, Widget};
 use takt_rt::{AxisLimits, AxisSnapshot, DriveState, Nanoseconds, OperationMode};
 
-use super::Palette;
+use super::palette::Palette;
 use super::times::duration;
 use crate::top::model::Model;
 use takt::telemetry::Unit;

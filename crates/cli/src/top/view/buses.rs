@@ -4,7 +4,7 @@ use ratatui::style::Style;
 use ratatui::text::Line;
 use takt_rt::BusState;
 
-use super::Palette;
+use super::palette::Palette;
 use crate::top::model::Model;
 use takt::telemetry::BusReport;
 

@@ -5,7 +5,7 @@ use ratatui::layout::Rect;
 use ratatui::text::Line;
 use ratatui::widgets::{Paragraph, Widget, Wrap};
 
-use super::Palette;
+use super::palette::Palette;
 
 const KEYS: [(&str, &str); 14] = [
     ("SPACE", "stop all axes, held under power (category 2); needs no lease"),

@@ -3,19 +3,21 @@
 mod axes;
 mod buses;
 mod help;
+mod palette;
 mod times;
 mod timing;
 
 use ratatui::Frame;
 use ratatui::buffer::Buffer;
 use ratatui::layout::{Constraint, Layout, Rect};
-use ratatui::style::{Color, Modifier, Style};
+use ratatui::style::Style;
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Paragraph, Widget, Wrap};
 use takt_rt::{Nanoseconds, StreamState, TimingLevel};
 
 use super::jog::Jog;
 use super::model::Model;
+pub use palette::Palette;
 use takt::telemetry::words;
 use times::{age, duration};
 
@@ -25,45 +27,6 @@ const WIDE: u16 = 110;
 const EVENTS_AT_LEAST: u16 = 2;
 /// The rows that axes have at least: the heading and three of them.
 const AXES_AT_LEAST: u16 = 4;
-
-/// Styles, with or without colours.
-#[derive(Clone, Copy, Debug)]
-pub struct Palette {
-    /// True if there are colours: not with `NO_COLOR`.
-    pub has_colours: bool,
-}
-
-impl Palette {
-    fn coloured(self, colour: Color, modifier: Modifier) -> Style {
-        let style = Style::new().add_modifier(modifier);
-        if self.has_colours { style.fg(colour) } else { style }
-    }
-
-    /// Of what is not as it should be.
-    pub fn bad(self) -> Style {
-        self.coloured(Color::Red, Modifier::BOLD)
-    }
-
-    /// Of what asks for attention.
-    pub fn notable(self) -> Style {
-        self.coloured(Color::Yellow, Modifier::BOLD)
-    }
-
-    /// Of what is well.
-    pub fn good(self) -> Style {
-        self.coloured(Color::Green, Modifier::empty())
-    }
-
-    /// Of headings.
-    pub fn heading(self) -> Style {
-        self.coloured(Color::Cyan, Modifier::BOLD)
-    }
-
-    /// Of what is less important.
-    pub fn faint(self) -> Style {
-        Style::new().add_modifier(Modifier::DIM)
-    }
-}
 
 /// Draws the model as it is at a time.
 pub fn draw(frame: &mut Frame<'_>, model: &Model, now_ns: Nanoseconds, palette: Palette) {

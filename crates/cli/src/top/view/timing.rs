@@ -2,7 +2,7 @@
 
 use ratatui::text::{Line, Span};
 
-use super::Palette;
+use super::palette::Palette;
 use super::times::duration;
 use crate::top::model::Model;
 use takt::telemetry::{TIME_BOUNDS_NS, TimeCounts};

@@ -20,6 +20,8 @@ use super::interruption::Interruption;
 use super::told::{RunningView, Torque, outcome};
 use super::{Bench, Errand};
 use takt::link::ownership::Ownership;
+use takt::words;
+use takt::words::Words;
 use takt_tools::commission::line_session::{self, LineEvent};
 use takt_tools::commission::{Failure, ProcedureError, Report, TargetDrive, Task, bus_session};
 use watcher::Watcher;
@@ -164,16 +166,12 @@ impl Worker {
             && failed.failure != Failure::Interrupted
         {
             self.watched = None;
-            self.bench.tell("warning", format!("{}: {}", self.name(drive), failed.failure));
+            let what = failed.failure.words();
+            self.bench.tell("warning", words!("{name}: {what}", name = self.name(drive), what));
         }
     }
 
-    fn choose_watched(
-        &mut self,
-        page: PageNumber,
-        drive: Option<usize>,
-        every_ms: u32,
-    ) -> Result<(), String> {
+    fn choose_watched(&mut self, page: PageNumber, drive: Option<usize>, every_ms: u32) -> Result<(), Words> {
         if let Some(drive) = drive {
             self.drive(drive).ok_or_else(no_such_drive)?;
         }
@@ -202,10 +200,10 @@ impl Worker {
         }
     }
 
-    fn task(&mut self, page: PageNumber, stops: u64, drive: usize, task: &AskedTask) -> Result<(), String> {
+    fn task(&mut self, page: PageNumber, stops: u64, drive: usize, task: &AskedTask) -> Result<(), Words> {
         let (bus, target) = self.drive(drive).ok_or_else(no_such_drive)?;
         let has_torque = matches!(self.torque(drive), Torque::Held(_));
-        let carried = task.task(&target, has_torque).map_err(|failure| failure.to_string())?;
+        let carried = task.task(&target, has_torque).map_err(|failure| failure.words())?;
         let keeps = match &carried {
             Task::Enable { .. } => true,
             Task::Move { keeps_enabled, .. } | Task::Velocity { keeps_enabled, .. } => *keeps_enabled,
@@ -253,7 +251,7 @@ impl Worker {
         let name = self.name(drive);
         self.bench.tell(
             "fault",
-            format!("{name} may still have torque: it could not be disabled. Use the emergency stop"),
+            words!("{name} may still have torque: it could not be disabled. Use the emergency stop", name),
         );
     }
 
@@ -291,7 +289,7 @@ impl Worker {
             self.disable_touched();
         }
         if is_stopped {
-            self.bench.tell("warning", "a page has stopped everything".to_owned());
+            self.bench.tell("warning", "a page has stopped everything".into());
         }
     }
 
@@ -329,8 +327,8 @@ impl Worker {
     }
 }
 
-fn no_such_drive() -> String {
-    "no drive has this number, or none that takt can move".to_owned()
+fn no_such_drive() -> Words {
+    "no drive has this number, or none that takt can move".into()
 }
 
 const fn refused(failure: Failure) -> ProcedureError {

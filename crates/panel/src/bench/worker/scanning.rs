@@ -13,6 +13,8 @@ use super::watcher::Watcher;
 use super::{PageNumber, Worker};
 use takt::family;
 use takt::family::scan::{BusScan, FoundDevice, LineScan, Scanned, scan_line};
+use takt::words;
+use takt::words::Words;
 use takt_tools::commission::line_session::{self, LineEvent};
 use takt_tools::commission::{TargetDrive, bus_scan};
 
@@ -28,9 +30,9 @@ impl Worker {
         stops: u64,
         number: usize,
         nodes: RangeInclusive<u8>,
-    ) -> Result<(), String> {
+    ) -> Result<(), Words> {
         if (0..self.place.drives.len()).any(|drive| self.torque(drive) != Torque::Off) {
-            return Err("a drive has torque: disable it first".to_owned());
+            return Err("a drive has torque: disable it first".into());
         }
         self.running(None, number, "scan", false);
         let bench = Arc::clone(&self.bench);
@@ -68,7 +70,7 @@ impl Worker {
                 let see = |_, event: LineEvent<'_>| watcher.see_line(&event);
                 let scanned =
                     line_session::run(scan, line, is_interrupted, see).map_err(|error| error.to_string())?;
-                scanned.map_err(|failed| failed.failure.to_string())?
+                scanned.map_err(|failed| failed.failure.words())?
             }
         };
         self.found(number, &name, &scanned);
@@ -80,9 +82,16 @@ impl Worker {
             self.add_found(bus, device);
         }
         self.bench.told().version += 1;
-        let ended = if scanned.is_interrupted { ", interrupted" } else { "" };
-        self.bench.tell("info", format!("{name}: {} found{ended}", scanned.devices.len()));
-        scanned.remarks.iter().for_each(|remark| self.bench.tell("warning", format!("{name}: {remark}")));
+        let count = scanned.devices.len();
+        let ended = match scanned.is_interrupted {
+            true => words!("{name}: {count} found, interrupted", name, count),
+            false => words!("{name}: {count} found", name, count),
+        };
+        self.bench.tell("info", ended);
+        for remark in &scanned.remarks {
+            let what = Words::from(remark.clone());
+            self.bench.tell("warning", words!("{name}: {what}", name, what));
+        }
     }
 
     fn add_found(&mut self, bus: usize, device: &FoundDevice) {
@@ -110,19 +119,21 @@ impl Worker {
     }
 
     /// Puts a drive of a family into the list that no scan has found.
-    pub(super) fn add(&mut self, bus: usize, node: u8, word: &str) -> Result<(), String> {
+    pub(super) fn add(&mut self, bus: usize, node: u8, word: &str) -> Result<(), Words> {
         if bus >= self.place.buses.len() {
-            return Err("there is no such bus".to_owned());
+            return Err("there is no such bus".into());
         }
         let drive = family::named(word).and_then(|family| family.unconfigured());
-        let drive = drive.ok_or_else(|| format!("a drive of {word:?} needs a configuration"))?;
+        let drive = drive.ok_or_else(|| {
+            words!("a drive of {family} needs a configuration", family = format!("{word:?}"))
+        })?;
         let target = TargetDrive::unconfigured(node, drive).map_err(|error| error.to_string())?;
         let bench = Arc::clone(&self.bench);
         let mut told = bench.told();
         let known = told.drives.iter().position(|drive| drive.bus == bus && drive.node == Some(node));
         match known {
             Some(known) if told.drives.get(known).is_some_and(|drive| drive.family.is_some()) => {
-                return Err(format!("node {node} is in the list already"));
+                return Err(words!("node {node} is in the list already", node));
             }
             Some(known) => {
                 if let (Some(view), Some(own)) =

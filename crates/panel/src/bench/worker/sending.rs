@@ -13,6 +13,8 @@ use super::super::told::Torque;
 use super::place::{BenchBus, BenchLink};
 use super::watcher::keep;
 use super::{POLL, PageNumber, Worker};
+use takt::words;
+use takt::words::Words;
 
 /// How long drives are listened to before a frame is sent, as `takt send` does.
 const TORQUE_NS: Nanoseconds = 300_000_000;
@@ -50,14 +52,14 @@ impl Worker {
         text: &str,
         count: u32,
         period: Duration,
-    ) -> Result<(), String> {
+    ) -> Result<(), Words> {
         let frame = frame_text::parse(text).map_err(|error| error.to_string())?;
         if let Some(drive) = (0..self.place.drives.len()).find(|drive| self.torque(*drive) != Torque::Off) {
-            return Err(format!("{} has torque. Nothing was sent: disable it first", self.name(drive)));
+            return Err(has_torque(&self.name(drive)));
         }
         let bus = self.place.buses.get(number).ok_or("there is no such bus")?;
         if matches!(bus.link, BenchLink::Line(..)) {
-            return Err("a serial line carries no frames".to_owned());
+            return Err("a serial line carries no frames".into());
         }
         self.running(None, number, "send", false);
         let bench = Arc::clone(&self.bench);
@@ -65,7 +67,7 @@ impl Worker {
         let begun = Instant::now();
         while begun.elapsed() < Duration::from_nanos(TORQUE_NS) {
             if let Some(who) = self.listen(number) {
-                return Err(format!("{who} has torque. Nothing was sent: disable it first"));
+                return Err(has_torque(&who));
             }
             if interruption.poll(&mut self.place.ownership) {
                 return Ok(());
@@ -87,16 +89,20 @@ impl Worker {
         Ok(())
     }
 
-    fn hand_over(&mut self, number: usize, frame: &Frame) -> Result<(), String> {
+    fn hand_over(&mut self, number: usize, frame: &Frame) -> Result<(), Words> {
         let bench = Arc::clone(&self.bench);
         let Some(BenchBus { link: BenchLink::Bus(port), decoder, .. }) = self.place.buses.get_mut(number)
         else {
-            return Err("there is no such bus".to_owned());
+            return Err("there is no such bus".into());
         };
         if port.send(MonotonicClock::default().now_ns(), &[*frame]) != 1 {
-            return Err(format!("{frame:?} was not taken by the interface"));
+            return Err(words!("{frame} was not taken by the interface", frame = format!("{frame:?}")));
         }
         keep(&bench, number, decoder, '>', frame);
         Ok(())
     }
+}
+
+fn has_torque(name: &str) -> Words {
+    words!("{name} has torque. Nothing was sent: disable it first", name)
 }

@@ -4,7 +4,6 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use takt_rt::Frame;
 
-use super::super::super::chinese::Words;
 use super::super::super::frames::FrameView;
 use super::super::super::lock::locked;
 use super::super::Bench;
@@ -52,7 +51,7 @@ impl<'a> Watcher<'a> {
         let frame: String = bytes.iter().map(|byte| format!("{byte:02X}")).collect();
         push(
             self.bench,
-            FrameView { direction, bus: self.bus, frame, number: 0, time: 0.0, words: Words::none() },
+            FrameView { direction, bus: self.bus, frame, number: 0, time: 0.0, words: String::new() },
         );
     }
 
@@ -84,7 +83,7 @@ pub(super) fn keep(
     frame: &Frame,
 ) -> Option<String> {
     let decoded = decoder.decode(frame);
-    let words = Words::of_meaning(&decoded);
+    let words = decoded.line();
     push(bench, FrameView { direction, bus, frame: format!("{frame:?}"), number: 0, time: 0.0, words });
     (direction == '<' && decoded.shows_torque == Some(true)).then_some(decoded.who)
 }

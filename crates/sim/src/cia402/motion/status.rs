@@ -13,7 +13,7 @@ impl Motion {
     pub fn status_bits(&mut self, actual: Actual, word: u16, profile: &Profile<'_>, duration_s: f64) -> u16 {
         let is_reached = self.is_target_reached(actual, word, profile, duration_s);
         let bit_12 = match self.mode {
-            Some(OperationMode::ProfilePosition) => self.set_points.is_acknowledged,
+            _ if self.has_set_points() => self.set_points.is_acknowledged,
             Some(OperationMode::ProfileVelocity) => self.stands(actual, profile),
             Some(OperationMode::Homing) => self.homing.is_done(),
             Some(OperationMode::InterpolatedPosition) => word & controlword::BIT_4 != 0,
@@ -73,11 +73,11 @@ impl Motion {
             }
             Some(OperationMode::ProfileTorque) => (self.torque == profile.real(places.target_torque), 0.0),
             Some(OperationMode::Homing) => (!self.homing.is_running() && self.stands(actual, profile), 0.0),
+            _ if self.has_set_points() => {
+                (self.set_points.active.is_none() && is_near(self.generator.position), window_time_s)
+            }
             Some(OperationMode::CyclicSynchronousPosition | OperationMode::InterpolatedPosition) => {
                 (is_near(self.generator.target), window_time_s)
-            }
-            Some(OperationMode::ProfilePosition) => {
-                (self.set_points.active.is_none() && is_near(self.generator.position), window_time_s)
             }
             _ => (false, 0.0),
         };

@@ -1,8 +1,8 @@
 //! Services: SDO transfers, PDO mapping, transmission types, NMT, guarding, quirks.
 
 use takt::config::quirks::{self, MotionUnit, Quirks};
-use takt::sim::NodeState;
-use takt_rt::{Frame, Id, OperationMode};
+use takt::sim::{DriveFault, NodeState};
+use takt_rt::{DriveState, Frame, Id, OperationMode};
 
 use super::{Tried, sheet};
 use crate::bench::{MILLISECOND_NS, NODE};
@@ -28,6 +28,32 @@ fn shipped() -> Vec<(String, Quirks)> {
         }
     }
     all
+}
+
+#[test]
+fn a_quirk_file_keeps_the_mode_of_an_enabled_drive_and_has_a_fault_reset_held() {
+    let quirks = shipped().into_iter().find(|(name, _)| name == "erob-canopen").unwrap().1;
+    let mut bench = Tried::with(sheet("erob-canopen"), quirks).bench;
+    assert_eq!(bench.read(0x6087, 0), Ok(1_000), "a value that the data sheet leaves open");
+    bench.enable(8, 0x607A_0020, 0);
+    assert_eq!(bench.write(0x6060, 0, 1, 9), Err(DEVICE_STATE));
+    bench.bus.inject_fault(NODE, DriveFault::Encoder).unwrap();
+    for (controlword, cycles, state) in [
+        (0x0F, 3, DriveState::Fault),
+        (0x80, 2, DriveState::Fault),
+        (0x00, 3, DriveState::Fault),
+        (0x80, 6, DriveState::SwitchOnDisabled),
+    ] {
+        for _ in 0..cycles {
+            bench.cycle(controlword, 0);
+        }
+        assert_eq!(bench.observe().state, state, "{cycles} cycles of {controlword:#04x}");
+    }
+    // Some units set bit 7.
+    assert_eq!(bench.cycle(0, 0).0 & !0x80, 0x1250);
+    bench.write(0x6060, 0, 1, 7).unwrap();
+    bench.run_ms(2);
+    assert_eq!(bench.read(0x6061, 0), Ok(7), "a mode that object 6502 does not declare");
 }
 
 #[test]
@@ -152,7 +178,7 @@ fn the_loss_of_the_masters_heartbeat_faults_an_enabled_drive_without_object_6007
     assert!(tried.bench.take(0x080 + u32::from(NODE)).is_empty());
     tried.bench.run_ms(200);
     assert_eq!(tried.bench.take(0x080 + u32::from(NODE))[0][..2], [0x30, 0x81]);
-    assert_eq!(tried.bench.observe().state, takt_rt::DriveState::Fault);
+    assert_eq!(tried.bench.observe().state, DriveState::Fault);
 }
 
 #[test]

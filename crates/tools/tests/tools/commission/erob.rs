@@ -278,7 +278,7 @@ fn a_fault_during_a_motion_ends_it_and_is_named() {
     };
     let failed = bench.run_for(move_to(absolute(90.0)), 5 * SECOND, breaks).unwrap().unwrap_err();
     assert!(
-        matches!(&failed.failure, Failure::Faulted { what, .. } if what.starts_with("0x4310")),
+        matches!(&failed.failure, Failure::Faulted { what, .. } if what.to_string().starts_with("0x4310")),
         "{failed:?}"
     );
     assert_eq!((failed.step, bench.observe().state), ("move", DriveState::Fault));
