@@ -111,7 +111,7 @@ impl Outcome {
                 )
             }
             Self::NotHeard { axis } => format!(
-                "{}: the drive is operational but sends no feedback; is another master changing its PDOs?",
+                "{}: the drive has been brought up but sends no feedback; does another master change its NMT state or its PDOs?",
                 name(*axis)
             ),
             Self::MoveRefused { number, refusal } => {

@@ -122,6 +122,10 @@ impl Sheet<'_> {
             self.set(GUARD_TIME, 0).await?;
             self.set(LIFE_TIME_FACTOR, 0).await?;
         }
+        // SYNC ends with the run: a node that watches for it by this period would report 0x8100 (CiA 301, 7.5.2.6).
+        if self.device.is_writable(COMMUNICATION_CYCLE_PERIOD.address) {
+            c.write(COMMUNICATION_CYCLE_PERIOD, 0).await?;
+        }
         self.set(PRODUCER_HEARTBEAT_TIME, 0).await
     }
 

@@ -289,14 +289,14 @@ fn a_restart_ends_the_request_under_way_without_a_repetition() {
 }
 
 #[test]
-fn a_shutdown_disables_the_drive_and_its_heartbeat_consumer() {
+fn a_shutdown_disables_the_drive_its_heartbeat_consumer_and_its_watch_for_sync() {
     let config = config(&[(0, 2)]);
     let mut world = started(&config);
     world.drive().state = DriveState::ReadyToSwitchOn;
     let facts = world.run(&mut Shutdown::new(&config)).unwrap();
     let drive = world.drive();
     assert_eq!((drive.nmt, drive.state), (NmtState::PreOperational, DriveState::SwitchOnDisabled));
-    assert_eq!((drive.number(0x1016, 1), drive.number(0x1017, 0)), (0, 0));
+    assert_eq!((drive.number(0x1006, 0), drive.number(0x1016, 1), drive.number(0x1017, 0)), (0, 0, 0));
     assert_eq!(facts[0].state(), DriveState::SwitchOnDisabled);
 }
 

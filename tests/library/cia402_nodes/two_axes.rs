@@ -130,7 +130,7 @@ fn what_belongs_to_the_node_is_done_once_and_what_belongs_to_an_axis_for_each() 
         "a shutdown wakes the node and then commands it"
     );
     assert_eq!(written(sent, 1, 0x1017, 0), [50, 0]);
-    assert_eq!(written(sent, 1, 0x1006, 0), [1_000]);
+    assert_eq!(written(sent, 1, 0x1006, 0), [1_000, 0]);
     for (mode, target) in [(0x6060, 0x607A), (0x6860, 0x687A)] {
         assert_eq!(written(sent, 1, mode, 0).first(), Some(&8));
         assert_eq!(written(sent, 1, target, 0).len(), 1);
