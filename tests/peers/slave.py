@@ -146,7 +146,8 @@ def takt_run(interface, exit_code):
 def communication(slave):
     expect("segments of the device name that were fetched", slave.segments, -(-len(NAME) // 7))
     expect("SYNC identifier", slave.last_written(0x1005), 0x80)
-    expect("cycle period in µs", slave.last_written(0x1006), 50_000)
+    period = [value for index, _, value in slave.writes if index == 0x1006]
+    expect("cycle period in µs, and its end", period, [50_000, 0])
     expect("error behaviour", slave.last_written(0x1029, 1), 2)
     consumer = [value for index, _, value in slave.writes if index == 0x1016]
     expect("heartbeat consumer of the drive, and its end", consumer, [127 << 16 | 20_000, 0])
