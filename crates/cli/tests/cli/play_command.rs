@@ -550,7 +550,7 @@ fn a_joint_trajectory_of_ros_and_a_table_of_it_are_executed_and_said_to_be_done(
         ends.push(fs::read_to_string(place.path("out.csv")).unwrap());
     }
     assert!(ends[0] == ends[1] && ends[1] == ends[2] && ends[0].lines().count() > 1500);
-    let refused = place.refused(message.replace("0.3]", "0.3, 0.4]"));
+    let refused = Place::new().refused(message.replace("0.3]", "0.3, 0.4]"));
     assert!(
         refused.contains("line 4") && refused.contains("`positions` has 3 numbers for 2 joints"),
         "{refused}"
