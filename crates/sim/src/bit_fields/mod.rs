@@ -769,7 +769,9 @@ impl Drive for FieldSimulation {
 
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_until(now_ns);
-        while let Some(Answer { told, .. }) = self.answers.pop_front_if(|answer| answer.due_ns <= now_ns) {
+        while self.answers.front().is_some_and(|answer| answer.due_ns <= now_ns)
+            && let Some(Answer { told, .. }) = self.answers.pop_front()
+        {
             let frame = match told {
                 Told::Reply => self.reply(),
                 Told::Frame(frame) => Some(frame),

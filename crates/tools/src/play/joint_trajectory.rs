@@ -59,7 +59,7 @@ pub(super) fn is_message(text: &str) -> bool {
     let mut lines = text.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with('#'));
     let Some(first) = lines.find(|line| *line != "---") else { return false };
     let is_key = |key: &&str| first.strip_prefix(*key).is_some_and(|rest| rest.trim_start().starts_with(':'));
-    first.starts_with('{') || KEYS.iter().any(|key| is_key(&key))
+    first.starts_with('{') || KEYS.iter().any(is_key)
 }
 
 /// Reads a message for axes with these names.
