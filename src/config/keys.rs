@@ -47,8 +47,11 @@ pub const STOP_AT_MOST_S: f64 = 10.0;
 /// The longest gap of a simulation, at most, in seconds.
 pub const LONGEST_GAP_AT_MOST_S: f64 = 60.0;
 
+/// The fewest counts of a turn.
+pub const COUNTS_AT_LEAST: f64 = 16.0;
+
 const COUNTS: Bounds = Bounds::Plausible {
-    low: 16.0,
+    low: COUNTS_AT_LEAST,
     high: 4_294_967_296.0,
     reason: "coarser encoders cannot position a joint, and drives count in 32 bits",
 };

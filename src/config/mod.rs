@@ -22,7 +22,7 @@ mod in_code;
 mod interface;
 mod interface_error;
 mod key;
-mod keys;
+pub(crate) mod keys;
 mod mode_words;
 mod model;
 mod position_unit;

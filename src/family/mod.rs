@@ -22,6 +22,7 @@ pub(crate) mod hollow;
 mod off_cycle;
 mod registry;
 pub mod scan;
+mod simulated_bring_up;
 mod simulated_bus;
 mod simulated_joint;
 mod warning;
@@ -44,6 +45,7 @@ pub use off_cycle::{LineCounts, OffCycleBudget, OffCycleDrive, OffCycleLine, Off
 pub use registry::{NameTaken, all, register};
 #[doc(hidden)]
 pub use registry::{named, of};
+pub use simulated_bring_up::refused_by_data_sheets;
 pub use simulated_bus::simulated_bus;
 #[doc(hidden)]
 pub use simulated_bus::simulated_drives;

@@ -69,7 +69,7 @@ fn every_data_sheet_gives_a_configuration_that_runs_as_it_is() {
     let mut moved = 0;
     for sheet in sheets() {
         let device = Device::load(&sheet, None).unwrap();
-        let text = cia402::starting_configuration(&device, &sheet, 5);
+        let text = cia402::starting_configuration(&device, &sheet, None, 5, None);
         let config =
             Config::parse("starting.toml", &text).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
         let axis = &config.axes[0];
@@ -161,7 +161,7 @@ fn interpolated_position_has_the_same_target_in_a_written_and_in_a_stored_mappin
 #[test]
 fn a_drive_that_has_them_runs_its_program_in_every_mode_of_positions() {
     let sheet = repository().join("tests/eds/vendors/eyou-euservo.eds");
-    let text = cia402::starting_configuration(&Device::load(&sheet, None).unwrap(), &sheet, 5);
+    let text = cia402::starting_configuration(&Device::load(&sheet, None).unwrap(), &sheet, None, 5, None);
     for mode in ["csp", "csv", "cst", "pp"] {
         let config = Config::parse("starting.toml", &text.replace("\"csp\"", &format!("{mode:?}"))).unwrap();
         run(&config);

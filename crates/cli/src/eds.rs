@@ -8,8 +8,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
-use takt::family::cia402;
+use takt::Config;
+use takt::config::mode_word;
+use takt::family::{cia402, refused_by_data_sheets};
 use takt_wire::canopen::eds::{self, Findings};
+use takt_wire::printable::printable_path;
 
 use super::exit::Exit;
 use super::print;
@@ -67,15 +70,34 @@ pub fn run(arguments: &Arguments) -> Exit {
 
 /// Prints a configuration with one axis.
 fn starting_configuration(arguments: &Arguments) -> Exit {
-    match cia402::Device::load(&arguments.file, arguments.quirks.as_deref()) {
-        Ok(device) => {
-            let node = arguments.node.or(device.dictionary.commissioned_node()).unwrap_or(1);
-            print::text(&cia402::starting_configuration(&device, &arguments.file, node), Exit::Done)
+    let quirks = arguments.quirks.as_deref();
+    let configuration = cia402::Device::load(&arguments.file, quirks).and_then(|device| {
+        let node = arguments.node.or(device.dictionary.commissioned_node()).unwrap_or(1);
+        let mut reasons = vec![];
+        for mode in device.usual_modes() {
+            let text = cia402::starting_configuration(&device, &arguments.file, quirks, node, Some(mode));
+            match refusal(&text) {
+                None => return Ok(text),
+                Some(reason) => reasons.push(format!("{}: {reason}", mode_word(mode.operation_mode()))),
+            }
         }
+        let file = printable_path(&arguments.file);
+        Err(format!("by {file}, takt can command this drive in no mode\n{}", reasons.join("\n")))
+    });
+    match configuration {
+        Ok(text) => print::text(&text, Exit::Done),
         Err(reason) => {
             say!("takt: {reason}");
             Exit::Usage
         }
+    }
+}
+
+/// Why a configuration cannot be run with the drives of its data sheets.
+fn refusal(text: &str) -> Option<String> {
+    match Config::parse("the configuration", text) {
+        Ok(config) => refused_by_data_sheets(&config).first().map(ToString::to_string),
+        Err(error) => Some(format!("{:?}", miette::Report::new(error))),
     }
 }
 

@@ -1,6 +1,8 @@
 //! The PDO mapping of a drive: written and read back, or taken as the drive reports it.
 
+use takt_wire::canopen::object::ObjectAddress;
 use takt_wire::canopen::objects::{PDO_IDENTITY, PDO_INVALID, PdoDirection, PdoParameters};
+use takt_wire::canopen::pdo_configuration::PdoConfiguration;
 use takt_wire::canopen::pdo_reader::PdoReader;
 
 use super::axis_session::{AxisSession, StepResult};
@@ -92,24 +94,67 @@ pub(crate) async fn take_reported(c: &AxisSession<'_>) -> StepResult {
     c.settled(taken)
 }
 
+/// Gives the PDOs with a fixed mapping that the axis needs the identifiers of the pre-defined connection set and its transmission type, and
+/// switches the other TPDOs off, as far as the drive lets these be written.
+pub(crate) async fn adapt_communication(
+    c: &AxisSession<'_>,
+    is_writable: impl Fn(ObjectAddress) -> bool,
+) -> StepResult {
+    // Further axes of a node have no identifiers in that set.
+    if c.is_dry_run() || c.axis.drive.node_axis > 1 {
+        return Ok(());
+    }
+    c.step("PDO communication", "the drive does not let its PDOs be set as this axis needs them");
+    let reported = reported(c).await;
+    let reported = c.settled(reported)?;
+    for pdo in reported.iter().filter(|pdo| pdo.is_valid) {
+        let PdoConfiguration { direction, number, id: Some(id), transmission_type, .. } = *pdo else {
+            continue;
+        };
+        let (parameters, place) = (PdoParameters::at(direction, number), number.clamp(1, 4) as u8);
+        let is_needed = ProcessData::is_needed(c.axis, pdo);
+        let planned = pdo_id(direction, place, c.axis.node);
+        let sets_type = transmission_type != Some(c.axis.transmission_type)
+            && is_writable(parameters.transmission_type().address);
+        if !is_writable(parameters.cob_id().address) {
+            continue;
+        } else if !is_needed && direction == PdoDirection::Transmit {
+            write_cob_id(c, parameters, id.value() | PDO_INVALID).await?;
+        } else if is_needed && (id != planned || sets_type) {
+            write_cob_id(c, parameters, planned.value() | PDO_INVALID).await?;
+            if sets_type {
+                c.write_and_read_back(parameters.transmission_type(), c.axis.transmission_type.into())
+                    .await?;
+            }
+            write_cob_id(c, parameters, planned.value()).await?;
+        }
+    }
+    Ok(())
+}
+
 async fn read_reported(c: &AxisSession<'_>) -> StepResult {
+    let reported = reported(c).await?;
+    let data = ProcessData::as_reported(c.axis, c.config, &reported).map_err(FailureCause::Mapping)?;
+    c.keep(|facts| facts.process_data = Some(data));
+    Ok(())
+}
+
+/// Reads the first four PDOs of the axis in each direction.
+async fn reported(c: &AxisSession<'_>) -> StepResult<Vec<PdoConfiguration>> {
     let mut reader = PdoReader::of_four(first_pdo(c.axis.drive.node_axis));
     while let Some(object) = reader.question() {
         let answer = c.bus.read_bytes(object).await;
         reader.answer(answer);
     }
-    let reported = match reader.outcome() {
-        Some(Ok(reported)) => reported,
+    match reader.outcome() {
+        Some(Ok(reported)) => Ok(reported),
         Some(Err(failure)) if c.bus.quirks().means_absent(failure.error) => {
             c.note_absent(failure.object);
-            vec![]
+            Ok(vec![])
         }
-        Some(Err(failure)) => return Err(FailureCause::PdoRead(failure)),
-        None => vec![],
-    };
-    let data = ProcessData::as_reported(c.axis, c.config, &reported).map_err(FailureCause::Mapping)?;
-    c.keep(|facts| facts.process_data = Some(data));
-    Ok(())
+        Some(Err(failure)) => Err(FailureCause::PdoRead(failure)),
+        None => Ok(vec![]),
+    }
 }
 
 #[cfg(test)]

@@ -173,6 +173,17 @@ impl ProcessData {
     }
 }
 
+impl ProcessData {
+    /// Returns `true` if a PDO that a drive reports carries an object that its axis needs.
+    pub(super) fn is_needed(axis: &Axis, pdo: &PdoConfiguration) -> bool {
+        let needed = match pdo.direction {
+            PdoDirection::Receive => Self::needed_commands(axis),
+            PdoDirection::Transmit => Self::needed_feedback(axis),
+        };
+        needed.into_iter().any(|object| carried(pdo, object).is_some())
+    }
+}
+
 fn by_content(
     axis: &Axis,
     counted: &ProcessData,

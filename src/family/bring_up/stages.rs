@@ -117,6 +117,12 @@ impl BringUp {
         Self::begun(Arc::new(config.clone()), timing, Group::new(config, timing, |_| true))
     }
 
+    /// As [`BringUp::new`], for these axes alone: all of each node.
+    pub fn of(config: &Config, axes: &[usize]) -> Self {
+        let timing = BringUpTiming::default();
+        Self::begun(Arc::new(config.clone()), timing, Group::new(config, timing, |axis| axes.contains(&axis)))
+    }
+
     /// Begins anew with [`Stage::Configure`], for these axes alone: all of each node. The facts of the others are unknown in its outcome.
     pub fn again(&self, axes: &[usize]) -> Self {
         let group = Group::new(&self.config, self.timing, |axis| axes.contains(&axis));

@@ -23,6 +23,7 @@ use crate::family::{DataSheet, stops_by_itself_after};
 
 const FOLLOWING_ERROR_WINDOW: Object = Object::new(0x6065, 0, DataType::U32, "following error window");
 const ABORT_CONNECTION_OPTION: Object = Object::new(0x6007, 0, DataType::I16, "abort connection option code");
+const SYNC_COUNTER_OVERFLOW: Object = Object::new(0x1019, 0, DataType::U8, "synchronous counter overflow");
 /// Object 6007: the drive reacts as to a fault.
 const FAULT_SIGNAL: i64 = 1;
 /// How long a drive may move on after a quick stop, if it cannot show its velocity.
@@ -191,6 +192,7 @@ impl Sheet<'_> {
         if c.is_first_of_node() {
             // Bit 30 would make the drive the SYNC producer. Where the object is constant, it is 80h already.
             self.set(SYNC_COB_ID, 0x80).await?;
+            self.end_sync_counter().await?;
             self.set(COMMUNICATION_CYCLE_PERIOD, rounded_up(period_ns, 1_000)).await?;
         }
         if let Some((mantissa, exponent)) = interpolation_time(period_ns) {
@@ -198,6 +200,20 @@ impl Sheet<'_> {
             self.set(INTERPOLATION_TIME_INDEX, exponent).await?;
         }
         Ok(())
+    }
+
+    /// The SYNC of takt has no counter. It may only be changed while 1006 is 0 (CiA 301, 7.5.2.22).
+    async fn end_sync_counter(&self) -> StepResult {
+        let c = self.c;
+        let mut overflow = 0;
+        if self.device.has(&SYNC_COUNTER_OVERFLOW) {
+            c.read_optional(SYNC_COUNTER_OVERFLOW, |_, value| overflow = value).await?;
+        }
+        if overflow == 0 {
+            return Ok(());
+        }
+        self.set(COMMUNICATION_CYCLE_PERIOD, 0).await?;
+        c.write_and_read_back(SYNC_COUNTER_OVERFLOW, 0).await
     }
 
     async fn process_data(&self) -> StepResult {
@@ -212,7 +228,13 @@ impl Sheet<'_> {
                 pdo_mapping::write(c, PdoDirection::Receive, &commands, slots(PdoDirection::Receive)).await?;
                 pdo_mapping::write(c, PdoDirection::Transmit, &feedback, slots(PdoDirection::Transmit)).await
             }
-            PdoMapping::AsStored => pdo_mapping::take_reported(c).await,
+            PdoMapping::AsStored => {
+                // Where its mapping can be changed, the user has stored it as it is to be.
+                if c.axis.drive.has_fixed_process_data {
+                    pdo_mapping::adapt_communication(c, |object| self.device.is_writable(object)).await?;
+                }
+                pdo_mapping::take_reported(c).await
+            }
         }
     }
 

@@ -13,6 +13,7 @@ use takt_wire::canopen::objects::{
 };
 use takt_wire::quirks::{MotionUnit, NamedObject, Quirks};
 
+use crate::config::keys::COUNTS_AT_LEAST;
 use crate::config::{Control, DriveFacts, ErrorControl, Identity, ModeSet, Plausible, VelocityUnit};
 use crate::family::DataSheet;
 use crate::family::bring_up::first_pdo;
@@ -70,7 +71,7 @@ impl Device {
     /// # Errors
     /// In words for the reader of a configuration: the file, the line, what is wrong.
     pub fn load(eds: &Path, quirks: Option<&Path>) -> Result<Self, String> {
-        let loaded = takt_wire::canopen::eds::load(eds).map_err(|findings| findings.to_string())?;
+        let loaded = takt_wire::canopen::eds::load(eds).map_err(|findings| findings.first_error())?;
         let quirks = match quirks {
             Some(path) => crate::config::quirks::load(path).map_err(|error| error.to_string())?,
             None => Quirks::default(),
@@ -84,7 +85,7 @@ impl Device {
     /// As [`load`](Self::load).
     pub fn parse(eds: &str, quirks: &str) -> Result<Self, String> {
         let loaded = takt_wire::canopen::eds::parse("data sheet", eds.as_bytes())
-            .map_err(|findings| findings.to_string())?;
+            .map_err(|findings| findings.first_error())?;
         let quirks = crate::config::quirks::parse("quirks", quirks).map_err(|error| error.to_string())?;
         Self { node_axis: 1, dictionary: loaded.dictionary, quirks }.of_axis(1)
     }
@@ -208,14 +209,16 @@ impl Device {
     }
 
     /// Counts of one turn of the reported position: by the quirks, by the feed constant (6092), or else by the resolution of the
-    /// encoder (608F).
+    /// encoder (608F). Sheets have 1 for 1 there where the drive is to be set.
     pub fn counts_per_turn(&self) -> Option<f64> {
         let told = self.quirks.counts_per_turn;
         told.or_else(|| self.counts_by_objects())
     }
 
     fn counts_by_objects(&self) -> Option<f64> {
-        self.ratio(FEED, FEED_REVOLUTIONS).or_else(|| self.ratio(ENCODER_INCREMENTS, ENCODER_REVOLUTIONS))
+        let set =
+            |numerator, divisor| self.ratio(numerator, divisor).filter(|counts| *counts >= COUNTS_AT_LEAST);
+        set(FEED, FEED_REVOLUTIONS).or_else(|| set(ENCODER_INCREMENTS, ENCODER_REVOLUTIONS))
     }
 
     /// The modes: those of the quirks, or of object 6502, or, where neither tells, those that have an object of their own. Only those
@@ -300,13 +303,21 @@ impl Device {
         self.is_writable(CONSUMER_HEARTBEAT_TIME.address)
     }
 
-    /// What is known of the drive.
-    pub fn facts(&self, standard: DriveFacts) -> DriveFacts {
-        let modes = self.modes();
+    /// Returns `true` if `[DeviceInfo]` has another vendor or product than object 1018.
+    pub(super) fn has_two_identities(&self) -> bool {
         let device = &self.dictionary.device;
-        let number = |address| {
-            self.number(address).and_then(|value| u32::try_from(value).ok()).filter(|value| *value != 0)
-        };
+        [(VENDOR, device.vendor_number), (PRODUCT, device.product_number)].into_iter().any(
+            |(object, stated)| {
+                let number = self.number(object).filter(|number| *number != 0);
+                let stated = stated.filter(|stated| *stated != 0).map(i64::from);
+                number.zip(stated).is_some_and(|(number, stated)| number != stated)
+            },
+        )
+    }
+
+    /// The modes for a configuration to start with, the most usual one first.
+    pub fn usual_modes(&self) -> impl Iterator<Item = Control> + use<> {
+        let modes = self.modes();
         let usual = [
             Control::Position,
             Control::Interpolated,
@@ -314,12 +325,23 @@ impl Device {
             Control::ProfileVelocity,
             Control::ProfileTorque,
         ];
+        usual.into_iter().filter(move |control| modes.contains(control.operation_mode()))
+    }
+
+    /// What is known of the drive.
+    pub fn facts(&self, standard: DriveFacts) -> DriveFacts {
+        let modes = self.modes();
+        let device = &self.dictionary.device;
+        let number = |address| {
+            self.number(address).and_then(|value| u32::try_from(value).ok()).filter(|value| *value != 0)
+        };
         let Quirks { plausible, keeps_empty_limits, bit_rates, .. } = self.quirks;
         DriveFacts {
             identity: Identity {
                 device_type: number(DEVICE_TYPE),
-                vendor: device.vendor_number.filter(|number| *number != 0).or(number(VENDOR)),
-                product: device.product_number.filter(|number| *number != 0).or(number(PRODUCT)),
+                // The drive answers with its objects.
+                vendor: number(VENDOR).or(device.vendor_number.filter(|number| *number != 0)),
+                product: number(PRODUCT).or(device.product_number.filter(|number| *number != 0)),
                 revision: None,
             },
             counts_per_turn: self.counts_per_turn(),
@@ -331,10 +353,7 @@ impl Device {
                 .unit_by_quirks(MAX_MOTOR_SPEED.address.index)
                 .unwrap_or(standard.motor_speed_unit),
             modes,
-            usual_mode: usual
-                .into_iter()
-                .find(|control| modes.contains(control.operation_mode()))
-                .unwrap_or(Control::Position),
+            usual_mode: self.usual_modes().next().unwrap_or(Control::Position),
             interpolation_target: self
                 .quirks
                 .interpolation_target

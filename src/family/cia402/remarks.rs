@@ -32,5 +32,12 @@ pub(crate) fn remarks(device: &Device) -> Vec<&'static str> {
     let unsupervised = (device.error_control() == ErrorControl::None).then_some(
         "the drive has neither a heartbeat (1017) nor node guarding (100C, 100D): only its process data shows that it is there",
     );
-    unsupervised.into_iter().chain(LOSSES.iter().filter(is_absent).map(|(_, _, loss)| *loss)).collect()
+    let two_identities = device.has_two_identities().then_some(
+        "its data sheet has two numbers of its vendor or product: that of object 1018 is expected, not that of [DeviceInfo]",
+    );
+    unsupervised
+        .into_iter()
+        .chain(two_identities)
+        .chain(LOSSES.iter().filter(is_absent).map(|(_, _, loss)| *loss))
+        .collect()
 }

@@ -6,12 +6,18 @@ use std::path::Path;
 use takt_rt::CommandSlot;
 
 use super::device::Device;
-use crate::config::{DriveFacts, MODES, mode_word};
+use crate::config::{Control, DriveFacts, MODES, mode_word};
 use crate::family::scan::{FoundDevice, StartingKeys};
 
-/// The text of a configuration with this drive, and an axis for each of its own. It is complete, and runs on a simulated bus; what nobody but
-/// the owner of the machine can know is marked.
-pub fn starting_configuration(device: &Device, eds: &Path, node: u8) -> String {
+/// Returns the text of a configuration with this drive, and an axis for each of its own, in this mode or in the usual one. It is complete,
+/// and runs on a simulated bus; what nobody but the owner of the machine can know is marked.
+pub fn starting_configuration(
+    device: &Device,
+    eds: &Path,
+    quirks: Option<&Path>,
+    node: u8,
+    mode: Option<Control>,
+) -> String {
     let sheet = &device.dictionary.device;
     let named = |name: &Option<String>| name.clone().unwrap_or_else(|| "unnamed".to_owned());
     let mut text = String::new();
@@ -23,11 +29,14 @@ pub fn starting_configuration(device: &Device, eds: &Path, node: u8) -> String {
     line("[[bus]]\nname = \"can\"\ninterface = \"sim\"  # \"can0\"\n".to_owned());
     let axes: Vec<Device> =
         (1..=device.axes()).filter_map(|axis| device.clone().of_axis(axis).ok()).collect();
+    let mode_of = |axis: &Device| {
+        let usual = axis.facts(super::FACTS).usual_mode;
+        mode.filter(|mode| axis.modes().contains(mode.operation_mode())).unwrap_or(usual)
+    };
     for axis in &axes {
-        axis_lines(axis, eds, node, &mut line);
+        axis_lines(axis, eds, quirks, node, mode_of(axis), &mut line);
     }
-    let takes_positions =
-        |axis: &Device| axis.facts(super::FACTS).usual_mode.target_slot() == CommandSlot::TargetPosition;
+    let takes_positions = |axis: &Device| mode_of(axis).target_slot() == CommandSlot::TargetPosition;
     if axes.iter().all(takes_positions) {
         line("[[program.move]]\nto = \"10 deg\"\n\n[[program.move]]\nto = \"0 deg\"".to_owned());
     }
@@ -64,7 +73,14 @@ pub fn keys(found: &FoundDevice) -> StartingKeys {
     StartingKeys { axis: axis.to_vec(), ..StartingKeys::default() }
 }
 
-fn axis_lines(axis: &Device, eds: &Path, node: u8, line: &mut impl FnMut(String)) {
+fn axis_lines(
+    axis: &Device,
+    eds: &Path,
+    quirks: Option<&Path>,
+    node: u8,
+    mode: Control,
+    line: &mut impl FnMut(String),
+) {
     let facts = axis.facts(super::FACTS);
     line(format!("[[axis]]\nname = \"joint{}\"\nbus = \"can\"", axis.node_axis));
     line(format!("node = {node}"));
@@ -73,11 +89,10 @@ fn axis_lines(axis: &Device, eds: &Path, node: u8, line: &mut impl FnMut(String)
     }
     line(format!("drive = \"{}\"", facts.word));
     line(format!("eds = {:?}", eds.display().to_string()));
-    line(format!(
-        "mode = \"{}\"  # the drive has {}",
-        mode_word(facts.usual_mode.operation_mode()),
-        modes(&facts)
-    ));
+    if let Some(quirks) = quirks {
+        line(format!("quirks = {:?}", quirks.display().to_string()));
+    }
+    line(format!("mode = \"{}\"  # the drive has {}", mode_word(mode.operation_mode()), modes(&facts)));
     match facts.counts_per_turn {
         Some(counts) => line(format!("counts_per_turn = {counts}  # by the data sheet")),
         None => line("counts_per_turn = 65536  # YOURS: the data sheet does not say".to_owned()),

@@ -232,7 +232,8 @@ fn the_schedule_counts_what_a_node_sends_once() {
 #[test]
 fn the_configuration_to_start_with_has_every_axis_of_the_drive() {
     let eds = Sheet::new("0x80000000");
-    let text = cia402::starting_configuration(&Device::load(&eds.path(), None).unwrap(), &eds.path(), 5);
+    let text =
+        cia402::starting_configuration(&Device::load(&eds.path(), None).unwrap(), &eds.path(), None, 5, None);
     let config = Config::parse("starting.toml", &text).unwrap_or_else(|error| panic!("{error:?}\n{text}"));
     let places: Vec<(u8, u8)> = config.axes.iter().map(|axis| (axis.node, axis.drive.node_axis)).collect();
     assert_eq!(places, [(5, 1), (5, 2)]);

@@ -4,6 +4,7 @@ use serde::Serialize;
 use takt::config::{
     Axis, Compliance, Config, Control, FeedForward, Group, PositionUnit, Travel, UrdfLimits, mode_word,
 };
+use takt::family::refused_by_data_sheets;
 use takt::schedule::{self, BusSchedule};
 use takt_rt::ModeCondition;
 
@@ -28,6 +29,8 @@ pub struct Check {
     pub buses: Vec<BusSchedule>,
     /// Those of the buses that are serial lines.
     pub lines: Vec<LineCheck>,
+    /// How bring-up fails with drives that are as their data sheets say.
+    pub refused: Vec<String>,
     /// What is possible and implausible.
     pub warnings: Vec<String>,
     /// What axes have to do without, because their drives lack it.
@@ -127,9 +130,10 @@ impl ComplianceCheck {
 impl Check {
     pub fn of(config: &Config) -> Self {
         let buses = schedule::analyse(config);
+        let refused: Vec<String> = refused_by_data_sheets(config).iter().map(ToString::to_string).collect();
         Self {
             name: config.name.clone(),
-            fits: buses.iter().all(BusSchedule::fits),
+            fits: buses.iter().all(BusSchedule::fits) && refused.is_empty(),
             cycle_ns: config.cycle.period_ns,
             command_phase_ns: config.cycle.command_phase_ns,
             automatic_command_phase_ns: schedule::automatic_command_phase(config).ok(),
@@ -138,6 +142,7 @@ impl Check {
             axes: config.axes.iter().map(|axis| AxisCheck::of(axis, config)).collect(),
             buses,
             lines: LineCheck::all(config),
+            refused,
             warnings: config.warnings().iter().map(ToString::to_string).collect(),
             losses: config.losses(),
         }

@@ -36,6 +36,7 @@ pub fn whole(check: &Check, config: &Config) -> String {
     );
     let mut text = paragraph(&format!("{}: {}", check.name, verdict(check)), 0);
     let _ = writeln!(text, "\n{}", paragraph(&summary, 0));
+    text.push_str(&sentences("Refused by the data sheets of the drives", &check.refused));
     text.push_str(&sentences("Warnings", &check.warnings));
     text.push_str(&sentences("What drives lack, by their data sheets", &check.losses));
     if !check.groups.is_empty() {
@@ -136,7 +137,9 @@ fn configuration_files(config: &Config) -> String {
 }
 
 fn verdict(check: &Check) -> &'static str {
-    if !check.fits {
+    if !check.refused.is_empty() {
+        "REFUSED: by their data sheets, not every drive can be brought up."
+    } else if !check.fits {
         "REFUSED: not every bus carries its traffic in the worst case."
     } else if check.buses.iter().any(BusSchedule::is_narrow) {
         "every bus carries its traffic in the worst case, but with little reserve."

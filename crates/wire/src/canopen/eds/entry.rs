@@ -47,8 +47,9 @@ pub(super) struct Context {
 pub(super) fn read(section: &Section<'_>, context: Context, reporter: &mut Reporter) -> DictionaryEntry {
     let mut reader = Reader { section, context, reporter };
     let data_type = reader.data_type();
-    let default = reader.value("DefaultValue", data_type);
-    let configured = reader.value("ParameterValue", data_type);
+    let default = reader.default_value(data_type);
+    // It is for the device, so it must be right whatever the object.
+    let configured = section.get("ParameterValue").and_then(|pair| value(pair, data_type, reader.reporter));
     let (low, high) = reader.limits(data_type);
     for (key, stated) in [("DefaultValue", &default), ("ParameterValue", &configured)] {
         reader.check_limits(key, stated.as_ref(), low.as_ref(), high.as_ref());
@@ -93,12 +94,50 @@ pub(super) fn misspelling_of(word: &str, known: &[&'static str]) -> Option<&'sta
     (nearest.0 <= LETTERS && word.len() > 2 * LETTERS).then_some(nearest.1)
 }
 
-/// Reads an integer without `$NODEID`; reports a problem otherwise.
-pub(super) fn whole(section: &Section<'_>, key: &str, reporter: &mut Reporter) -> Option<i128> {
+/// Returns `true` if takt works by the values that a data sheet has for this object: identity, SYNC, error control, PDOs, modes and units.
+/// What cannot be read of any other object does not matter.
+fn is_used(index: u16) -> bool {
+    // The objects of each further axis stand 0x800 higher (CiA 402-2).
+    let of_first_axis =
+        if (0x6000..0xA000).contains(&index) { 0x6000 + (index - 0x6000) % 0x800 } else { index };
+    matches!(
+        of_first_axis,
+        0x1000
+            | 0x1005
+            | 0x100C
+            | 0x100D
+            | 0x1016..=0x1018
+            | 0x1400..=0x1BFF
+            | 0x6502
+            | 0x607B
+            | 0x608F
+            | 0x6092
+            | 0x6096
+            | 0x60A9
+    )
+}
+
+/// A problem in the description of an object: of no consequence where takt does not use the object.
+pub(super) fn of_object(index: u16, kind: EdsProblemKind) -> EdsProblemKind {
+    if is_used(index) { kind } else { EdsProblemKind::Unused { problem: Box::new(kind) } }
+}
+
+/// Reads an integer without `$NODEID`; reports a problem otherwise. `of` is the object that it describes.
+pub(super) fn whole(
+    section: &Section<'_>,
+    key: &str,
+    of: Option<u16>,
+    reporter: &mut Reporter,
+) -> Option<i128> {
     let pair = section.get(key)?;
     let number = number::read(pair.value).filter(|parsed| !parsed.number.adds_node);
     let Some(parsed) = number else {
-        reporter.report(not_a_number(pair), pair.span.clone());
+        let kind = not_a_number(pair);
+        let kind = match of {
+            Some(index) => of_object(index, kind),
+            None => kind,
+        };
+        reporter.report(kind, pair.span.clone());
         return None;
     };
     report_anomaly(parsed.anomaly, pair, reporter);
@@ -111,21 +150,28 @@ pub(super) fn value(
     data_type: Option<DataTypeCode>,
     reporter: &mut Reporter,
 ) -> Option<LocatedValue> {
+    let read = value_or_problem(pair, data_type, reporter);
+    read.map_err(|kind| reporter.report(kind, pair.span.clone())).ok()
+}
+
+fn value_or_problem(
+    pair: &Pair<'_>,
+    data_type: Option<DataTypeCode>,
+    reporter: &mut Reporter,
+) -> Result<LocatedValue, EdsProblemKind> {
     let key = pair.key.to_owned();
-    let kind = match (Value::read(pair.value, data_type), data_type) {
+    Err(match (Value::read(pair.value, data_type), data_type) {
         (Ok((value, anomaly)), _) => {
             report_anomaly(anomaly, pair, reporter);
             let line = reporter.line_of(pair.span.start);
-            return Some(LocatedValue { value, line, span: pair.span.clone() });
+            return Ok(LocatedValue { value, line, span: pair.span.clone() });
         }
         (Err(ValueError::OutOfRange { value }), Some(data_type)) => {
             EdsProblemKind::DoesNotFit { key, value, data_type }
         }
         (Err(ValueError::NotBytes), _) => EdsProblemKind::NotBytes { key, given: pair.value.to_owned() },
         (Err(_), _) => not_a_number(pair),
-    };
-    reporter.report(kind, pair.span.clone());
-    None
+    })
 }
 
 fn not_a_number(pair: &Pair<'_>) -> EdsProblemKind {
@@ -139,6 +185,20 @@ fn report_anomaly(anomaly: Option<Anomaly>, pair: &Pair<'_>, reporter: &mut Repo
             pair.span.clone(),
         );
     }
+}
+
+/// The object; its sub-index 0 is a count.
+const CONSUMER_HEARTBEAT: u16 = 0x1016;
+/// The lowest value of 1016:01 that has a node ID (CiA 301, 7.5.2.13).
+const NODE_IN_HEARTBEAT: i128 = 0x1_0000;
+
+/// A limit, and where it is.
+type PlacedLimit = (Value, Range<usize>);
+
+/// The limits as numbers for node 1, and the place of the upper one.
+fn numbers_of(low: Option<&PlacedLimit>, high: Option<&PlacedLimit>) -> Option<(i128, i128, Range<usize>)> {
+    let ((low, _), (high, span)) = low.zip(high)?;
+    Some((low.number(Some(1))?, high.number(Some(1))?, span.clone()))
 }
 
 struct Reader<'s, 't, 'r> {
@@ -177,9 +237,10 @@ impl Reader<'_, '_, '_> {
         let number = number::read(pair.value).filter(|parsed| !parsed.number.adds_node);
         let code = number.as_ref().and_then(|parsed| u16::try_from(parsed.number.constant).ok());
         let Some(code) = code.filter(|code| *code > 0) else {
+            let ObjectAddress { index, subindex } = self.context.address;
             let kind = EdsProblemKind::UnknownDataType { given: pair.value.to_owned() };
-            self.reporter.report(kind, pair.span.clone());
-            return None;
+            self.reporter.report(of_object(index, kind), pair.span.clone());
+            return DataTypeCode::of_standard_object(index, subindex);
         };
         report_anomaly(number.and_then(|parsed| parsed.anomaly), pair, self.reporter);
         Some(DataTypeCode(code))
@@ -201,30 +262,44 @@ impl Reader<'_, '_, '_> {
         })
     }
 
-    fn value(&mut self, key: &str, data_type: Option<DataTypeCode>) -> Option<LocatedValue> {
-        value(self.section.get(key)?, data_type, self.reporter)
+    fn default_value(&mut self, data_type: Option<DataTypeCode>) -> Option<LocatedValue> {
+        let pair = self.section.get("DefaultValue")?;
+        let read = value_or_problem(pair, data_type, self.reporter);
+        read.map_err(|kind| {
+            self.reporter.report(of_object(self.context.address.index, kind), pair.span.clone())
+        })
+        .ok()
     }
 
     fn whole(&mut self, key: &str) -> Option<i128> {
-        whole(self.section, key, self.reporter)
+        whole(self.section, key, Some(self.context.address.index), self.reporter)
     }
 
     /// Reads the limits. Wrong limits are dropped, because limits only lead to warnings.
     fn limits(&mut self, data_type: Option<DataTypeCode>) -> (Option<Value>, Option<Value>) {
         let low = self.limit("LowLimit", data_type);
         let high = self.limit("HighLimit", data_type);
-        let numbers = low.as_ref().zip(high.as_ref()).and_then(|((low, _), (high, span))| {
-            Some((low.number(Some(1))?, high.number(Some(1))?, span.clone()))
-        });
+        let numbers = numbers_of(low.as_ref(), high.as_ref());
         if let Some((low, high, span)) = numbers.filter(|(low, high, _)| low > high) {
             let reason = format!("the lower limit {low} is above the upper limit {high}");
             self.reporter.report(EdsProblemKind::BadLimit { reason }, span);
             return (None, None);
         }
+        if let Some((_, high, span)) = numbers_of(low.as_ref(), high.as_ref())
+            .filter(|(_, high, _)| self.is_heartbeat_consumer() && (1..NODE_IN_HEARTBEAT).contains(high))
+        {
+            let reason = format!("the upper limit {high} leaves no room for the node ID in bits 16 to 22");
+            self.reporter.report(EdsProblemKind::BadLimit { reason }, span);
+            return (low.map(|(low, _)| low), None);
+        }
         (low.map(|(low, _)| low), high.map(|(high, _)| high))
     }
 
-    fn limit(&mut self, key: &str, data_type: Option<DataTypeCode>) -> Option<(Value, Range<usize>)> {
+    fn is_heartbeat_consumer(&self) -> bool {
+        self.context.address.index == CONSUMER_HEARTBEAT && self.context.address.subindex > 0
+    }
+
+    fn limit(&mut self, key: &str, data_type: Option<DataTypeCode>) -> Option<PlacedLimit> {
         let pair = self.section.get(key)?;
         let reason = match Value::read(pair.value, data_type) {
             Ok((value, anomaly)) => {

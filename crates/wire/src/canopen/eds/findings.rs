@@ -54,6 +54,17 @@ impl Findings {
         self.problems().iter().any(|problem| problem.kind.severity() == Severity::Error)
     }
 
+    /// What it is like, with the first error and its line, in one sentence.
+    pub fn first_error(&self) -> String {
+        match self.problems().iter().find(|problem| problem.kind.severity() == Severity::Error) {
+            Some(problem) if problem.label().is_some() => {
+                format!("{self}: line {}: {problem}", self.position(problem).line)
+            }
+            Some(problem) => format!("{}: {problem}", self.source_name()),
+            None => self.to_string(),
+        }
+    }
+
     /// Returns `true` if there are no problems.
     pub fn is_empty(&self) -> bool {
         self.problems().is_empty()

@@ -58,7 +58,7 @@ fn read(
         }
     }
     if let Some(pair) = section.get("SupportedObjects")
-        && let Some(stated) = entry::whole(section, "SupportedObjects", reporter)
+        && let Some(stated) = entry::whole(section, "SupportedObjects", None, reporter)
         && usize::try_from(stated) != Ok(found)
     {
         let kind = EdsProblemKind::Count { key: pair.key.to_owned(), stated, found };

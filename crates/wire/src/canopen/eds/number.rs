@@ -50,6 +50,10 @@ pub enum Anomaly {
     Comment,
     /// `true` or `false`, `yes` or `no`.
     Word,
+    /// A suffix of a C literal: `0x10UL`.
+    CSuffix,
+    /// A whole number with a decimal point: `100.0`.
+    Point,
 }
 
 /// Parses a sum of numbers and at most one `$NODEID`; `None` for any other text.
@@ -92,6 +96,9 @@ fn read_term(term: &str) -> Option<ParsedNumber> {
         Some(ParsedNumber { number: Number::constant(constant.into()), anomaly, is_pattern })
     };
     let lower = term.to_ascii_lowercase();
+    if let Some(literal) = without_c_suffix(&lower) {
+        return Some(ParsedNumber { anomaly: Some(Anomaly::CSuffix), ..read_term(literal)? });
+    }
     let node = |anomaly| {
         let number = Number { constant: 0, adds_node: true };
         Some(ParsedNumber { number, anomaly, is_pattern: false })
@@ -109,6 +116,9 @@ fn read_term(term: &str) -> Option<ParsedNumber> {
     if let Some(digits) = lower.strip_suffix('h') {
         return of(digits_in(digits, 16)?, Some(Anomaly::Suffix), true);
     }
+    if let Some(whole) = without_zero_fraction(&lower) {
+        return of(digits_in(whole, 10)?, Some(Anomaly::Point), false);
+    }
     let decimal = digits_in(&lower, 10)?;
     if lower.len() == 1 || !lower.starts_with('0') {
         return of(decimal, None, false);
@@ -117,6 +127,19 @@ fn read_term(term: &str) -> Option<ParsedNumber> {
         None => of(decimal, Some(Anomaly::NotOctal), false),
         Some(octal) => of(octal, (octal != decimal).then_some(Anomaly::Octal), false),
     }
+}
+
+/// The literal without the suffix of an integer in C (ISO/IEC 9899, 6.4.4.1); `None` if it has none.
+fn without_c_suffix(literal: &str) -> Option<&str> {
+    let digits = literal.trim_end_matches(['u', 'l']);
+    let is_number = digits.starts_with(|first: char| first.is_ascii_digit());
+    (is_number && (1..=3).contains(&(literal.len() - digits.len()))).then_some(digits)
+}
+
+/// The whole part of a decimal number whose fraction is zero.
+fn without_zero_fraction(text: &str) -> Option<&str> {
+    let (whole, fraction) = text.split_once('.')?;
+    (!whole.is_empty() && fraction.bytes().all(|digit| digit == b'0')).then_some(whole)
 }
 
 fn digits_in(digits: &str, radix: u32) -> Option<u64> {
@@ -159,6 +182,9 @@ mod tests {
         assert_eq!(value("089"), Some((89, Some(Anomaly::NotOctal))));
         assert_eq!(value("2Ah"), Some((42, Some(Anomaly::Suffix))));
         assert_eq!(value("-0x2A"), Some((-42, None)));
+        assert_eq!(value("0x2AuL"), Some((42, Some(Anomaly::CSuffix))));
+        assert_eq!(value("42l"), Some((42, Some(Anomaly::CSuffix))));
+        assert_eq!(value("42.00"), Some((42, Some(Anomaly::Point))));
         assert_eq!(value("42 ; forty-two"), Some((42, Some(Anomaly::Comment))));
         assert_eq!(value("0xFFFFFFFFFFFFFFFF"), Some((u64::MAX.into(), None)));
     }
@@ -171,6 +197,10 @@ mod tests {
             "0x",
             "0xG",
             "1.5",
+            ".0",
+            "ul",
+            "1ulul",
+            "0x1.0",
             "$NODE+1",
             "-$NODEID",
             "$NODEID+$NODEID",

@@ -114,13 +114,13 @@ impl Reader<'_, '_, '_> {
     /// The number of sub-objects that the object's own section describes.
     fn compact_count(&mut self) -> u8 {
         let Some(section) = self.parts.object else { return 0 };
-        let count = entry::whole(section, "CompactSubObj", self.reporter).unwrap_or(0);
+        let count = entry::whole(section, "CompactSubObj", Some(self.index), self.reporter).unwrap_or(0);
         if !(0..=i128::from(HIGHEST_SUBINDEX)).contains(&count)
             && let Some(pair) = section.get("CompactSubObj")
         {
             let kind =
                 EdsProblemKind::OutOfRange { key: pair.key.to_owned(), value: count, allowed: "0 to 254" };
-            self.reporter.report(kind, pair.span.clone());
+            self.reporter.report(entry::of_object(self.index, kind), pair.span.clone());
         }
         count.clamp(0, HIGHEST_SUBINDEX.into()) as u8
     }
@@ -265,7 +265,7 @@ impl Reader<'_, '_, '_> {
             .filter_map(|pair| Some((pair.key.parse().ok()?, pair.clone())))
             .collect();
         if let Some(pair) = section.get("NrOfEntries")
-            && let Some(stated) = entry::whole(section, "NrOfEntries", self.reporter)
+            && let Some(stated) = entry::whole(section, "NrOfEntries", Some(self.index), self.reporter)
             && usize::try_from(stated) != Ok(listed.len())
         {
             let kind = EdsProblemKind::Count { key: pair.key.to_owned(), stated, found: listed.len() };
@@ -276,7 +276,9 @@ impl Reader<'_, '_, '_> {
 
     fn check_sub_number(&mut self, section: &Section<'_>, compact: u8) {
         let Some(pair) = section.get("SubNumber").filter(|_| compact == 0) else { return };
-        let Some(stated) = entry::whole(section, "SubNumber", self.reporter) else { return };
+        let Some(stated) = entry::whole(section, "SubNumber", Some(self.index), self.reporter) else {
+            return;
+        };
         let found = self.parts.sub_objects.len();
         if usize::try_from(stated) != Ok(found) {
             let kind = EdsProblemKind::Count { key: pair.key.to_owned(), stated, found };

@@ -110,6 +110,24 @@ pub enum EdsProblemKind {
         allowed: &'static str,
     },
 
+    /// A part of the description of an object that takt does not use.
+    #[error("{problem}")]
+    Unused {
+        /// What is wrong with it.
+        problem: Box<EdsProblemKind>,
+    },
+    /// Two numbers of the vendor or of the product.
+    #[error("`{key}` is 0x{stated:08X}, but {object} is 0x{number:08X}")]
+    TwoIdentities {
+        /// The key in `[DeviceInfo]`.
+        key: String,
+        /// Its number.
+        stated: u32,
+        /// The object.
+        object: String,
+        /// Its number.
+        number: u32,
+    },
     /// A line before the first section.
     #[error("this line is before the first section")]
     OutsideSections,
@@ -286,6 +304,8 @@ fn anomaly_words(anomaly: Anomaly, given: &str) -> String {
         Anomaly::Suffix => format!("{given} is not the notation of a hexadecimal number"),
         Anomaly::NoDollar => format!("{given} is not the notation of the node ID"),
         Anomaly::Comment => format!("there is a comment after the number: {given}"),
+        Anomaly::CSuffix => format!("{given} has the suffix of a C literal"),
+        Anomaly::Point => format!("{given} is a whole number with a decimal point"),
         Anomaly::Word => format!("{given} is a word instead of a number"),
     }
 }
@@ -329,6 +349,10 @@ impl EdsProblemKind {
                 "remove the wrong one, because it would be written to the device".into()
             }
             Self::OutOfRange { .. } => "correct it".into(),
+            Self::Unused { problem } => {
+                format!("{}; until then it is ignored, because takt does not use this object", problem.help())
+            }
+            Self::TwoIdentities { object, .. } => format!("the drive is expected to have that of {object}"),
             Self::OutsideSections | Self::NotALine => "it was ignored".into(),
             Self::UnclosedHeader => "the name was read up to the end of the line".into(),
             Self::RepeatedSection { .. } => "both were merged".into(),
@@ -347,6 +371,7 @@ impl EdsProblemKind {
                 Anomaly::Suffix => "it was read as hexadecimal: write 0x before it".into(),
                 Anomaly::NoDollar => "it was read as $NODEID".into(),
                 Anomaly::Comment => "the comment was ignored: write comments on their own lines".into(),
+                Anomaly::CSuffix | Anomaly::Point => "it was read as this number".into(),
                 Anomaly::Word => "it was read as 1 or 0".into(),
             },
             Self::MissingKey { repair, .. } => repair.clone(),

@@ -12,6 +12,7 @@ use super::number;
 use super::objects;
 use super::problem::{EdsProblem, EdsProblemKind};
 use super::section_name::SectionName;
+use crate::canopen::object::ObjectAddress;
 
 /// The sections besides those of objects (CiA 306), as the standard spells them, and those of modular devices.
 const SECTIONS: [&str; 15] = [
@@ -86,7 +87,29 @@ pub(super) fn read(text: &str) -> (Option<ObjectDictionary>, Vec<EdsProblem>) {
     lists::check(&document, &mut dictionary, &mut reporter);
     compact_pdo::expand(&mut dictionary);
     mapping::check(&dictionary, &mut reporter);
+    check_identity(&document, &dictionary, &mut reporter);
     (Some(dictionary), reporter.into_problems())
+}
+
+/// Warns of numbers in `[DeviceInfo]` that are not those of object 1018.
+fn check_identity(document: &Document<'_>, dictionary: &ObjectDictionary, reporter: &mut Reporter) {
+    let device = &dictionary.device;
+    let Some(section) = document.section("DeviceInfo") else { return };
+    for (key, stated, subindex) in
+        [("VendorNumber", device.vendor_number, 1), ("ProductNumber", device.product_number, 2)]
+    {
+        let object = ObjectAddress::new(0x1018, subindex);
+        let number = dictionary.number(object, None).and_then(|number| u32::try_from(number).ok());
+        if let (Some(stated), Some(number), Some(pair)) = (stated, number, section.get(key))
+            && stated != number
+            && stated != 0
+            && number != 0
+        {
+            let (key, object) = (pair.key.to_owned(), object.to_string());
+            let kind = EdsProblemKind::TwoIdentities { key, stated, object, number };
+            reporter.report(kind, pair.span.clone());
+        }
+    }
 }
 
 fn check_sections(document: &Document<'_>, reporter: &mut Reporter) {
@@ -177,7 +200,7 @@ fn commissioning(document: &Document<'_>, reporter: &mut Reporter) -> Option<Dev
     // The standard's own spelling comes first.
     let section =
         document.section("DeviceComissioning").or_else(|| document.section("DeviceCommissioning"))?;
-    let node = entry::whole(section, "NodeID", reporter);
+    let node = entry::whole(section, "NodeID", None, reporter);
     if let Some(value) = node.filter(|node| !(1..=127).contains(node))
         && let Some(pair) = section.get("NodeID")
     {

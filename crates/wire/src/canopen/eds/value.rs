@@ -108,7 +108,8 @@ fn real(text: &str, bits: u8) -> Option<f64> {
             _ => f64::from_bits(u64::try_from(pattern).ok()?),
         });
     }
-    text.parse().ok()
+    // A literal of C may have the suffix of a float.
+    text.parse().or_else(|_| text.trim_end_matches(['f', 'F']).parse()).ok()
 }
 
 /// Parses pairs of hexadecimal digits, with or without blanks between them, optionally after `0x`.
@@ -162,6 +163,7 @@ mod tests {
     #[test]
     fn reals_texts_and_bytes_have_their_own_notations() {
         assert_eq!(encoded("1.5", REAL32), Ok(Some(1.5_f32.to_le_bytes().into())));
+        assert_eq!(encoded("1.5f", REAL32), Ok(Some(1.5_f32.to_le_bytes().into())));
         assert_eq!(encoded("0x3FC00000", REAL32), Ok(Some(1.5_f32.to_le_bytes().into())));
         assert_eq!(encoded("abc", DataTypeCode(0x09)), Ok(Some(b"abc".into())));
         assert_eq!(encoded("ab", DataTypeCode::UNICODE_STRING), Ok(Some(b"a\0b\0".into())));
