@@ -116,6 +116,14 @@ impl<'a> CdrDecoder<'a> {
         Some(*bytes)
     }
 
+    /// `uint8[]`
+    pub fn octet_sequence(&mut self) -> Option<&'a [u8]> {
+        let length = usize::try_from(self.u32()?).ok()?;
+        let bytes = self.body.get(self.at..)?.get(..length)?;
+        self.at += length;
+        Some(bytes)
+    }
+
     /// `uint8`
     pub fn u8(&mut self) -> Option<u8> {
         self.take::<1>().map(|[byte]| byte)

@@ -11,7 +11,9 @@ use super::cdr::CdrEncoder;
 use super::severity::Severity;
 use crate::link::trace::{TracedFrame, TracedHealth};
 
-pub use decode::{decode_axis, decode_bus, decode_cycle, decode_event, decode_frame, decode_group};
+pub use decode::{
+    decode_axis, decode_bus, decode_cycle, decode_event, decode_frame, decode_group, decode_journal,
+};
 
 /// A message type: its name, and its definition in the ROS 2 interface language.
 pub struct MessageType {
@@ -70,6 +72,13 @@ pub const BUS: MessageType = MessageType {
     name: "takt_msgs/msg/Bus",
     definition: include_str!("messages/Bus.msg"),
     later_fields: &[1],
+};
+
+/// A block of the journal.
+pub const JOURNAL: MessageType = MessageType {
+    name: "takt_msgs/msg/Journal",
+    definition: include_str!("messages/Journal.msg"),
+    later_fields: &[],
 };
 
 /// All axes at a time, as programs of ROS 2 know them.
@@ -267,6 +276,11 @@ pub fn encode_frame(TracedFrame { at_ns, is_sent, frame }: &TracedFrame, encoder
         .u8(frame.length() as u8)
         .octet_sequence(frame.payload())
         .string(&format!("{frame:?}"));
+}
+
+/// Encodes a [`JOURNAL`].
+pub fn encode_journal(block: &[u8], encoder: &mut CdrEncoder) {
+    encoder.begin().octet_sequence(block);
 }
 
 /// Encodes a [`BUS`].

@@ -5,7 +5,7 @@
 //! its slot.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Seek, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -51,7 +51,7 @@ pub const PART_NUMBER: &str = "number";
 pub const METADATA: &str = "takt";
 
 /// The version of the format of the journal, in the metadata of its channel.
-pub const JOURNAL_VERSION: &str = "3";
+pub const JOURNAL_VERSION: &str = "4";
 /// The metadata record at the end of a journal.
 pub const JOURNAL_END: &str = "journal end";
 /// The metadata record that names the file of the configuration, and the interfaces that replace those of the file.
@@ -62,6 +62,26 @@ pub const MAIN_FILE: &str = "file";
 pub const INTERFACE_OF: &str = "interface of ";
 /// The metadata record with the files of the configuration.
 pub const CONFIGURATION_FILES: &str = "configuration files";
+
+/// The key of the quality of service in the metadata of a channel (rosbag2_storage_mcap).
+const OFFERED_QOS: &str = "offered_qos_profiles";
+/// Keep the last 10, reliable, volatile, automatic liveliness, no deadlines: the numbers of `rmw/types.h`, which every version of rosbag2 reads.
+const QOS_PROFILES: &str = "- history: 1
+  depth: 10
+  reliability: 1
+  durability: 2
+  deadline:
+    sec: 9223372036
+    nsec: 854775807
+  lifespan:
+    sec: 9223372036
+    nsec: 854775807
+  liveliness: 1
+  liveliness_lease_duration:
+    sec: 9223372036
+    nsec: 854775807
+  avoid_ros_namespace_conventions: false
+";
 
 /// The name of the group of all axes, where no groups are configured.
 const ONLY_GROUP: &str = "all";
@@ -145,7 +165,7 @@ impl Recording {
         let (group, bus) = (schema(&messages::GROUP)?, schema(&messages::BUS)?);
         let (joint_state, log) = (schema(&messages::JOINT_STATE)?, schema(&messages::LOG)?);
         let mut channel = |schema, topic: &str, metadata: &BTreeMap<_, _>| {
-            writer.add_channel(schema, topic, "cdr", metadata)
+            add_channel(&mut writer, schema, topic, metadata)
         };
         let cycle_channel = channel(cycle, "/cycle", &BTreeMap::new())?;
         let event_channel = channel(event, "/events", &BTreeMap::new())?;
@@ -226,7 +246,9 @@ impl Recording {
     /// Adds the channel of the journal, and the files that the configuration was made of.
     pub fn begin_journal(&mut self, sources: &ConfigSources) -> McapResult<()> {
         let metadata = BTreeMap::from([("journal".to_owned(), JOURNAL_VERSION.to_owned())]);
-        self.journal_channel = Some(self.writer.add_channel(0, "/journal", "takt-journal", &metadata)?);
+        let MessageType { name, definition, .. } = messages::JOURNAL;
+        let schema = self.writer.add_schema(name, "ros2msg", definition.as_bytes())?;
+        self.journal_channel = Some(add_channel(&mut self.writer, schema, "/journal", &metadata)?);
         if let Some(main) = &sources.main {
             let overrides = sources
                 .interfaces
@@ -247,10 +269,8 @@ impl Recording {
     pub fn journal(&mut self, block: &[u8]) -> McapResult<()> {
         let Some(channel_id) = self.journal_channel else { return Ok(()) };
         let time = self.last_time;
-        let header = MessageHeader { channel_id, sequence: 0, log_time: time, publish_time: time };
-        self.writer.write_to_known_channel(&header, block)?;
-        self.open_bytes += MESSAGE_BYTES + block.len() as u64;
-        Ok(())
+        messages::encode_journal(block, &mut self.encoder);
+        self.write_encoded(channel_id, 0, time)
     }
 
     /// Adds the channels of the frames.
@@ -260,7 +280,7 @@ impl Recording {
         for (index, description) in machine.buses.iter().enumerate() {
             let topic = format!("/frames/{}", description.name);
             let metadata = describe_bus(index, description);
-            self.frame_channels.push(self.writer.add_channel(frame, &topic, "cdr", &metadata)?);
+            self.frame_channels.push(add_channel(&mut self.writer, frame, &topic, &metadata)?);
         }
         Ok(())
     }
@@ -369,7 +389,12 @@ impl Recording {
     fn write(&mut self, channel_id: u16, slot: u64, at_ns: u64) -> McapResult<()> {
         let time = self.wall_clock.unix_ns(at_ns);
         self.last_time = time;
-        let header = MessageHeader { channel_id, sequence: slot as u32, log_time: time, publish_time: time };
+        self.write_encoded(channel_id, slot as u32, time)
+    }
+
+    /// Writes the message of the encoder.
+    fn write_encoded(&mut self, channel_id: u16, sequence: u32, time: u64) -> McapResult<()> {
+        let header = MessageHeader { channel_id, sequence, log_time: time, publish_time: time };
         self.writer.write_to_known_channel(&header, self.encoder.bytes())?;
         self.open_bytes += MESSAGE_BYTES + self.encoder.bytes().len() as u64;
         Ok(())
@@ -388,6 +413,18 @@ impl Recording {
         self.writer.finish()?;
         self.writer.into_inner().into_inner().flush().map_err(McapError::Io)
     }
+}
+
+/// Adds a channel of CDR messages. rosbag2 expects the quality of service that each topic was offered with.
+fn add_channel<W: Write + Seek>(
+    writer: &mut mcap::Writer<W>,
+    schema: u16,
+    topic: &str,
+    metadata: &BTreeMap<String, String>,
+) -> McapResult<u16> {
+    let mut metadata = metadata.clone();
+    metadata.insert(OFFERED_QOS.to_owned(), QOS_PROFILES.to_owned());
+    writer.add_channel(schema, topic, "cdr", &metadata)
 }
 
 fn describe_bus(index: usize, description: &BusDescription) -> BTreeMap<String, String> {

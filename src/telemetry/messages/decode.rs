@@ -107,17 +107,18 @@ pub fn decode_frame(message: &[u8]) -> Option<TracedFrame> {
     let id = if fields.u8()? != 0 { Id::extended(id) } else { Id::base(id) }.ok()?;
     let (is_remote, is_fd, has_switch) = (fields.u8()? != 0, fields.u8()? != 0, fields.u8()? != 0);
     let length = fields.u8()?;
-    let mut bytes = [0; Frame::MAX_BYTES];
-    let data = bytes.get_mut(..usize::try_from(fields.u32()?).ok()?)?;
-    for byte in data.iter_mut() {
-        *byte = fields.u8()?;
-    }
+    let data = fields.octet_sequence()?;
     let frame = match (is_remote, is_fd) {
         (true, _) => Frame::remote(id, length),
         (false, true) => Frame::fd(id, data, has_switch),
         (false, false) => Frame::data(id, data),
     };
     Some(TracedFrame { at_ns, is_sent, frame: frame.ok()? })
+}
+
+/// Decodes a [`JOURNAL`](super::JOURNAL).
+pub fn decode_journal(message: &[u8]) -> Option<&[u8]> {
+    CdrDecoder::begin(message)?.octet_sequence()
 }
 
 /// Decodes a [`BUS`](super::BUS).

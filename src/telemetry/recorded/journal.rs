@@ -11,7 +11,7 @@ use super::{RecordedError, walk};
 use crate::config::ConfigSources;
 use crate::journal::{BlockDefect, Journal};
 use crate::telemetry::destination::PartNames;
-use crate::telemetry::recording;
+use crate::telemetry::{messages, recording};
 
 /// A part of a journal that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -117,7 +117,11 @@ fn add(
         }
         Some(Ok(Record::Message { channel, data, .. })) if channels.contains(&channel) => {
             number += 1;
-            if let Err(defect) = found.journal.get_or_insert_default().add_block(data) {
+            let journal = found.journal.get_or_insert_default();
+            let added = messages::decode_journal(data)
+                .ok_or(BlockDefect::Undecodable)
+                .and_then(|block| journal.add_block(block));
+            if let Err(defect) = added {
                 let file = path.to_owned();
                 found.defect.get_or_insert(JournalDefect::Block { file, number, defect });
             }
@@ -175,16 +179,19 @@ mod tests {
 
     use super::*;
     use crate::journal::ClockAnswer;
+    use crate::telemetry::cdr::CdrEncoder;
 
     /// A recording in which these are the blocks of a journal of this version.
     fn file_of(version: &str, blocks: &[Vec<u8>]) -> Vec<u8> {
         let mut file = Cursor::new(vec![]);
         let mut writer = Writer::with_options(&mut file, WriteOptions::new().compression(None)).unwrap();
         let metadata = BTreeMap::from([("journal".to_owned(), version.to_owned())]);
-        let channel_id = writer.add_channel(0, "/journal", "takt-journal", &metadata).unwrap();
+        let channel_id = writer.add_channel(0, "/journal", "cdr", &metadata).unwrap();
         for block in blocks {
             let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
-            writer.write_to_known_channel(&header, block).unwrap();
+            let mut encoder = CdrEncoder::default();
+            messages::encode_journal(block, &mut encoder);
+            writer.write_to_known_channel(&header, encoder.bytes()).unwrap();
         }
         writer.finish().unwrap();
         drop(writer);

@@ -150,7 +150,9 @@ fn a_recording_has_an_index_and_the_description_of_the_machine() {
         ("unit", "m"),
         ("velocity_limit", "2"),
     ];
-    assert_eq!(slide.metadata, expected.map(|(key, value)| (key.to_owned(), value.to_owned())).into());
+    let mut metadata = slide.metadata.clone();
+    assert!(metadata.remove("offered_qos_profiles").is_some());
+    assert_eq!(metadata, expected.map(|(key, value)| (key.to_owned(), value.to_owned())).into());
     let metadata = mcap::read::metadata(&recording, &summary.metadata_indexes[0]).unwrap();
     assert_eq!((&*metadata.name, &*metadata.metadata["axes"]), ("takt", "shoulder\nslide"));
     assert_eq!(metadata.metadata["cycle_ns"], "1000000");

@@ -202,3 +202,20 @@ fn the_black_box_of_a_run_that_was_not_recorded_is_replayed_and_shows_other_limi
     let stricter = replay(&["--set", "axes.joint.limits.jerk=20"]);
     assert_eq!(stricter["cycles"], same["cycles"], "{stricter:#}");
 }
+
+#[test]
+fn every_channel_of_a_recording_is_one_that_readers_of_ros_2_decode() {
+    let bytes = fs::read(&recorded().run).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let topics: Vec<&str> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
+    assert!(topics.contains(&"/journal") && topics.contains(&"/joint_states"), "{topics:?}");
+    for channel in summary.channels.values() {
+        let schema = channel.schema.as_ref().unwrap_or_else(|| panic!("{}", channel.topic));
+        assert_eq!((&*channel.message_encoding, &*schema.encoding), ("cdr", "ros2msg"), "{}", channel.topic);
+        let offered = &channel.metadata["offered_qos_profiles"];
+        assert!(offered.starts_with("- history: 1\n  depth: 10\n  reliability: 1\n"), "{offered}");
+    }
+    let header =
+        mcap::records::parse_record(mcap::records::op::HEADER, &bytes[mcap::MAGIC.len() + 9..]).unwrap();
+    assert!(matches!(header, mcap::records::Record::Header(header) if header.profile == "ros2"));
+}
