@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use serde_json::json;
 use takt_rt::{Frame, FrameKind, Nanoseconds};
-use takt_wire::bus_log::Direction;
+use takt_wire::bus_log::{Direction, is_time_of_day};
 
 use crate::columns::columns;
 use crate::print;
@@ -51,7 +51,7 @@ impl Line<'_> {
             })
             .collect();
         let object = json!({
-            "time": self.unix_ns as f64 / 1e9,
+            "time": is_time_of_day(self.unix_ns).then_some(self.unix_ns as f64 / 1e9),
             "since_start": self.since_ns as f64 / 1e9,
             "bus": self.bus,
             "direction": self.direction.map(|direction| match direction {
@@ -119,6 +119,15 @@ impl LineStyle {
         let is_needed = names.len() > 1;
         let longest = names.map(|name| name.chars().count()).max().unwrap_or(0);
         self.bus_letters = if is_needed { longest.max(self.bus_letters) } else { self.bus_letters };
+    }
+
+    /// Counts times from the first frame. Returns `true` if they were to be times of day until now.
+    pub fn count_from_start(&mut self) -> bool {
+        let is_clock = self.time == TimeStyle::Clock;
+        if is_clock {
+            self.time = TimeStyle::Start;
+        }
+        is_clock
     }
 
     /// Writes a line, or several where the terminal is narrow.

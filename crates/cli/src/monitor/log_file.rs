@@ -59,7 +59,15 @@ fn log(
 }
 
 fn remark(shown: &str, condition: &LogCondition, session: &mut Session) {
-    let LogCondition { error_frames, foreign, malformed, first_malformed, is_cut_off } = condition;
+    let LogCondition {
+        error_frames,
+        foreign,
+        malformed,
+        first_malformed,
+        steps_back,
+        first_step_back,
+        is_cut_off,
+    } = condition;
     if *error_frames > 0 {
         session.remark(format!("{shown} has {error_frames} messages of CAN controllers about errors"));
     }
@@ -69,6 +77,12 @@ fn remark(shown: &str, condition: &LogCondition, session: &mut Session) {
     if let Some((at, problem)) = first_malformed {
         session.remark(format!(
             "{malformed} lines (blocks) of {shown} are no frames, and were passed over; the first one is {at}: {problem}"
+        ));
+    }
+    if let Some(first) = first_step_back {
+        session.remark(format!(
+            "the times of {shown} go back at {steps_back} of its frames, first at frame {first}: they may be those of several logs, or count \
+             from the frame before (candump -t d)"
         ));
     }
     if *is_cut_off {

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use takt_rt::{BusState, Frame, Nanoseconds};
-use takt_wire::bus_log::{Direction, LogWriter, LoggedFrame};
+use takt_wire::bus_log::{Direction, LogWriter, LoggedFrame, is_time_of_day};
 
 use super::line::{Line, LineStyle, TimeStyle};
 use super::statistics;
@@ -129,6 +129,10 @@ impl Session {
         frame: &Frame,
     ) -> bool {
         let first_ns = *self.first_ns.get_or_insert(unix_ns);
+        if !is_time_of_day(unix_ns) && self.style.count_from_start() {
+            self.remarks
+                .push("the log has no times of day: its times are shown from its first frame".to_owned());
+        }
         let since_ns = unix_ns.saturating_sub(first_ns);
         if self.options.duration.is_some_and(|duration| u128::from(since_ns) > duration.as_nanos()) {
             return false;

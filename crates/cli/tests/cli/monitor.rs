@@ -378,3 +378,31 @@ fn a_bus_whose_interface_goes_is_named_at_the_end_and_the_monitor_fails() {
     ends_with(1, &output);
     assert!(errors(&output).contains("went down, or has gone"), "{}", errors(&output));
 }
+
+#[test]
+fn what_the_times_of_a_log_do_not_say_is_said_and_not_shown() {
+    let folder = folder();
+    let shown = |name: &str, text: &str, arguments: &[&str]| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        let output = monitor(&[&[path.to_str().unwrap()], arguments].concat());
+        ends_with(0, &output);
+        (said(&output), errors(&output))
+    };
+    let (frames, notes) = shown(
+        "arm.asc",
+        "base hex  timestamps absolute\n 1.5 1 080 Rx d 0\n 1.75 1 080 Rx d 0\n",
+        &["--time", "clock"],
+    );
+    assert!(frames.contains("0.250000") && !frames.contains("1970"), "{frames}");
+    assert!(notes.contains("the log has no times of day"), "{notes}");
+    let (object, _) = shown("arm.trc", ";$FILEVERSION=1.1\n 1) 1.5 Rx 0080 0\n", &["--json"]);
+    let object: Value = serde_json::from_str(&object).unwrap();
+    assert_eq!((&object["time"], &object["frame"]), (&Value::Null, &"080#".into()));
+    let (frames, notes) = shown("back.log", "(2.0) can0 080#\n(1.0) can0 080#\nEND\n", &[]);
+    assert_eq!(frames.lines().count(), 2);
+    assert!(
+        notes.contains("go back at 1 of its frames, first at frame 2") && notes.contains("1 lines"),
+        "{notes}"
+    );
+}

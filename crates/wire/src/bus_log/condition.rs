@@ -15,7 +15,7 @@ pub enum LogError {
     /// It is none of the logs that are known.
     #[error(
         "this is no log of a bus; line {line}: {problem}. A log of candump (-l, or what it prints), pcapng, a CSV table with the \
-         columns id and data, and recordings of takt are read"
+         columns id and data (or that of python-can), ASC, TRC, and recordings of takt are read"
     )]
     Unknown {
         /// The first line that is of no log.
@@ -45,6 +45,10 @@ pub struct LogCondition {
     pub malformed: u64,
     /// The first of them, counted from 1, and why.
     pub first_malformed: Option<(usize, String)>,
+    /// How often a time is before that of the frame before.
+    pub steps_back: u64,
+    /// The first such frame, counted from 1.
+    pub first_step_back: Option<u64>,
     /// True if the end of the last block is missing.
     pub is_cut_off: bool,
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use takt_rt::{Frame, FrameKind, NANOSECONDS_PER_SECOND};
 
-use super::line::{LineItem, LineProblem};
+use super::line::{self, LineItem, LineProblem};
 use super::{Direction, LoggedFrame, frame_text, time};
 
 /// The first line, with its end.
@@ -59,6 +59,16 @@ pub struct Columns {
     kind: Option<usize>,
     length: Option<usize>,
     data: usize,
+    /// Those of python-can: the data is base64, and flags say the kind.
+    flags: Option<PythonFlags>,
+}
+
+/// The columns with flags of python-can's CSV.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct PythonFlags {
+    extended: usize,
+    remote: usize,
+    error: usize,
 }
 
 impl Columns {
@@ -67,7 +77,12 @@ impl Columns {
         let header = header.trim_start_matches('\u{FEFF}');
         let names: Vec<String> = cells(header).map(|name| name.trim().to_lowercase()).collect();
         let column = |known: &[&str]| names.iter().position(|name| known.contains(&name.as_str()));
+        let flags = || {
+            let (extended, remote) = (column(&["extended"])?, column(&["remote"])?);
+            Some(PythonFlags { extended, remote, error: column(&["error"])? })
+        };
         Some(Self {
+            flags: flags(),
             time: column(&["time", "timestamp"]),
             bus: column(&["bus", "channel", "interface"]),
             state: column(&["state", "status", "direction"]),
@@ -96,6 +111,9 @@ impl Columns {
             Some(Some('R' | 'r')) => Some(Direction::Received),
             _ => None,
         };
+        if let Some(flags) = self.flags {
+            return self.of_python(flags, &cells, at_ns);
+        }
         // The vendor's tool does not fill identifiers up with zeros.
         let id = cell(self.id)?.trim_start_matches("0x");
         let id = if id.len() < 3 { format!("{id:0>3}") } else { id.to_owned() };
@@ -123,6 +141,61 @@ impl Columns {
         let bus = given(self.bus).unwrap_or_default();
         Ok(LineItem::Frame(LoggedFrame { at_ns, bus, direction, frame }))
     }
+}
+
+impl Columns {
+    /// Reads the cells of a line of python-can.
+    fn of_python<'a>(
+        &self,
+        flags: PythonFlags,
+        cells: &[&'a str],
+        at_ns: u64,
+    ) -> Result<LineItem<'a>, LineProblem> {
+        let cell = |at: usize| cells.get(at).map(|cell| cell.trim()).ok_or(LineProblem::Cut);
+        let is_set = |at: usize| cell(at).map(|cell| cell == "1");
+        if is_set(flags.error)? {
+            return Ok(LineItem::ErrorFrame);
+        }
+        let digits = cell(self.id)?.trim_start_matches("0x");
+        let id = line::numbered(u32::from_str_radix(digits, 16).ok(), is_set(flags.extended)?)?;
+        let mut bytes = [0; Frame::MAX_BYTES];
+        let length = base64(cell(self.data)?, &mut bytes)?;
+        let payload = bytes.get(..length).unwrap_or_default();
+        let frame = if is_set(flags.remote)? {
+            let length = self.length.map_or(Ok("0"), cell)?;
+            Frame::remote(id, length.parse().map_err(|_| LineProblem::Length)?)
+        } else if length > 8 {
+            Frame::fd(id, payload, false)
+        } else {
+            Frame::data(id, payload)
+        };
+        let frame = frame.map_err(|_| LineProblem::Length)?;
+        let bus = self.bus.map_or(Ok(""), cell)?;
+        Ok(LineItem::Frame(LoggedFrame { at_ns, bus, direction: None, frame }))
+    }
+}
+
+/// Decodes base64 (RFC 4648, 4). Returns the number of bytes.
+fn base64(text: &str, bytes: &mut [u8]) -> Result<usize, LineProblem> {
+    let (mut bits, mut kept, mut length) = (0_u32, 0, 0);
+    for sign in text.trim_end_matches('=').bytes() {
+        let value = match sign {
+            b'A'..=b'Z' => sign - b'A',
+            b'a'..=b'z' => sign - b'a' + 26,
+            b'0'..=b'9' => sign - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => return Err(LineProblem::Base64),
+        };
+        bits = (bits << 6 | u32::from(value)) & 0xFFFF;
+        kept += 6;
+        if kept >= 8 {
+            kept -= 8;
+            *bytes.get_mut(length).ok_or(LineProblem::Length)? = (bits >> kept) as u8;
+            length += 1;
+        }
+    }
+    Ok(length)
 }
 
 /// The cells of a line. Quotes around a cell are left out; two quotes within stay two, which no cell that is read needs.

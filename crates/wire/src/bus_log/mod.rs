@@ -3,9 +3,11 @@
 //! - [`frame_text`]: a frame as `cansend` takes it: `181#3712`, `123##1DEAD`, `701#R`.
 //! - [`candump`]: `candump -l`; `candump_text`: what candump prints.
 //! - `pcapng`: Wireshark, which decodes CANopen by itself.
-//! - `csv`: a table with a header, for spreadsheets.
+//! - `csv`: a table with a header, for spreadsheets; also that of python-can.
+//! - `asc`, `trc`: the logs of Vector's and PEAK's tools, which are read alone.
 //! - [`read`] tells them apart; [`LogWriter`] writes one of them.
 
+mod asc;
 pub mod candump;
 mod candump_text;
 mod condition;
@@ -15,10 +17,12 @@ mod line;
 mod pcapng;
 mod reader;
 mod time;
+mod trc;
 mod writer;
 
 pub use condition::{LogCondition, LogError};
 pub use reader::read;
+pub use time::is_time_of_day;
 pub use writer::{LogFormat, LogWriter};
 
 use takt_rt::{Frame, Nanoseconds};

@@ -8,6 +8,11 @@ pub fn seconds(text: &str) -> Option<Nanoseconds> {
     whole_number(whole)?.checked_mul(NANOSECONDS_PER_SECOND)?.checked_add(nanoseconds(fraction)?)
 }
 
+/// Returns `true` if a time of a log can be a time of day: one after 1990. Others count from another moment, or from the line before.
+pub const fn is_time_of_day(at_ns: Nanoseconds) -> bool {
+    at_ns >= 631_152_000 * NANOSECONDS_PER_SECOND
+}
+
 /// Reads `2026.11.23 10:20:30.123` or `2026-11-23 10:20:30.123456` as UTC.
 pub fn moment(date: &str, time: &str) -> Option<Nanoseconds> {
     let mut parts = date.split(['.', '-']).map(whole_number);
