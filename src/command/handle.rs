@@ -322,8 +322,8 @@ impl<B: Backend + ?Sized> Handle<B> {
     }
 
     /// Changes the speed along the path of a trajectory: 1 as it was written, 0.5 half as fast. The path stays the same, and all limits
-    /// are kept: the change is a ramp that is as short as they allow. Of a trajectory that is paused, it is the speed after
-    /// [`Handle::resume`]. Returns when the change begins.
+    /// are kept: the change is a ramp that is as short as they allow. 0 is [`Handle::pause`]. Of a trajectory that is paused, it is the
+    /// speed after [`Handle::resume`]. Returns when the change begins.
     ///
     /// # Errors
     /// [`CommandError::Rate`] for what the limits do not allow, [`CommandError::NoTrajectory`] if that motion is not a trajectory under way,

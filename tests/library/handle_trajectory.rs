@@ -47,7 +47,7 @@ fn a_trajectory_is_carried_out_paused_slowed_down_resumed_and_replaced() {
     arm.resume(motion).unwrap();
     arm.set_speed(motion, 1.0).unwrap();
     assert!(matches!(arm.set_speed(motion, 50.0), Err(CommandError::Rate(RateError::Limit { .. }))));
-    assert!(matches!(arm.set_speed(motion, 0.0), Err(CommandError::Rate(RateError::NotARate { .. }))));
+    assert!(matches!(arm.set_speed(motion, -1.0), Err(CommandError::Rate(RateError::NotARate { .. }))));
     assert_eq!(arm.wait(motion, PATIENCE), Ok(()));
     for (at, expected) in here(&arm).iter().zip(beside(&home, 0.3)) {
         assert!((at - expected).abs() < 1e-12);
@@ -60,6 +60,22 @@ fn a_trajectory_is_carried_out_paused_slowed_down_resumed_and_replaced() {
     assert_eq!(arm.wait(second, PATIENCE), Ok(()));
     assert_eq!((arm.state().groups[0].phase, arm.state().groups[0].stop), (Phase::Holding, None));
     assert_eq!(arm.finish(), Outcome::Finished);
+}
+
+#[test]
+fn speed_0_pauses_and_what_no_resume_could_carry_out_is_refused_before_it() {
+    let arm = start();
+    let home = here(&arm);
+    let motion = arm.execute(&[point(&arm, 2.0, 0.3)]).unwrap();
+    arm.set_speed(motion, 0.0).unwrap();
+    let rate = |arm: &Handle| arm.trajectory_progress(motion).unwrap().map(|progress| progress.rate);
+    arm.wait_until(PATIENCE, |_| (rate(&arm) == Some(0.0)).then_some(())).unwrap();
+    assert!(matches!(arm.set_speed(motion, 50.0), Err(CommandError::Rate(RateError::Limit { .. }))));
+    arm.resume(motion).unwrap();
+    assert_eq!(arm.wait(motion, PATIENCE), Ok(()));
+    for (at, expected) in here(&arm).iter().zip(beside(&home, 0.3)) {
+        assert!((at - expected).abs() < 1e-12);
+    }
 }
 
 #[test]

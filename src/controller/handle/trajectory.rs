@@ -119,6 +119,10 @@ impl OneGroup<'_> {
 
     /// Another speed of a trajectory under way.
     pub(super) fn set_speed(&self, motion: MotionId, rate: f64) -> Result<(), CommandError> {
+        // The speed before is the one after a resume.
+        if rate == 0.0 {
+            return self.set_paused(motion, true);
+        }
         self.change_rate(motion, |present| (rate, present.is_paused))
     }
 
@@ -160,11 +164,15 @@ impl OneGroup<'_> {
         }
         let next = Present { rate, is_paused, ..present.clone() };
         let actual = |of: &Present| if of.is_paused { 0.0 } else { of.rate };
+        let limits = self.limits();
         if actual(&next) == actual(&present) {
+            if next.is_paused {
+                // What the limits do not allow is refused now, so that a resume can be carried out.
+                present.given.trajectory().at_rate(present.given.at_s(), rate, &limits)?;
+            }
             trajectories.present = Some(next);
             return Ok(());
         }
-        let limits = self.limits();
         let (wanted, of) = (actual(&next), present.given.trajectory());
         self.take_over(&mut trajectories, &present, stopped, Some(&next), |at_s| {
             Ok(of.at_rate(at_s, wanted, &limits)?)

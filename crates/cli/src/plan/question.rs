@@ -3,7 +3,8 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use takt_rt::plan::{
-    Limits, PlanOptions, Problem, Profile, State, Synchronisation, synchronised, synchronised_velocity,
+    Limit, Limits, PlanError, PlanOptions, Problem, Profile, State, Synchronisation, synchronised,
+    synchronised_velocity,
 };
 
 use super::answer::{Answer, sample_times};
@@ -87,6 +88,29 @@ enum Sync {
     Straight,
     None,
 }
+
+/// Checks that no axis leaves its velocity limits before its target velocity, unless its start does so by itself.
+fn keeps_velocity(problems: &[Problem], profiles: &[Profile]) -> Result<(), PlanError> {
+    for (axis, (Problem { start, limits, .. }, profile)) in problems.iter().zip(profiles).enumerate() {
+        let reached = profile.extrema().velocity;
+        // The velocity when the jerk has ended the acceleration of the start, at the earliest.
+        let unavoidable =
+            start.velocity + 0.5 * start.acceleration * start.acceleration.abs() / limits.jerk_max;
+        let (highest, lowest) = (start.velocity.max(unavoidable), start.velocity.min(unavoidable));
+        let beyond = if reached.max > limits.velocity_max.max(highest) * (1.0 + ROUNDING) {
+            Limit::VelocityMax
+        } else if reached.min < limits.velocity_min.min(lowest) * (1.0 + ROUNDING) {
+            Limit::VelocityMin
+        } else {
+            continue;
+        };
+        return Err(PlanError::TargetBeyondLimit { axis, limit: beyond });
+    }
+    Ok(())
+}
+
+/// Exceeding a limit by this much, relative to it, is rounding.
+const ROUNDING: f64 = 1e-9;
 
 impl Question {
     /// Reads a line and checks that the lists belong together.
@@ -189,7 +213,11 @@ impl Question {
             Interface::Position => synchronised(&problems, &mut profiles, timing),
             Interface::Velocity => synchronised_velocity(&problems, &mut profiles, timing),
         };
-        match planned {
+        let checked = planned.and_then(|duration_s| match self.interface {
+            Interface::Velocity => keeps_velocity(&problems, &profiles).map(|()| duration_s),
+            Interface::Position => Ok(duration_s),
+        });
+        match checked {
             Ok(duration_s) => {
                 let times = self.t.clone().unwrap_or_else(|| sample_times(duration_s, self.dt));
                 (Answer::planned(self.id.clone(), duration_s, times, &profiles), Some(profiles))

@@ -337,3 +337,17 @@ fn the_picture_has_all_axes_and_their_limits() {
     assert_eq!(svg.matches("stroke-dasharray").count(), 14);
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
 }
+
+#[test]
+fn a_velocity_target_that_is_only_reached_from_beyond_the_limit_is_refused() {
+    let problem = |rest: &str| {
+        format!("{{\"interface\":\"velocity\",\"p0\":[0],\"vmax\":[1],\"amax\":[1],\"jmax\":[1],{rest}}}\n")
+    };
+    let result = |rest: &str| answers(&plan(&[], &problem(rest)))[0]["result"].as_str().unwrap().to_owned();
+    assert_eq!(result("\"vf\":[1],\"af\":[-0.5]"), "target_beyond_limit");
+    assert_eq!(result("\"vf\":[-1],\"af\":[0.5]"), "target_beyond_limit");
+    assert_eq!(result("\"vf\":[1]"), "ok");
+    // Where the start is beyond the limit, or goes beyond it by itself, the way back is allowed.
+    assert_eq!(result("\"v0\":[1.5],\"vf\":[1]"), "ok");
+    assert_eq!(result("\"v0\":[0.9],\"a0\":[1],\"vf\":[0.5]"), "ok");
+}
