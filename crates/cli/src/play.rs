@@ -20,6 +20,7 @@ use takt_tools::play::{
     ArmedFrom, AxisMaxima, FileStream, FileTrajectory, PlayError, PlayFile, PlayFileError, PlayedGroup,
     RealStage, SetPointLog, SharedSetPointLog, Stage, StreamSummary, VirtualStage, execute, stream,
 };
+use takt_wire::printable::printable_path;
 
 use super::configuration::{self, BusOverride};
 use super::exit::Exit;
@@ -29,15 +30,16 @@ use super::print;
 use super::table::{Table, UNBROKEN};
 use super::usage_error::UsageError;
 
-/// Play points from a CSV file into the arm, which is led to the first of them before.
+/// Play points from a file into the arm, which first moves to the first of them.
 ///
-/// The header is `arrive,at,JOINT[,JOINT.velocity][,JOINT.acceleration]…`: seconds from the start, rad (m). Rows stand in the order
-/// of their arrival. Joints that are not named hold.
+/// The header of a CSV file is `arrive,at,JOINT[,JOINT.velocity][,JOINT.acceleration]…`: seconds from the start, rad (m). Rows stand in the
+/// order of their arrival. Joints that are not named hold. With `time_from_start` instead of `arrive,at` the rows are one trajectory, as
+/// with --trajectory; so is a `JointTrajectory` of ROS in YAML or JSON, alone or in a `RobotTrajectory` or goal.
 #[derive(Args, Debug)]
 pub struct Arguments {
     /// The configuration (TOML)
     config: PathBuf,
-    /// The points (CSV)
+    /// The points (CSV; JointTrajectory as YAML or JSON)
     file: PathBuf,
     /// What is done where the points ask for more than the limits allow: smooth follows as closely as they go, exact stops
     #[arg(long, value_enum, conflicts_with = "trajectory")]
@@ -55,7 +57,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SETPOINTS.csv")]
     out: Option<PathBuf>,
     /// Connect a bus to another interface than the configuration says: sim, can0, vcan0 …
-    #[arg(long = "bus", value_name = "NAME=INTERFACE")]
+    #[arg(long = "bus", value_name = "[NAME=]INTERFACE")]
     buses: Vec<BusOverride>,
     /// Have another takt of this host that commands one of the buses stop in control first, and take them over
     #[arg(long)]
@@ -127,6 +129,8 @@ struct Printed {
     stop: Option<StopReport>,
     /// Why the run ended, in words, where that was neither its end, nor Ctrl-C, nor a stop.
     failure: Option<String>,
+    /// From the first point to the last one.
+    duration_s: f64,
     points: usize,
     late_points: u64,
     /// Points that found no room, or could not be used.
@@ -193,6 +197,13 @@ pub fn run(arguments: &Arguments) -> Exit {
             return Exit::Stopped;
         }
     };
+    if !arguments.json {
+        say!(
+            "takt: {} lasts {:.1} s from its first point",
+            printable_path(&arguments.file),
+            file.duration_s()
+        );
+    }
     let armed = ArmedFrom::default();
     let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
     let log = SetPointLog::new(&names, config.cycle.period_ns, piece.begins_s(), armed.clone(), out)
@@ -218,7 +229,8 @@ fn read(arguments: &Arguments, config: &Config) -> Result<(PlayFile, Piece), Exi
     let names: Vec<String> = config.axes.iter().map(|axis| axis.name.clone()).collect();
     let file = PlayFile::parse(&bytes, &names).map_err(wrong_file)?;
     file.check_modes(&config.axes).map_err(wrong_file)?;
-    if !arguments.trajectory {
+    let is_streamed = arguments.follow.is_some() || arguments.delay.is_some();
+    if !arguments.trajectory && (is_streamed || !file.is_trajectory) {
         let stream = FileStream::new(&file, config).map_err(wrong_file)?;
         return Ok((file, Piece::Stream(stream)));
     }
@@ -326,6 +338,7 @@ fn report(arguments: &Arguments, config: &Config, file: &PlayFile, played: Playe
     let printed = Printed {
         stop: stop.map(|stop| StopReport::new(&stop, &played.last, &machine)),
         failure,
+        duration_s: file.duration_s(),
         points: file.rows.len(),
         late_points: summary.late_points,
         lost_points: summary.lost_points,
@@ -333,7 +346,11 @@ fn report(arguments: &Arguments, config: &Config, file: &PlayFile, played: Playe
         lag_max_s: summary.lag_max_ns as f64 / 1e9,
         axes: played.axes,
     };
-    if arguments.json { print::json(&printed, exit) } else { print::text(&text(&printed, config), exit) }
+    if arguments.json {
+        print::json(&printed, exit)
+    } else {
+        print::text(&text(&printed, config, exit == Exit::Done), exit)
+    }
 }
 
 /// Creates the file before anything moves.
@@ -383,13 +400,16 @@ fn failure(error: PlayError, machine: &Machine) -> String {
     }
 }
 
-fn text(printed: &Printed, config: &Config) -> String {
+fn text(printed: &Printed, config: &Config, is_done: bool) -> String {
     let mut text = String::new();
     if let Some(stop) = &printed.stop {
         text += &format!("stopped (category {}): {}\n", stop.category, stop.reason);
     }
     if let Some(failure) = &printed.failure {
         text += &format!("{failure}\n");
+    }
+    if printed.stop.is_none() && printed.failure.is_none() {
+        text += if is_done { "done: " } else { "interrupted: " };
     }
     text += &format!(
         "{} points, {} late, {} lost; lag {:.1} ms, {:.1} ms at most\n",

@@ -526,3 +526,33 @@ fn a_trajectory_is_for_one_group_and_says_whose_joints_it_names() {
     let last: Vec<f64> = out.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
     assert!((last[4] - 0.2).abs() < 1e-6, "{last:?}");
 }
+
+#[test]
+fn a_joint_trajectory_of_ros_and_a_table_of_it_are_executed_and_said_to_be_done() {
+    let place = Place::new();
+    let message = r#"{"joint_names": ["joint2", "joint1"], "points": [
+        {"positions": [-0.2, 0.1], "time_from_start": {"sec": 0, "nanosec": 0}},
+        {"positions": [-0.25, 0.2], "time_from_start": {"sec": 0, "nanosec": 700000000}},
+        {"positions": [-0.3, 0.3], "time_from_start": {"sec": 1, "nanosec": 500000000}}]}"#;
+    let yaml = "joint_names: [joint2, joint1]\npoints:\n- positions: [-0.2, 0.1]\n  time_from_start: {sec: 0, nanosec: 0}\n\
+                - positions: [-0.25, 0.2]\n  time_from_start: {sec: 0, nanosec: 700000000}\n\
+                - positions: [-0.3, 0.3]\n  time_from_start: {sec: 1, nanosec: 500000000}\n---\n";
+    let table = "time_from_start,joint2,joint1\n0,-0.2,0.1\n0.7,-0.25,0.2\n1.5,-0.3,0.3\n";
+    let mut ends = vec![];
+    for text in [message, yaml, table] {
+        place.write(text);
+        let output = place.play(&["--virtual", "--out", "out.csv"]);
+        let (said, words) =
+            (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+        assert_eq!(output.status.code(), Some(0), "{said}{words}");
+        assert!(words.contains("points.csv lasts 1.5 s from its first point"), "{words}");
+        assert!(said.starts_with("done: 3 points"), "{said}");
+        ends.push(fs::read_to_string(place.path("out.csv")).unwrap());
+    }
+    assert!(ends[0] == ends[1] && ends[1] == ends[2] && ends[0].lines().count() > 1500);
+    let refused = place.refused(message.replace("0.3]", "0.3, 0.4]"));
+    assert!(
+        refused.contains("line 4") && refused.contains("`positions` has 3 numbers for 2 joints"),
+        "{refused}"
+    );
+}

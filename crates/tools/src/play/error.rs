@@ -100,6 +100,16 @@ pub enum FileProblem {
         /// What it is.
         text: String,
     },
+    /// It has the time from the start of a trajectory and another one.
+    TwoTimes {
+        /// The other column.
+        name: String,
+    },
+    /// A message of ROS cannot be read.
+    Message {
+        /// Why not.
+        words: String,
+    },
     /// The rows cannot be played.
     Rows {
         /// The name of the joint concerned.
@@ -153,6 +163,10 @@ impl fmt::Display for FileProblem {
                 "rows stand in the order of their arrival: this one arrives at {arrive_s} s, and the one above it at {previous_s} s"
             ),
             Self::Chunk { text } => write!(f, "the number of a chunk is a whole number: `{text}`"),
+            Self::TwoTimes { name } => {
+                write!(f, "`time_from_start` and `{name}` are two times: leave one of them out")
+            }
+            Self::Message { words } => write!(f, "JointTrajectory: {words}"),
             Self::Rows { joint: Some(joint), words } => write!(f, "{joint}: {words}"),
             Self::Rows { joint: None, words } => f.write_str(words),
         }

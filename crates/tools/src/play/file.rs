@@ -1,4 +1,4 @@
-//! A file of points: what its columns mean, and its rows as numbers.
+//! Reads a file of points: what the columns of a table mean, and its rows as numbers.
 
 use std::io;
 use std::path::Path;
@@ -6,11 +6,9 @@ use std::path::Path;
 use takt_wire::text_file;
 
 use super::error::{FileProblem, PlayFileError};
+use super::joint_trajectory;
+use super::points::{JointColumns, JointPoint, LONGEST_S, PlayFile, PlayRow};
 use super::table::{self, Cell};
-use takt::config::Axis;
-
-/// Longer than thirty years is a slip, and would not fit the clock in nanoseconds.
-const LONGEST_S: f64 = 1e9;
 
 /// Reads the bytes of a file of points.
 ///
@@ -20,63 +18,13 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     text_file::read(path)
 }
 
-/// Points in the order of their arrival.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlayFile {
-    /// The joints that it names.
-    pub joints: Vec<JointColumns>,
-    /// Its rows; at least one.
-    pub rows: Vec<PlayRow>,
-    /// The column of the first torque in the header, if there is one.
-    pub torque_column: Option<usize>,
-}
-
-/// What a file has of a joint, beside its position.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct JointColumns {
-    /// The axis.
-    pub axis: usize,
-    /// True if it has velocities.
-    pub has_velocity: bool,
-    /// True if it has accelerations.
-    pub has_acceleration: bool,
-    /// True if it has torques.
-    pub has_torque: bool,
-}
-
-/// A row of the file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlayRow {
-    /// The line in the file, from 1.
-    pub line: usize,
-    /// When it arrives, in seconds after the start.
-    pub arrive_s: f64,
-    /// The time that it is meant for, in seconds after the start.
-    pub at_s: f64,
-    /// The number of the chunk that it belongs to; `None` for a row by itself.
-    pub chunk: Option<u64>,
-    /// What it wants of each joint that the file names.
-    pub points: Vec<JointPoint>,
-}
-
-/// What a row wants of a joint. An empty cell is `None`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct JointPoint {
-    /// rad (m)
-    pub position: f64,
-    /// rad/s (m/s)
-    pub velocity: Option<f64>,
-    /// rad/s² (m/s²)
-    pub acceleration: Option<f64>,
-    /// Feed-forward in N·m (N).
-    pub torque: Option<f64>,
-}
-
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Column {
     Arrive,
     At,
+    /// When it is meant for; it is there from the start.
+    FromStart,
     Chunk,
     /// Of an axis.
     Joint(usize, JointQuantity),
@@ -91,8 +39,9 @@ enum JointQuantity {
 }
 
 /// The suffixes of the columns of a joint.
-const SUFFIXES: [(JointQuantity, &str); 4] = [
+const SUFFIXES: [(JointQuantity, &str); 5] = [
     (JointQuantity::Position, ""),
+    (JointQuantity::Position, ".position"),
     (JointQuantity::Velocity, ".velocity"),
     (JointQuantity::Acceleration, ".acceleration"),
     (JointQuantity::Torque, ".torque"),
@@ -109,6 +58,9 @@ impl PlayFile {
             let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
             PlayFileError { line, column: None, problem: FileProblem::NotText }
         })?;
+        if joint_trajectory::is_message(text) {
+            return joint_trajectory::parse(text, axes);
+        }
         let rows = table::rows(text)?;
         let Some((header, rows)) = rows.split_first() else {
             return Err(PlayFileError { line: 1, column: None, problem: FileProblem::Empty });
@@ -127,24 +79,8 @@ impl PlayFile {
         if read.is_empty() {
             return Err(PlayFileError { line: header.line + 1, column: None, problem: FileProblem::NoRow });
         }
-        Ok(Self { torque_column: header.torque_column(), joints: header.joints, rows: read })
-    }
-}
-
-impl PlayFile {
-    /// Checks that the drives of all joints that it names follow set-points.
-    ///
-    /// # Errors
-    /// The first joint whose drive plans its own profile.
-    pub fn check_modes(&self, axes: &[Axis]) -> Result<(), PlayFileError> {
-        let of = |joint: &JointColumns| axes.get(joint.axis).filter(|axis| axis.control.is_profile());
-        match self.joints.iter().find_map(of) {
-            Some(axis) => {
-                let problem = FileProblem::OwnProfile { joint: axis.name.clone() };
-                Err(PlayFileError { line: 1, column: None, problem })
-            }
-            None => Ok(()),
-        }
+        let is_trajectory = header.place(Column::FromStart).is_some();
+        Ok(Self { torque_column: header.torque_column(), joints: header.joints, rows: read, is_trajectory })
     }
 }
 
@@ -178,9 +114,17 @@ impl Header {
         let line = cells.first().map_or(1, |cell| cell.line);
         let places = cells.iter().map(|cell| cell.column).collect();
         let header = Self { line, joints: joints_of(&columns), columns, places };
+        let other_time = |(column, _): &(Column, String)| matches!(column, Column::Arrive | Column::At);
+        if header.place(Column::FromStart).is_some()
+            && let Some(place) = header.columns.iter().position(other_time)
+        {
+            let name = header.columns.get(place).map(|(_, name)| name.clone()).unwrap_or_default();
+            return Err(at(cells.get(place), FileProblem::TwoTimes { name }));
+        }
         let missing = |problem| PlayFileError { line, column: None, problem };
+        let has_own_start = header.place(Column::FromStart).is_some();
         for (column, name) in [(Column::Arrive, "arrive"), (Column::At, "at")] {
-            if header.place(column).is_none() {
+            if header.place(column).is_none() && !has_own_start {
                 return Err(missing(FileProblem::MissingColumn { name }));
             }
         }
@@ -251,10 +195,16 @@ impl Header {
                 torque: of(JointQuantity::Torque)?,
             })
         };
+        let (arrive_s, at_s) = if self.place(Column::FromStart).is_some() {
+            let at_s = time(Column::FromStart, "time_from_start", 0.0)?;
+            (at_s, at_s)
+        } else {
+            (time(Column::Arrive, "arrive", 0.0)?, time(Column::At, "at", -LONGEST_S)?)
+        };
         Ok(PlayRow {
             line,
-            arrive_s: time(Column::Arrive, "arrive", 0.0)?,
-            at_s: time(Column::At, "at", -LONGEST_S)?,
+            arrive_s,
+            at_s,
             chunk: self.chunk(cells)?,
             points: self.joints.iter().map(point).collect::<Result<_, PlayFileError>>()?,
         })
@@ -320,6 +270,7 @@ fn column_of(name: &str, axes: &[String]) -> Option<Column> {
     match name {
         "arrive" => return Some(Column::Arrive),
         "at" => return Some(Column::At),
+        "time_from_start" => return Some(Column::FromStart),
         "chunk" => return Some(Column::Chunk),
         _ => {}
     }
@@ -364,6 +315,19 @@ mod tests {
         assert_eq!(first.points[1], JointPoint { position: -3.0, ..JointPoint::default() });
         let second = &file.rows[1];
         assert_eq!((second.chunk, second.points[0].velocity, second.points[0].position), (None, None, 1.5));
+    }
+
+    #[test]
+    fn a_table_with_time_from_start_is_a_trajectory() {
+        let file = parse("time_from_start,elbow,shoulder.position,elbow.velocity\n0,1,2,0\n1.5,1.2,2.1,0\n");
+        assert!(file.is_trajectory && !parse("arrive,at,elbow\n0,0,1\n").is_trajectory);
+        assert_eq!(
+            file.rows.iter().map(|row| (row.arrive_s, row.at_s)).collect::<Vec<_>>(),
+            [(0.0, 0.0), (1.5, 1.5)]
+        );
+        assert_eq!((file.duration_s(), file.rows[1].points[1].position), (1.5, 2.1));
+        let (line, column, words) = refused("time_from_start,at,elbow\n0,0,1\n");
+        assert_eq!((line, column), (1, Some(17)), "{words}");
     }
 
     #[test]

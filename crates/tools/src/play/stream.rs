@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use takt_rt::{AxisPoint, MAX_AXES, Nanoseconds, PointRole, PositionPoint, Snapshot, StreamPoint};
 
 use super::error::{FileProblem, PlayFileError};
-use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
+use super::points::{JointPoint, PlayFile, PlayRow};
 use takt::channels::GroupAxes;
 use takt::command::check_point;
 use takt::config::{Axis, Config};

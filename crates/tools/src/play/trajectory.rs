@@ -3,8 +3,8 @@
 use takt_rt::plan::State;
 
 use super::error::{FileProblem, PlayFileError};
-use super::file::{JointPoint, PlayFile, PlayRow};
 use super::groups::PlayedGroup;
+use super::points::{JointPoint, PlayFile, PlayRow};
 use takt::config::{Axis, Config};
 use takt::trajectory::{AxisPoints, Interpolation, Trajectory, TrajectoryConditions, TrajectoryError};
 
