@@ -40,7 +40,7 @@ pub struct Arguments {
     config: Option<PathBuf>,
     /// Connect a bus to another interface than the configuration says: can0, vcan0 …, slcan:/dev/ttyACM0,
     /// rs485-canfd:/dev/ttyUSB0
-    #[arg(long = "bus", value_name = "NAME=INTERFACE")]
+    #[arg(long = "bus", value_name = "[NAME=]INTERFACE")]
     buses: Vec<BusOverride>,
     /// Put every simulated bus behind an SLCAN adapter on a pseudo-terminal, and say its path
     ///

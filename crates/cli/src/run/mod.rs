@@ -37,7 +37,7 @@ pub struct Arguments {
     config: PathBuf,
     /// Connect a bus to another interface than the configuration says: sim, can0, vcan0 …, slcan:/dev/ttyACM0,
     /// rs485-canfd:/dev/ttyUSB0
-    #[arg(long = "bus", value_name = "NAME=INTERFACE")]
+    #[arg(long = "bus", value_name = "[NAME=]INTERFACE")]
     buses: Vec<BusOverride>,
     /// Repeat the program until this many seconds are over
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = configuration::seconds)]
