@@ -215,7 +215,6 @@ fn every_channel_of_a_recording_is_one_that_readers_of_ros_2_decode() {
         let offered = &channel.metadata["offered_qos_profiles"];
         assert!(offered.starts_with("- history: 1\n  depth: 10\n  reliability: 1\n"), "{offered}");
     }
-    let header =
-        mcap::records::parse_record(mcap::records::op::HEADER, &bytes[mcap::MAGIC.len() + 9..]).unwrap();
+    let header = mcap::parse_record(mcap::records::op::HEADER, &bytes[mcap::MAGIC.len() + 9..]).unwrap();
     assert!(matches!(header, mcap::records::Record::Header(header) if header.profile == "ros2"));
 }
