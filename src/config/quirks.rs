@@ -74,6 +74,8 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
         [("pre-operational", PowerUpState::PreOperational), ("operational", PowerUpState::Operational)];
     let power_up = optional(root.get("power_up"), |entry| entry.choice(&power_ups));
     let sdo_blocks = optional(root.get("sdo_blocks"), |entry| entry.boolean());
+    let is_silent_if_absent = optional(root.get("silent_if_absent"), |entry| entry.boolean());
+    let shows_alarm = optional(root.get("alarm_in_heartbeat"), |entry| entry.boolean());
     let delays = delays(root.section("delays"));
     let errors = data_file::errors(root.get("errors"), problems, hexadecimal, ERROR_CODES);
     let cures = keyed(("cures", root.get("cures")), problems, (hexadecimal, ERROR_CODES), sentence);
@@ -107,6 +109,8 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Quirks> {
         units: units?,
         power_up: power_up?.unwrap_or_default(),
         refuses_blocks: !sdo_blocks?.unwrap_or(true),
+        is_silent_if_absent: is_silent_if_absent?.unwrap_or(false),
+        shows_alarm_in_heartbeat: shows_alarm?.unwrap_or(false),
         delays: delays?,
         errors: errors?,
         cures: cures?,
@@ -376,6 +380,11 @@ fn simulated<'a>(mut section: Section<'a>, problems: &'a Problems) -> Option<Sim
         "sync_period_first",
         "interpolated_moves",
         "battery",
+        "expedited_only",
+        "short_sdo_requests",
+        "answers_rpdos",
+        "silent_power_up",
+        "emergencies",
     ];
     let switches = switches.map(|key| optional(section.get(key), |entry| entry.boolean()));
     let torque_per_ampere =
@@ -390,10 +399,16 @@ fn simulated<'a>(mut section: Section<'a>, problems: &'a Problems) -> Option<Sim
         }
         bounds
     });
+    let choices = ("simulation.choices", section.get("choices"));
+    let choices = keyed(choices, problems, (keys, ADDRESSES), |entry| {
+        each_of_some(entry, "value", |entry| entry.integer(-(1 << 31)..1 << 32))
+    });
+    let unsaved = optional(section.get("unsaved"), |entry| each(&entry, pattern));
     let measured = ("simulation.measured", section.get("measured"));
     let measured = keyed(measured, problems, (keys, ADDRESSES), measured_quantity);
     section.finish();
-    let [sync, timers, remote, code, uploads, period, moves, battery] = switches;
+    let [sync, timers, remote, code, uploads, period, moves, battery, ..] = switches;
+    let [.., expedited, short, answers, silent, emergencies] = switches;
     let measured = measured?.into_iter();
     Some(SimulatedQuirks {
         takes_any_sync: sync?.unwrap_or(false),
@@ -404,8 +419,15 @@ fn simulated<'a>(mut section: Section<'a>, problems: &'a Problems) -> Option<Sim
         interpolates_over_sync: period?.unwrap_or(false),
         moves_in_interpolation: moves?.unwrap_or(false),
         lacks_battery: !battery?.unwrap_or(true),
+        has_expedited_only: expedited?.unwrap_or(false),
+        takes_short_requests: short?.unwrap_or(false),
+        answers_rpdos: answers?.unwrap_or(false),
+        is_power_up_silent: silent?.unwrap_or(false),
+        lacks_emergencies: !emergencies?.unwrap_or(true),
         torque_per_ampere: torque_per_ampere?,
         ranges: ranges?,
+        choices: choices?,
+        unsaved: unsaved?.unwrap_or_default(),
         measured: measured
             .map(|(address, (factor, quantity))| MeasuredObject { address, factor, quantity })
             .collect(),

@@ -46,6 +46,11 @@ pub trait DataSheet {
         false
     }
 
+    /// Returns `true` if the drive does not answer SDO requests for objects that it lacks.
+    fn is_silent_if_absent(&self) -> bool {
+        false
+    }
+
     /// How long the drive takes to store its parameters, if it is known.
     fn storing_ns(&self) -> Option<Nanoseconds>;
 

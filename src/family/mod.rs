@@ -69,7 +69,7 @@ use takt_sim::{DevicesOnLine, Drive};
 /// ZeroErr eRob with CANopen firmware.
 pub const EROB_CANOPEN: DriveFamily = DriveFamily::built_in(cia402::erob_canopen);
 /// YZ-AIM integrated servo, CANopen edition.
-pub const YZ_AIM: DriveFamily = DriveFamily::of_family(&yz_aim::FACTS);
+pub const YZ_AIM: DriveFamily = DriveFamily::built_in(yz_aim::drive);
 
 /// Describes frames in words.
 pub type FrameWords = Box<dyn FnMut(&Frame) -> String + Send>;
@@ -365,7 +365,9 @@ pub(crate) fn sdo_quirks(drive: &DriveFamily, mut timing: SdoTiming) -> SdoQuirk
     if let Some(reply_ns) = family.data_sheet(drive).and_then(DataSheet::sdo_reply_ns) {
         timing.reply_timeout_ns = timing.reply_timeout_ns.max(2 * reply_ns);
     }
-    SdoQuirks { timing, ..family.sdo_quirks() }
+    let own = family.sdo_quirks();
+    let is_silent = family.data_sheet(drive).is_some_and(DataSheet::is_silent_if_absent);
+    SdoQuirks { timing, is_silent_if_absent: own.is_silent_if_absent || is_silent, ..own }
 }
 
 /// Every identifier between a drive and its master: those of its frames, and those of another protocol that it may speak.

@@ -159,10 +159,12 @@ fn servo(node: u8) -> Box<dyn Drive> {
         friction_shape: takt::config::FrictionShape::Constant,
         brake_torque: 0.0,
     };
+    let device = takt::family::yz_aim::device();
+    let description = (device.dictionary.clone().into(), device.quirks.clone());
     Box::new(YzAimJoint::new(YzAimParameters {
         power_up_ns: 5_000_000,
         special_function: 7,
-        ..YzAimParameters::new(node, Model::Aim57x30C, gearing, joint)
+        ..YzAimParameters::new(description, node, Model::Aim57x30C, gearing, joint)
     }))
 }
 

@@ -27,19 +27,41 @@
 //!
 //! ```
 //! use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
-//! use takt_sim::plant::{FrictionShape, JointParameters};
-//! use takt_sim::yz_aim::{Gearing, Model, YzAimJoint, YzAimParameters};
+//! use takt_sim::cia402::{Cia402AxisParameters, Cia402Drive, Cia402Parameters};
+//! use takt_sim::homing_switches::ReferenceSwitches;
+//! use takt_sim::plant::{Encoder, FrictionShape, JointParameters};
 //! use takt_sim::{SimulatedBus, WireBitRates};
+//! use takt_wire::canopen::eds;
+//! use takt_wire::quirks::Quirks;
 //!
-//! let joint = JointParameters {
-//!     inertia: 0.01,
-//!     viscous_friction: 0.1,
-//!     coulomb_friction: 0.1,
-//!     friction_shape: FrictionShape::Constant,
-//!     brake_torque: 0.0,
+//! let axis = Cia402AxisParameters {
+//!     joint: JointParameters {
+//!         inertia: 0.01,
+//!         viscous_friction: 0.1,
+//!         coulomb_friction: 0.1,
+//!         friction_shape: FrictionShape::Constant,
+//!         brake_torque: 10.0,
+//!     },
+//!     encoder: Encoder { counts_per_unit: 524_288.0 / std::f64::consts::TAU, zero_counts: 0.0 },
+//!     counts_per_turn: 524_288.0,
+//!     initial_position: 0.0,
+//!     rated_torque: 1.0,
+//!     peak_torque: 3.0,
+//!     highest_velocity: 10.0,
+//!     switches: ReferenceSwitches::default(),
+//!     end_stops: None,
 //! };
-//! let gearing = Gearing { ratio: 1.0, travel_per_turn: std::f64::consts::TAU, is_reversed: false, zero_counts: 0.0 };
-//! let drive = YzAimJoint::new(YzAimParameters::new(1, Model::Aim57x30C, gearing, joint));
+//! let sheet = eds::load("../../configs/eds/erob-canopen.eds".as_ref()).unwrap().dictionary;
+//! let drive = Cia402Drive::new(Cia402Parameters {
+//!     sheet,
+//!     node: 1,
+//!     quirks: Quirks::default(),
+//!     axes: vec![axis],
+//!     power_up_ns: 100_000_000,
+//!     feedback_delay_ns: 20_000,
+//!     seed: 0,
+//! })
+//! .unwrap();
 //! let rates = WireBitRates { nominal: 1_000_000, data: None };
 //! let mut bus = SimulatedBus::with_drives(rates, 1_000_000_000, vec![Box::new(drive)]);
 //! bus.send(0, &[]); // the supply is switched on

@@ -1,14 +1,11 @@
-//! The object dictionary of a simulated device: its objects as an electronic data sheet or a table describes them, their
+//! The object dictionary of a simulated device: its objects as an electronic data sheet describes them, their
 //! values, and the non-volatile memory.
-
-pub mod table;
 
 use takt_wire::canopen::eds;
 use takt_wire::canopen::eds::{AccessType, DataTypeCode, ObjectType, ValueKind};
 use takt_wire::canopen::object::ObjectAddress;
 
 use super::sdo_reply::AbortCode;
-use table::ObjectRow;
 
 /// Room for a value of variable length, such as a text, when the data sheet has a shorter one: bytes.
 const TEXT_CAPACITY: usize = 64;
@@ -47,6 +44,8 @@ pub struct ObjectEntry {
     high: i128,
     default: i64,
     saved: i64,
+    /// The only values that it takes; empty: every one within its range.
+    choices: Vec<i64>,
     bytes: Vec<u8>,
     /// Bits of 64 that its type does not use, and the range of its type.
     unused_bits: u32,
@@ -80,6 +79,7 @@ impl ObjectEntry {
             high: i128::MAX,
             default: 0,
             saved: 0,
+            choices: vec![],
             bytes: vec![],
             unused_bits,
             type_range,
@@ -102,6 +102,9 @@ impl ObjectEntry {
     }
 
     fn check_range(&self, number: i64) -> Result<(), AbortCode> {
+        if !self.choices.is_empty() && !self.choices.contains(&number) {
+            return Err(AbortCode::Value);
+        }
         let number = match self.kind {
             ObjectKind::Signed => i128::from(number),
             _ => i128::from(number.cast_unsigned()),
@@ -152,13 +155,6 @@ impl SimulatedDictionary {
         let mut own = Self::with(entries, sheet.dummies.iter().map(|code| code.0).collect());
         own.take_identity(&sheet.device);
         own
-    }
-
-    /// The dictionary of a device with this node ID, by a table in the order of the addresses: the places of the entries are
-    /// those of the rows.
-    pub fn of_table(rows: &[ObjectRow], node: u8) -> Self {
-        debug_assert!(rows.is_sorted_by_key(|row| (row.index, row.subindex)));
-        Self::with(rows.iter().map(|row| read_row(row, node)).collect(), vec![])
     }
 
     fn with(mut entries: Vec<ObjectEntry>, dummies: Vec<u16>) -> Self {
@@ -256,8 +252,9 @@ impl SimulatedDictionary {
         }
     }
 
-    /// Sets a number to the nearest value within its range.
-    pub fn set_within(&mut self, place: usize, value: f64) {
+    /// Sets a number to the nearest value within its range, if the device has the object.
+    pub fn set_within_at(&mut self, place: Option<usize>, value: f64) {
+        let Some(place) = place else { return };
         let entry = &self.entries[place];
         let nearest = i128::from(entry.nearest(value));
         self.numbers[place] = nearest.min(entry.high).max(entry.low) as i64;
@@ -268,6 +265,31 @@ impl SimulatedDictionary {
         self.set(place, value);
         let entry = &mut self.entries[place];
         (entry.default, entry.saved) = (self.numbers[place], self.numbers[place]);
+    }
+
+    /// Sets the defaults that follow from the node ID to those of another one.
+    pub fn set_node(&mut self, sheet: &eds::ObjectDictionary, node: u8) {
+        for entry in sheet.entries() {
+            let number = |node| entry.value().and_then(|value| value.number(Some(node)));
+            let Some(place) = self.place(entry.address.index, entry.address.subindex) else { continue };
+            if let Some(default) = number(node)
+                && number(1) != number(2)
+            {
+                self.set_factory(place, default as i64);
+            }
+        }
+    }
+
+    /// Lets a number take these values only.
+    pub fn set_choices(&mut self, place: usize, choices: &[i64]) {
+        self.entries[place].choices = choices.to_vec();
+    }
+
+    /// From now on no entry is saved that is one of these.
+    pub fn set_unsaved(&mut self, is_unsaved: impl Fn(ObjectAddress) -> bool) {
+        for entry in &mut self.entries {
+            entry.is_saved &= !is_unsaved(entry.address);
+        }
     }
 
     /// Narrows the range of a number.
@@ -350,25 +372,6 @@ impl SimulatedDictionary {
     }
 }
 
-/// Reads a row of a table.
-fn read_row(row: &ObjectRow, node: u8) -> ObjectEntry {
-    let is_writable = row.access.is_writable();
-    let entry = ObjectEntry::new(ObjectAddress::new(row.index, row.subindex), row.data_type);
-    let default = entry.fit(row.default_of(node));
-    ObjectEntry {
-        is_readable: row.access != AccessType::WriteOnly,
-        is_writable,
-        maps_to_rpdo: row.is_mappable && is_writable,
-        maps_to_tpdo: row.is_mappable,
-        is_saved: row.is_saved,
-        low: row.lowest.into(),
-        high: row.highest.into(),
-        default,
-        saved: default,
-        ..entry
-    }
-}
-
 /// Reads an entry. `count` is the highest sub-index, which sub-index 0 shows when the sheet gives it no value.
 fn read_entry(entry: &eds::DictionaryEntry, node: u8, count: Option<u8>, is_constant: bool) -> ObjectEntry {
     let data_type = entry.data_type.unwrap_or(DataTypeCode::DOMAIN);
@@ -425,16 +428,12 @@ fn is_command(index: u16) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::table::{I16, I32, U16, U32};
     use super::*;
 
-    const ROWS: [ObjectRow; 5] = [
-        ObjectRow::read_only(0x6064, 0, I32, 0),
-        ObjectRow::read_only(0x606C, 0, I16, 0).within([-30_000, 30_000]),
-        ObjectRow::read_only(0x6079, 0, U16, 0),
-        ObjectRow::read_only(0x607A, 0, I32, 0).with_access(AccessType::ReadWrite),
-        ObjectRow::read_only(0x6081, 0, U32, 10).with_access(AccessType::ReadWrite).saved(),
-    ];
+    fn entry(index: u16, data_type: DataTypeCode) -> ObjectEntry {
+        ObjectEntry::new(ObjectAddress::new(index, 0), data_type)
+    }
+
     const POSITION: usize = 0;
     const VELOCITY: usize = 1;
     const VOLTAGE: usize = 2;
@@ -442,7 +441,16 @@ mod tests {
     const PROFILE_VELOCITY: usize = 4;
 
     fn dictionary() -> SimulatedDictionary {
-        SimulatedDictionary::of_table(&ROWS, 5)
+        let [u16, u32] = [DataTypeCode::UNSIGNED16, DataTypeCode::UNSIGNED32];
+        let [i16, i32] = [DataTypeCode(0x03), DataTypeCode(0x04)];
+        let entries = vec![
+            entry(0x6064, i32),
+            ObjectEntry { low: -30_000, high: 30_000, ..entry(0x606C, i16) },
+            entry(0x6079, u16),
+            ObjectEntry { is_writable: true, ..entry(0x607A, i32) },
+            ObjectEntry { is_writable: true, is_saved: true, default: 10, saved: 10, ..entry(0x6081, u32) },
+        ];
+        SimulatedDictionary::with(entries, vec![])
     }
 
     fn bytes(dictionary: &SimulatedDictionary, place: usize) -> Vec<u8> {
@@ -484,7 +492,7 @@ mod tests {
         let mut set = |place, value| {
             dictionary.set_real(place, value);
             let by_type = dictionary.number(place);
-            dictionary.set_within(place, value);
+            dictionary.set_within_at(Some(place), value);
             (by_type, dictionary.number(place))
         };
         assert_eq!(set(VELOCITY, 1e9), (32_767, 30_000));

@@ -181,6 +181,8 @@ struct Outbound {
     last_ns: Nanoseconds,
     /// When its inhibit time ends.
     free_ns: Nanoseconds,
+    /// When its event timer ends, where events are the timers only.
+    timer_ns: Nanoseconds,
     is_sent: bool,
 }
 
@@ -193,7 +195,12 @@ impl Outbound {
         self.events = 0;
         self.last_ns = 0;
         self.free_ns = 0;
+        self.timer_ns = NEVER;
         self.is_sent = false;
+    }
+
+    fn start_timer(&mut self, now_ns: Nanoseconds) {
+        self.timer_ns = if self.pdo.event_ns == 0 { NEVER } else { now_ns + self.pdo.event_ns };
     }
 }
 
@@ -203,7 +210,7 @@ pub struct PdoEngine {
     inbound: Vec<Inbound>,
     outbound: Vec<Outbound>,
     features: PdoFeatures,
-    /// The time of the next action: of the first sampled TPDO, or of the first event timer that runs out.
+    /// The time of the next action: of the first sampled TPDO, or of the first event timer that ends.
     due_ns: Nanoseconds,
     /// True if an event can send a TPDO.
     has_events: bool,
@@ -216,6 +223,8 @@ pub struct PdoFeatures {
     pub is_measured: fn(u16) -> bool,
     /// True if it watches the event timers of its RPDOs.
     pub watches_rpdos: bool,
+    /// True if each RPDO is answered by the TPDO with its number, and the only other events are the event timers.
+    pub answers_rpdos: bool,
 }
 
 impl PdoEngine {
@@ -238,6 +247,7 @@ impl PdoEngine {
             events: 0,
             last_ns: 0,
             free_ns: 0,
+            timer_ns: NEVER,
             is_sent: false,
         });
         let (inbound, outbound) = (inbound.collect(), outbound.collect());
@@ -248,24 +258,28 @@ impl PdoEngine {
 
     /// Compiles the parameters of the dictionary. Latched and sampled data is discarded.
     pub fn compile(&mut self, dictionary: &SimulatedDictionary) {
-        self.update(dictionary);
-        self.stop();
-    }
-
-    /// Compiles the parameters of the dictionary. Latched and sampled data stays.
-    pub fn update(&mut self, dictionary: &SimulatedDictionary) {
         for inbound in &mut self.inbound {
             inbound.pdo.compile(dictionary, self.features.is_measured);
         }
         for outbound in &mut self.outbound {
             outbound.pdo.compile(dictionary, self.features.is_measured);
         }
-        self.has_events = self.outbound.iter().any(|outbound| outbound.pdo.is_event_driven());
+        self.has_events = !self.features.answers_rpdos
+            && self.outbound.iter().any(|outbound| outbound.pdo.is_event_driven());
+        self.stop();
+    }
+
+    /// Starts the event timers, when NMT operational begins.
+    pub fn start(&mut self, now_ns: Nanoseconds) {
+        if self.features.answers_rpdos {
+            self.outbound.iter_mut().for_each(|outbound| outbound.start_timer(now_ns));
+            self.schedule();
+        }
     }
 
     /// Notes the time of the next action, after one of those times has changed.
     fn schedule(&mut self) {
-        let sampled = self.outbound.iter().map(|outbound| outbound.due_ns);
+        let sampled = self.outbound.iter().map(|outbound| outbound.due_ns.min(outbound.timer_ns));
         let deadlines = self.inbound.iter().map(|inbound| inbound.deadline_ns);
         self.due_ns = sampled.chain(deadlines).fold(NEVER, Nanoseconds::min);
     }
@@ -307,15 +321,13 @@ impl PdoEngine {
         reception
     }
 
-    /// SYNC, first part: applies the latched data.
-    pub fn apply_latched(&mut self, dictionary: &mut SimulatedDictionary, write: WriteField<'_>) {
-        for number in 0..self.inbound.len() {
-            self.apply_latched_of(number, dictionary, &mut *write);
-        }
+    /// The number of RPDOs.
+    pub fn rpdos(&self) -> usize {
+        self.inbound.len()
     }
 
-    /// Applies the latched data of one RPDO. Returns whether there was any.
-    pub fn apply_latched_of(
+    /// SYNC, first part: applies the latched data of an RPDO. Returns whether there was any.
+    pub fn apply_latched(
         &mut self,
         number: usize,
         dictionary: &mut SimulatedDictionary,
@@ -328,8 +340,8 @@ impl PdoEngine {
     }
 
     /// Returns `true` if an RPDO carries an object.
-    pub fn carries(&self, number: usize, place: usize) -> bool {
-        self.inbound[number].pdo.fields.iter().any(|field| field.place == Some(place))
+    pub fn carries(&self, number: usize, place: Option<usize>) -> bool {
+        place.is_some() && self.inbound[number].pdo.fields.iter().any(|field| field.place == place)
     }
 
     /// SYNC, second part: samples the synchronous TPDOs, which are sent `latency_ns` later. `counter` is that of the SYNC
@@ -374,14 +386,23 @@ impl PdoEngine {
         self.schedule();
     }
 
-    /// Returns `true` if an event can send a TPDO.
-    pub fn has_events(&self) -> bool {
-        self.has_events
+    /// Returns `true` if an event can send a TPDO now.
+    pub fn has_events(&self, now_ns: Nanoseconds) -> bool {
+        self.has_events || self.outbound.iter().any(|outbound| outbound.timer_ns <= now_ns)
     }
 
     /// Checks the event-driven TPDOs (types 254 and 255). Events: the first time, the event timer, and a change of a
     /// mapped object other than measured values.
     pub fn sample_events(&mut self, now_ns: Nanoseconds, dictionary: &SimulatedDictionary) {
+        if self.features.answers_rpdos {
+            for number in 0..self.outbound.len() {
+                if self.outbound[number].timer_ns <= now_ns {
+                    self.outbound[number].start_timer(now_ns);
+                    self.answer(number, now_ns, 0, dictionary);
+                }
+            }
+            return;
+        }
         for outbound in &mut self.outbound {
             let pdo = &outbound.pdo;
             if !pdo.is_event_driven() || outbound.due_ns != NEVER {
@@ -402,29 +423,18 @@ impl PdoEngine {
         self.schedule();
     }
 
-    /// An event of the device: samples a TPDO, which is sent `latency_ns` later, or when its inhibit time is over.
-    pub fn trigger(
+    /// Samples the TPDO with this number, if there is one. It is sent `latency_ns` later, or when its inhibit time is over.
+    pub fn answer(
         &mut self,
         number: usize,
         now_ns: Nanoseconds,
         latency_ns: Nanoseconds,
         dictionary: &SimulatedDictionary,
     ) {
-        let outbound = &mut self.outbound[number];
+        let Some(outbound) = self.outbound.get_mut(number) else { return };
         outbound.sampled = outbound.pdo.pack(dictionary);
         outbound.due_ns = outbound.due_ns.min((now_ns + latency_ns).max(outbound.free_ns));
         self.schedule();
-    }
-
-    /// How many SYNCs a synchronous TPDO waits for; `None` for another one.
-    pub fn syncs_of(&self, number: usize) -> Option<u8> {
-        let pdo = &self.outbound[number].pdo;
-        pdo.is_synchronous().then_some(pdo.transmission_type)
-    }
-
-    /// The event timer of a TPDO; 0 without one.
-    pub fn event_timer_of(&self, number: usize) -> Nanoseconds {
-        self.outbound[number].pdo.event_ns
     }
 
     /// Returns `true` if the event timer of an RPDO has just run out.

@@ -186,10 +186,24 @@ pub struct SimulatedQuirks {
     pub moves_in_interpolation: bool,
     /// True if no battery keeps its turn count: after power-up its position is within a turn.
     pub lacks_battery: bool,
+    /// True if it has expedited SDO transfers only.
+    pub has_expedited_only: bool,
+    /// True if it takes SDO requests of four bytes and more, where CiA 301 has eight.
+    pub takes_short_requests: bool,
+    /// True if each RPDO is answered by the TPDO with its number, which no changed value sends.
+    pub answers_rpdos: bool,
+    /// True if it sends no boot-up message after power-up, only after NMT commands.
+    pub is_power_up_silent: bool,
+    /// True if it sends no emergency messages.
+    pub lacks_emergencies: bool,
     /// Its torque for one ampere, for the rated current (6075): N·m (N).
     pub torque_per_ampere: Option<f64>,
     /// The ranges of objects that the data sheet leaves open.
     pub ranges: Vec<(ObjectAddress, [i64; 2])>,
+    /// The only values that some objects take.
+    pub choices: Vec<(ObjectAddress, Vec<i64>)>,
+    /// Writable objects that it does not store.
+    pub unsaved: Vec<ObjectPattern>,
     /// Measured values in objects of the vendor.
     pub measured: Vec<MeasuredObject>,
 }
@@ -232,6 +246,10 @@ pub struct Quirks {
     pub power_up: PowerUpState,
     /// True if it refuses SDO block transfers.
     pub refuses_blocks: bool,
+    /// True if it does not answer SDO requests for objects that it lacks.
+    pub is_silent_if_absent: bool,
+    /// True if its heartbeat has the code of "stopped" during an alarm, and a stopped one sends none.
+    pub shows_alarm_in_heartbeat: bool,
     /// Its delays.
     pub delays: Delays,
     /// Its own error codes (603F, EMCY) in words.

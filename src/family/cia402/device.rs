@@ -3,7 +3,10 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use takt_rt::{Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode, PositionCounter};
+use takt_rt::{
+    Cia402Codec, Id, MAX_NODE_AXES, MAX_OBJECTS, MappedObject, Nanoseconds, OperationMode, PositionCounter,
+    StoppedHeartbeat,
+};
 use takt_wire::canopen::eds::{AccessType, DictionaryEntry, ObjectDictionary, ValueKind};
 use takt_wire::canopen::object::{DataType, Object, ObjectAddress};
 use takt_wire::canopen::objects::{
@@ -315,6 +318,10 @@ impl Device {
             Control::ProfileTorque,
         ];
         let Quirks { plausible, keeps_empty_limits, bit_rates, .. } = self.quirks;
+        let stopped_heartbeat = match self.quirks.shows_alarm_in_heartbeat {
+            true => StoppedHeartbeat::Alarm,
+            false => standard.codec.stopped_heartbeat,
+        };
         DriveFacts {
             identity: Identity {
                 device_type: number(DEVICE_TYPE),
@@ -349,7 +356,8 @@ impl Device {
             consumes_heartbeat: self.consumes_heartbeat(),
             sends_emergencies: self.entry(ObjectAddress::new(0x1014, 0)).is_some(),
             empty_software_limits_are_off: !keeps_empty_limits,
-            bit_rates,
+            bit_rates: if bit_rates.is_empty() { standard.bit_rates } else { bit_rates },
+            codec: Cia402Codec { stopped_heartbeat, ..standard.codec },
             plausible: Plausible {
                 fastest_turns_per_s: plausible.fastest_per_s.unwrap_or(f64::INFINITY),
                 usual_velocity: plausible.usual_per_s.map_or(f64::INFINITY, |turns| turns * TAU),
@@ -413,6 +421,10 @@ impl DataSheet for Device {
 
     fn lacks_switches(&self) -> bool {
         self.quirks.lacks_switches
+    }
+
+    fn is_silent_if_absent(&self) -> bool {
+        self.quirks.is_silent_if_absent
     }
 
     fn storing_ns(&self) -> Option<Nanoseconds> {

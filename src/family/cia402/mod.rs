@@ -61,7 +61,7 @@ pub fn erob_canopen() -> &'static DriveFamily {
 }
 
 /// A drive whose data sheet and quirk file come with takt.
-fn built_in(standard: DriveFacts, eds: &str, quirks: &str) -> DriveFamily {
+pub(super) fn built_in(standard: DriveFacts, eds: &str, quirks: &str) -> DriveFamily {
     let device = Device::parse(eds, quirks).expect("the files that come with takt are right");
     DriveFamily::of_drive(device.facts(standard), device)
 }

@@ -1,12 +1,11 @@
 //! What is known of a YZ-AIM.
 
-use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
-use takt_rt::{
-    Cia402Codec, OperationMode, ProfileRamps, SetPointTransfer, ShownStates, StopCommand, StoppedHeartbeat,
-};
+use takt_rt::{Cia402Codec, ProfileRamps, SetPointTransfer, ShownStates, StopCommand, StoppedHeartbeat};
 
-use crate::config::{Control, DriveFacts, Identity, ModeChangeRule, ModeSet, Plausible, VelocityUnit};
+use crate::config::{DriveFacts, DriveFamily, ModeChangeRule};
+use crate::family::cia402::{self, Device};
 
 /// The only period of interpolated position mode (manual, 5.10.3).
 pub const INTERPOLATION_PERIOD_NS: u64 = 2_000_000;
@@ -29,23 +28,8 @@ pub const CODEC: Cia402Codec = Cia402Codec {
     stopped_heartbeat: StoppedHeartbeat::Alarm,
 };
 
-/// The facts.
-pub static FACTS: DriveFacts = DriveFacts {
-    identity: Identity {
-        device_type: Some(0x0002_0192),
-        vendor: Some(0x331),
-        product: Some(1),
-        revision: None,
-    },
-    // 15 bits on the motor side.
-    counts_per_turn: Some(32_768.0),
-    velocity_unit: VelocityUnit::RevolutionsPerMinute(1.0),
-    modes: ModeSet::of(&[
-        OperationMode::InterpolatedPosition,
-        OperationMode::ProfilePosition,
-        OperationMode::ProfileVelocity,
-    ]),
-    usual_mode: Control::Interpolated,
+/// What its data sheet and its quirk file do not say.
+const STANDARD: DriveFacts = DriveFacts {
     mode_changes: ModeChangeRule::Never {
         because: "no object 6061 shows its mode, and it interpolates only with 2619h = 7 stored",
     },
@@ -53,23 +37,31 @@ pub static FACTS: DriveFacts = DriveFacts {
     highest_speed_rpm: Some(HIGHEST_SPEED_RPM),
     // Manual, 5.13.
     bit_rates: &[125_000, 250_000, 500_000, 1_000_000],
-    has_fixed_process_data: true,
-    reports_mode: false,
     may_ignore_sync: true,
-    sends_emergencies: false,
     // The manual does not say which NMT state real units have after power-up.
     may_power_up_operational: true,
     codec: CODEC,
     // A drive that has just booted ignores controlwords that follow sooner.
     controlword_spacing_ns: 20_000_000,
-    plausible: Plausible {
-        // 3000 r/min
-        fastest_turns_per_s: 50.0,
-        usual_velocity: 50.0 * TAU,
-        inner_gear_from: None,
-    },
     ..DriveFacts::standard("yz-aim", "YZ-AIM")
 };
+
+/// The drive, by its data sheet and its quirk file.
+pub fn drive() -> &'static DriveFamily {
+    static DRIVE: LazyLock<DriveFamily> = LazyLock::new(|| {
+        cia402::built_in(
+            STANDARD,
+            include_str!("../../../configs/eds/yz-aim.eds"),
+            include_str!("../../../drives/yz-aim.toml"),
+        )
+    });
+    &DRIVE
+}
+
+/// Its data sheet and its quirks.
+pub fn device() -> &'static Device {
+    drive().description().expect("it is made from them")
+}
 
 #[cfg(test)]
 mod tests {

@@ -11,7 +11,7 @@ mod process_data;
 mod simulated;
 
 pub use alarm::{Alarm, Clearing};
-pub use facts::{FACTS, HIGHEST_SPEED_RPM, NO_RAMP, STANDSTILL};
+pub use facts::{HIGHEST_SPEED_RPM, NO_RAMP, STANDSTILL, device, drive};
 pub(crate) use process_data::answers_sync;
 pub use simulated::simulated_parameters;
 
@@ -35,7 +35,7 @@ pub struct YzAim;
 
 impl ConfiguredFamily for YzAim {
     fn word(&self) -> &'static str {
-        FACTS.word
+        "yz-aim"
     }
 
     fn read(&self, _: &mut FamilyKeys<'_, '_>) -> Option<DriveFamily> {
@@ -49,7 +49,7 @@ impl Family for YzAim {
     }
 
     fn maker(&self) -> Option<&'static str> {
-        Some("YZ-AIM")
+        Some(&device().quirks.drive.vendor)
     }
 
     fn starting_keys(&self, _: &FoundDevice) -> Option<StartingKeys> {
@@ -90,7 +90,7 @@ impl Family for YzAim {
     }
 
     fn instead_of_lss(&self) -> Option<&'static str> {
-        Some("a YZ-AIM has `takt drive … set-id` and `takt drive … set-bitrate`")
+        device().quirks.instead_of_lss
     }
 
     /// A YZ-AIM drops requests that overlap or follow too soon, shortens its replies, and does not answer for objects that
@@ -100,7 +100,7 @@ impl Family for YzAim {
             gap_ns: 2_000_000,
             has_short_replies: true,
             has_other_lengths: true,
-            is_silent_if_absent: true,
+            is_silent_if_absent: device().quirks.is_silent_if_absent,
             ..SdoQuirks::standard()
         }
     }

@@ -1,12 +1,14 @@
 //! The simulated servo of an axis.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use takt_sim::homing_switches::{HomingSwitches, Switch};
 use takt_sim::plant::{EndStops, JointParameters};
 use takt_sim::yz_aim::{Gearing, Model, YzAimParameters};
 
-use crate::config::{Axis, Control, PowerUpState, Simulation, Travel};
+use super::device;
+use crate::config::{Axis, Control, Simulation, Travel};
 
 /// Returns the parameters of the servo that simulates an axis. Interpolation is stored if the axis uses it. Limit switches are just beyond
 /// the axis' limits, the lower one at DIR and the upper one at PU, with end stops behind them.
@@ -31,6 +33,9 @@ pub fn simulated_parameters(axis: &Axis, bit_rate: u32, simulation: &Simulation)
     };
     let limits = &axis.limits;
     let margin = 0.02 * (limits.position_max - limits.position_min);
+    let mut quirks = device().quirks.clone();
+    quirks.power_up = own.power_up;
+    let sheet = Arc::new(device().dictionary.clone());
     YzAimParameters {
         bit_rate,
         end_stops: Some(EndStops {
@@ -47,9 +52,8 @@ pub fn simulated_parameters(axis: &Axis, bit_rate: u32, simulation: &Simulation)
         maximum_speed_rpm: 3000.0,
         special_function: if axis.control == Control::Interpolated { 7 } else { 0 },
         power_up_ns: axis.power_up_ns,
-        starts_operational: own.power_up == PowerUpState::Operational,
         feedback_delay_ns: axis.feedback_delay_ns,
         seed: simulation.seed,
-        ..YzAimParameters::new(axis.node, Model::Aim57x30C, gearing, joint)
+        ..YzAimParameters::new((sheet, quirks), axis.node, Model::Aim57x30C, gearing, joint)
     }
 }

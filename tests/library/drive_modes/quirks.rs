@@ -33,19 +33,24 @@ fn error_after_the_program(mut world: World) -> f64 {
 fn the_program_ends_where_it_should_with_any_of_the_quirks_and_without_them() {
     let all = Quirks::default();
     let none = Quirks::none();
+    // Its deviations, whether it is silent for objects that it lacks, and whether it powers up in silence.
     let kinds = [
-        all,
-        none,
-        Quirks { ignores_first_target: true, ..none },
-        Quirks { needs_shutdown_first: true, ..none },
-        Quirks { controlword_interval_ns: 20_000_000, ..none },
-        Quirks { is_silent_on_unknown_objects: true, ..none },
-        Quirks { announces_power_up: false, ..all },
+        (all, true, false),
+        (none, false, false),
+        (Quirks { ignores_first_target: true, ..none }, false, false),
+        (Quirks { needs_shutdown_first: true, ..none }, false, false),
+        (Quirks { controlword_interval_ns: 20_000_000, ..none }, false, false),
+        (none, true, false),
+        (all, true, true),
     ];
-    for quirks in kinds {
+    for (quirks, is_silent_if_absent, is_power_up_silent) in kinds {
         let mut config = load("gantry-yz-aim.toml");
         config.program.moves.remove(0);
-        let error = error_after_the_program(gantry_with(config, |parameters| parameters.quirks = quirks));
+        let error = error_after_the_program(gantry_with(config, |parameters| {
+            parameters.quirks = quirks;
+            parameters.device.is_silent_if_absent = is_silent_if_absent;
+            parameters.device.simulated.is_power_up_silent = is_power_up_silent;
+        }));
         assert!(error <= 2.0, "{quirks:?}: {error}");
     }
 }

@@ -4,10 +4,11 @@ use std::path::Path;
 
 use takt::Outcome;
 use takt::config::Config;
-use takt::sim::yz_aim::{Quirks, YzAimJoint, YzAimParameters};
+use takt::sim::yz_aim::YzAimJoint;
 use takt::sim::{Drive, SimulatedBus, WireBitRates};
 use takt_wire::canopen::dcf::DeviceConfiguration;
 use takt_wire::canopen::eds;
+use takt_wire::canopen::object::ObjectAddress;
 
 use crate::drive_modes::one_yz_aim::one_yz_aim;
 use crate::drive_modes::wire::{counts_per_unit, id, word};
@@ -161,9 +162,17 @@ fn the_mapping_of_a_yz_aim_cannot_be_written() {
 /// Drives whose firmware reports the statusword before the position, unlike the manual.
 fn state_first(config: Config) -> World {
     let drives = config.axes.iter().map(|axis| -> Box<dyn Drive> {
-        let parameters = takt::family::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
-        let quirks = Quirks { reports_state_first: true, ..parameters.quirks };
-        Box::new(YzAimJoint::new(YzAimParameters { quirks, ..parameters }))
+        let mut parameters = takt::family::yz_aim::simulated_parameters(axis, 1_000_000, &config.simulation);
+        for (index, objects) in [
+            (0x1A00, [0x6041_0010, 0x6064_0020]),
+            (0x1A01, [0x6041_0010, 0x6064_0020]),
+            (0x1A02, [0x606C_0020, 0x6041_0010]),
+            (0x1A03, [0x6041_0010, 0x6064_0020]),
+        ] {
+            let addresses = (1..).map(|subindex| ObjectAddress::new(index, subindex));
+            parameters.device.values.extend(addresses.zip(objects));
+        }
+        Box::new(YzAimJoint::new(parameters))
     });
     let rates = WireBitRates { nominal: 1_000_000, data: None };
     let bus = SimulatedBus::with_drives(rates, config.simulation.longest_gap_ns, drives.collect());

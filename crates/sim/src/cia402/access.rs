@@ -3,8 +3,8 @@
 use takt_rt::Nanoseconds;
 use takt_wire::canopen::object::ObjectAddress;
 
-use super::drive::Cia402Drive;
-use super::node::CanopenNode;
+use super::node::{CanopenDevice, CanopenNode};
+use crate::drive::NodeState;
 use crate::object_dictionary::ObjectKind;
 use crate::pdo_engine::{check_parameter, is_parameter};
 use crate::sdo_reply::AbortCode;
@@ -15,14 +15,15 @@ const SAVE_SIGNATURE: u32 = u32::from_le_bytes(*b"save");
 const LOAD_SIGNATURE: u32 = u32::from_le_bytes(*b"load");
 
 /// The objects as the SDO server accesses them.
-pub(super) struct Objects<'a> {
-    pub(super) drive: &'a mut Cia402Drive,
+pub(super) struct Objects<'a, D> {
+    pub(super) device: &'a mut D,
     pub(super) now_ns: Nanoseconds,
+    pub(super) is_silent_if_absent: bool,
 }
 
-impl ObjectAccess for Objects<'_> {
+impl<D: CanopenDevice> ObjectAccess for Objects<'_, D> {
     fn read(&mut self, address: ObjectAddress, value: &mut Vec<u8>) -> Result<(), AbortCode> {
-        let dictionary = &self.drive.canopen.dictionary;
+        let dictionary = &self.device.canopen().dictionary;
         let place = dictionary.find(address)?;
         if !dictionary.entry(place).is_readable {
             return Err(AbortCode::WriteOnly);
@@ -31,27 +32,27 @@ impl ObjectAccess for Objects<'_> {
         if address.index == 0x1003 && i64::from(address.subindex) > history() {
             return Err(AbortCode::NoData);
         }
-        self.drive.measure();
-        self.drive.canopen.dictionary.append(place, value);
+        self.device.measure();
+        self.device.canopen().dictionary.append(place, value);
         Ok(())
     }
 
     fn check_write(&mut self, address: ObjectAddress) -> Result<Option<usize>, AbortCode> {
-        let dictionary = &self.drive.canopen.dictionary;
+        let dictionary = &self.device.canopen().dictionary;
         let place = dictionary.find(address)?;
         let entry = dictionary.entry(place);
         if !entry.is_writable {
             return Err(AbortCode::ReadOnly);
         }
         let length = (entry.kind != ObjectKind::Bytes).then_some(entry.length);
-        self.drive.check_write(place)?;
+        self.device.check_write(place)?;
         Ok(length)
     }
 
     fn write(&mut self, address: ObjectAddress, value: &[u8]) -> Result<(), AbortCode> {
-        let Self { drive, now_ns } = self;
-        let has_one_code = drive.quirks.simulated.has_one_abort_code;
-        let node = &mut drive.canopen;
+        let Self { device, now_ns, .. } = self;
+        let has_one_code = device.canopen().quirks.simulated.has_one_abort_code;
+        let node = device.canopen();
         let place = node.dictionary.find(address)?;
         let number = match (address.index, address.subindex) {
             // The objects show what they can do, and take a signature, whatever their range is.
@@ -62,13 +63,18 @@ impl ObjectAccess for Objects<'_> {
             })?,
         };
         check_communication(address, number)?;
-        drive.check_value(address, number)?;
-        let node = &mut drive.canopen;
+        device.check_value(address, number)?;
+        let node = device.canopen();
         check_parameter(&node.dictionary, address, number)?;
         node.dictionary.store(place, value)?;
         node.written(address.index, *now_ns);
-        drive.written(address, *now_ns);
+        device.written(address, *now_ns);
         Ok(())
+    }
+
+    fn refusal(&self, code: AbortCode) -> Option<AbortCode> {
+        let is_absent = matches!(code, AbortCode::NoObject | AbortCode::NoSubindex);
+        (!is_absent || !self.is_silent_if_absent).then_some(code)
     }
 }
 
@@ -76,7 +82,7 @@ impl CanopenNode {
     fn take_signature(&mut self, index: u16, value: &[u8], now_ns: Nanoseconds) -> Result<(), AbortCode> {
         match (index, <[u8; 4]>::try_from(value).map(u32::from_le_bytes)) {
             (0x1010, Ok(SAVE_SIGNATURE)) => {
-                self.save_ns = now_ns + self.delays.save_ns;
+                self.begin_save(now_ns);
                 Ok(())
             }
             (0x1011, Ok(LOAD_SIGNATURE)) => {
@@ -94,7 +100,12 @@ impl CanopenNode {
             0x100C | 0x100D => self.network.stop_life_guarding(),
             0x1016 => self.network.stop_master_monitor(),
             0x1017 => self.network.schedule_heartbeat(now_ns, &self.dictionary),
-            _ if is_parameter(index) => self.pdos.compile(&self.dictionary),
+            _ if is_parameter(index) => {
+                self.pdos.compile(&self.dictionary);
+                if self.network.state() == NodeState::Operational {
+                    self.pdos.start(now_ns);
+                }
+            }
             _ => {}
         }
     }

@@ -2,11 +2,11 @@
 
 use takt_rt::{Frame, Nanoseconds};
 use takt_wire::canopen::object::ObjectAddress;
-use takt_wire::quirks::Quirks;
 
 use super::axis::{Axis, AxisEvent};
-use super::node::{CanopenNode, NodeDelays};
-use super::places::{AXIS_OFFSET, is_measured};
+use super::node::{CanopenDevice, CanopenNode};
+use super::places::AXIS_OFFSET;
+use super::services::NodeServices;
 use super::{Cia402Parameters, NotADrive, dictionary_of};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::{Drive, DriveFault, Observation};
@@ -14,23 +14,14 @@ use crate::errors::DeviceError;
 use crate::feedback_defects::ShownObjects;
 use crate::loops::ControlLoops;
 use crate::mailbox::Mailbox;
-use crate::pdo_engine::PdoFeatures;
 use crate::plant::Gravity;
 use crate::random::Random;
 use crate::sdo_reply::AbortCode;
-use crate::sdo_server::{SdoFeatures, SdoServer};
-
-/// From an SDO request to its reply.
-const SHORTEST_REPLY_NS: Nanoseconds = 300_000;
-const LONGEST_REPLY_NS: Nanoseconds = 1_000_000;
-/// From "save" until it takes effect.
-const SAVE_NS: Nanoseconds = 100_000_000;
 
 /// A simulated CiA 402 drive, made from its data sheet.
 #[derive(Clone, Debug)]
 pub struct Cia402Drive {
-    pub(super) quirks: Quirks,
-    pub(super) canopen: CanopenNode,
+    canopen: CanopenNode,
     axes: Vec<Axis>,
     /// A fault injected since the last advance.
     injected: Option<DriveFault>,
@@ -52,27 +43,11 @@ impl Cia402Drive {
         if quirks.statusword_set_in_some != 0 && random.next_u64() & 1 == 1 {
             quirks.statusword_set |= quirks.statusword_set_in_some;
         }
-        let delays = NodeDelays {
-            power_up_ns: quirks.delays.boot_up_ns.unwrap_or(power_up_ns),
-            feedback_ns: feedback_delay_ns,
-            save_ns: quirks.delays.save_ns.unwrap_or(SAVE_NS),
-            first_pdo_ns: quirks.delays.first_pdo_ns.unwrap_or(0),
-        };
         let axes = (0u16..).zip(axes).map(|(number, axis)| Axis::new(number, axis, &mut dictionary, &quirks));
         let axes = axes.collect();
-        let longest_ns = quirks.delays.sdo_reply_ns.unwrap_or(LONGEST_REPLY_NS);
-        let features = if quirks.refuses_blocks {
-            SdoFeatures::Segmented { is_upload_segmented: quirks.simulated.segments_uploads }
-        } else {
-            SdoFeatures::Blocks
-        };
-        let latency_ns = SHORTEST_REPLY_NS.min(longest_ns)..longest_ns + 1;
-        let sdo = SdoServer::new(random, latency_ns, features);
-        let pdo_features = PdoFeatures { is_measured, watches_rpdos: !quirks.simulated.ignores_rpdo_timers };
         let mut drive = Self {
-            canopen: CanopenNode::new(node, dictionary, quirks.power_up, sdo, pdo_features, delays),
+            canopen: CanopenNode::new(node, dictionary, quirks, random, power_up_ns, feedback_delay_ns),
             axes,
-            quirks,
             injected: None,
             stepped_ns: 0,
             now_ns: 0,
@@ -83,7 +58,7 @@ impl Cia402Drive {
 
     /// Without a battery the turn count is lost.
     fn power_up(&mut self) {
-        if self.quirks.simulated.lacks_battery {
+        if self.canopen.quirks.simulated.lacks_battery {
             self.axes.iter_mut().for_each(Axis::zero_turns);
         }
     }
@@ -167,27 +142,40 @@ impl ControlLoops for Cia402Drive {
     }
 }
 
-/// What its objects mean.
 impl Cia402Drive {
     /// Acts on the modes, controlwords and set-points in the dictionary.
-    pub(super) fn take_values(&mut self, now_ns: Nanoseconds) {
+    fn take_values(&mut self, now_ns: Nanoseconds) {
         self.follow_modes(now_ns);
         self.evaluate(now_ns);
         self.latch();
     }
+}
 
-    /// Returns `true` if an axis is in a fault.
-    pub(super) fn is_faulted(&self) -> bool {
+impl CanopenDevice for Cia402Drive {
+    fn canopen(&mut self) -> &mut CanopenNode {
+        &mut self.canopen
+    }
+
+    fn rpdo_applied(&mut self, now_ns: Nanoseconds, _number: usize, is_by_sync: bool) {
+        if !is_by_sync {
+            self.take_values(now_ns);
+        }
+    }
+
+    fn synced(&mut self, now_ns: Nanoseconds) {
+        self.take_values(now_ns);
+    }
+
+    fn is_faulted(&self) -> bool {
         self.axes.iter().any(|axis| axis.state().is_faulted())
     }
 
-    /// Writes the measured values to the dictionary.
-    pub(super) fn measure(&mut self) {
+    fn measure(&mut self) {
         self.axes.iter().for_each(|axis| axis.measure(&mut self.canopen.dictionary));
     }
 
     /// The objects that a defect can change in the feedback: the torque takes the place of the position.
-    pub(super) fn shown(&self) -> ShownObjects {
+    fn shown(&self) -> ShownObjects {
         let places = &self.axes[0].places;
         ShownObjects {
             statusword: places.statusword,
@@ -197,8 +185,7 @@ impl Cia402Drive {
         }
     }
 
-    /// The node has booted.
-    pub(super) fn started(&mut self, now_ns: Nanoseconds) {
+    fn started(&mut self, now_ns: Nanoseconds) {
         for index in 0..self.axes.len() {
             self.axes[index].started(&self.canopen.dictionary, now_ns);
             if self.axes[index].has_lost_turns() {
@@ -207,18 +194,17 @@ impl Cia402Drive {
         }
     }
 
-    /// Restarts everything except the joints and the saved parameters.
-    pub(super) fn restart(&mut self, now_ns: Nanoseconds) {
+    fn restart(&mut self, now_ns: Nanoseconds) {
         self.canopen.restart(now_ns);
-        for axis in &mut self.axes {
-            axis.restart(&mut self.canopen.dictionary, &self.quirks);
-        }
+        let CanopenNode { dictionary, quirks, .. } = &mut self.canopen;
+        self.axes.iter_mut().for_each(|axis| axis.restart(dictionary, quirks));
         self.power_up();
     }
 
     /// The master is lost: every axis does what object 6007 says.
-    pub(super) fn lose_master(&mut self) {
-        let CanopenNode { dictionary, errors, .. } = &mut self.canopen;
+    fn lose_master(&mut self) {
+        let CanopenNode { dictionary, errors, network, .. } = &mut self.canopen;
+        network.follow_error_behaviour(dictionary);
         let mut is_fault = false;
         for axis in &mut self.axes {
             if axis.lose_master(dictionary) {
@@ -233,22 +219,20 @@ impl Cia402Drive {
         }
     }
 
-    /// Checks that SDO can write an object of the dictionary now.
-    pub(super) fn check_write(&self, place: usize) -> Result<(), AbortCode> {
+    fn check_write(&self, place: usize) -> Result<(), AbortCode> {
         let is_kept = self.axes.iter().any(|axis| axis.places.mode == Some(place) && axis.keeps_mode());
         if is_kept { Err(AbortCode::DeviceState) } else { Ok(()) }
     }
 
-    /// Checks what the range of an object does not say of a value.
-    pub(super) fn check_value(&self, address: ObjectAddress, value: i64) -> Result<(), AbortCode> {
+    fn check_value(&self, address: ObjectAddress, value: i64) -> Result<(), AbortCode> {
         let is_remote = matches!(address.index, 0x1800..=0x19FF) && address.subindex == 2;
-        let is_refused = self.quirks.simulated.refuses_remote_pdos && is_remote && matches!(value, 252 | 253);
+        let is_refused =
+            self.canopen.quirks.simulated.refuses_remote_pdos && is_remote && matches!(value, 252 | 253);
         if is_refused { Err(AbortCode::Value) } else { Ok(()) }
     }
 
-    /// Applies the effects of a value that SDO has written.
-    pub(super) fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
-        if self.quirks.turn_count.is_some_and(|turns| turns.clear == address) {
+    fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+        if self.canopen.quirks.turn_count.is_some_and(|turns| turns.clear == address) {
             let place = self.canopen.dictionary.place(address.index, address.subindex);
             if self.canopen.dictionary.number_at(place) == Some(1) {
                 self.axes[0].clear_turns();
@@ -264,7 +248,7 @@ impl Cia402Drive {
             0x607A | 0x60C1 => self.latch(),
             0x607E | 0x608F | 0x6091 | 0x6092 | 0x6096 | 0x60A9 => {
                 for axis in &mut self.axes {
-                    axis.set_units(&self.canopen.dictionary, &self.quirks);
+                    axis.set_units(&self.canopen.dictionary, &self.canopen.quirks);
                 }
             }
             _ => {}
@@ -291,7 +275,7 @@ impl Drive for Cia402Drive {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
-            if fault == DriveFault::MultiTurnBattery && self.quirks.turn_count.is_some() {
+            if fault == DriveFault::MultiTurnBattery && self.canopen.quirks.turn_count.is_some() {
                 self.axes[0].lose_turns();
             }
             self.fail(0, DeviceError::Fault(fault));
@@ -319,6 +303,7 @@ impl Drive for Cia402Drive {
         self.run_loops(now_ns);
         mailbox.clear();
         self.restart(now_ns);
+        self.canopen.is_boot_silent = self.canopen.quirks.simulated.is_power_up_silent;
         self.canopen.schedule(now_ns);
     }
 

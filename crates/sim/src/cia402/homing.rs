@@ -177,6 +177,18 @@ impl Homing {
         }
     }
 
+    /// Ends a running homing with an error.
+    pub fn fail(&mut self) {
+        if self.is_running() {
+            self.state = State::Failed;
+        }
+    }
+
+    /// Returns `true` if one was started since the mode was set.
+    pub fn is_begun(&self) -> bool {
+        self.state != State::Idle
+    }
+
     /// Returns `true` if the homing is running.
     pub fn is_running(&self) -> bool {
         !matches!(self.state, State::Idle | State::Done | State::Failed)

@@ -29,12 +29,12 @@ mod access;
 mod axis;
 mod device;
 mod drive;
-mod homing;
+pub(crate) mod homing;
 mod motion;
-mod node;
-mod places;
+pub(crate) mod node;
+pub(crate) mod places;
 mod profile;
-mod services;
+pub(crate) mod services;
 mod units;
 
 use takt_rt::Nanoseconds;
@@ -47,6 +47,7 @@ use super::object_dictionary::SimulatedDictionary;
 use super::plant::{Encoder, EndStops, JointParameters};
 
 pub use drive::Cia402Drive;
+pub(crate) use places::AXIS_OFFSET;
 
 /// From a new value of 6060 until 6061 shows it, unless the quirks say otherwise.
 const MODE_CHANGE_NS: Nanoseconds = 250_000;
@@ -119,9 +120,21 @@ fn dictionary_of(parameters: &Cia402Parameters) -> Result<SimulatedDictionary, N
     if !(1..=MOST_AXES).contains(&axes.len()) {
         return Err(NotADrive::Axes(axes.len()));
     }
+    let dictionary = dictionary_by(sheet, *node, quirks);
+    for axis in 0..axes.len() {
+        for index in [0x6040, 0x6041] {
+            let address = ObjectAddress::new(index + axis as u16 * AXIS_OFFSET, 0);
+            dictionary.find(address).map_err(|_| NotADrive::Lacks(address, axis + 1))?;
+        }
+    }
+    Ok(dictionary)
+}
+
+/// The dictionary of a drive by its data sheet and its quirks.
+pub(crate) fn dictionary_by(sheet: &eds::ObjectDictionary, node: u8, quirks: &Quirks) -> SimulatedDictionary {
     let is_missing = |address| quirks.is_missing(address);
     let is_constant = |address| quirks.is_constant(address);
-    let mut dictionary = SimulatedDictionary::of(sheet, *node, is_missing, is_constant);
+    let mut dictionary = SimulatedDictionary::of(sheet, node, is_missing, is_constant);
     for (address, value) in &quirks.values {
         if let Ok(place) = dictionary.find(*address) {
             dictionary.set_factory(place, *value);
@@ -132,11 +145,12 @@ fn dictionary_of(parameters: &Cia402Parameters) -> Result<SimulatedDictionary, N
             dictionary.set_range(place, *range);
         }
     }
-    for axis in 0..axes.len() {
-        for index in [0x6040, 0x6041] {
-            let address = ObjectAddress::new(index + axis as u16 * places::AXIS_OFFSET, 0);
-            dictionary.find(address).map_err(|_| NotADrive::Lacks(address, axis + 1))?;
+    for (address, choices) in &quirks.simulated.choices {
+        if let Ok(place) = dictionary.find(*address) {
+            dictionary.set_choices(place, choices);
         }
     }
-    Ok(dictionary)
+    let unsaved = &quirks.simulated.unsaved;
+    dictionary.set_unsaved(|address| unsaved.iter().any(|pattern| pattern.matches(address)));
+    dictionary
 }

@@ -1,8 +1,6 @@
 //! The complete YZ-AIM: it receives frames and time, advances its parts, and sends frames.
 
-mod access;
 mod commands;
-mod frames;
 mod load_monitor;
 mod loops;
 mod measurement;
@@ -13,30 +11,25 @@ use super::alarms::{Alarms, StoppingAlarm};
 use super::bit_rate::BitRateChange;
 use super::defects::check_possible;
 use super::device::{Level, YzAimDevice};
-use super::homing::Homing;
 use super::motion::YzAimMotion;
-use super::objects::{OBJECTS, at};
 use super::parameters::{COUNTS_PER_SECOND_PER_RPM, COUNTS_PER_TURN, YzAimParameters};
-use super::process_data::{PDO_FEATURES, Transmission, report_state_first};
+use super::places::Places;
+use crate::cia402::dictionary_by;
+use crate::cia402::homing::Homing;
+use crate::cia402::node::{CanopenDevice, CanopenNode};
+use crate::cia402::services::NodeServices;
 use crate::defect::{Defect, Unsupported};
 use crate::drive::{Drive, DriveFault, Observation};
-use crate::feedback_defects::{FeedbackDefects, JointDefects};
+use crate::feedback_defects::{JointDefects, ShownObjects};
 use crate::loops::ControlLoops;
 use crate::mailbox::Mailbox;
 use crate::motion::Actual;
-use crate::network::Network;
-use crate::object_dictionary::SimulatedDictionary;
-use crate::pdo_engine::PdoEngine;
 use crate::plant::{Gravity, Joint};
 use crate::random::Random;
-use crate::sdo_server::{SdoFeatures, SdoServer};
 use crate::servo::Servo;
+use takt_wire::canopen::object::ObjectAddress;
 use takt_wire::quirks::PowerUpState;
 
-/// Longest time between two advances.
-const IDLE_NS: Nanoseconds = 1_000_000;
-/// From an SDO request to its reply, as measured on real units: about 0.3 ms.
-const SDO_LATENCY_NS: std::ops::Range<Nanoseconds> = 270_000..330_000;
 /// Factor by which the loops may exceed the highest speed to catch up.
 const SPEED_RESERVE: f64 = 1.1;
 /// Standstill threshold: r/min.
@@ -51,7 +44,6 @@ mod mode {
     pub const VELOCITY: i64 = OperationMode::ProfileVelocity as i64;
     pub const HOMING: i64 = OperationMode::Homing as i64;
     pub const INTERPOLATION: i64 = OperationMode::InterpolatedPosition as i64;
-    pub const ALL: [i64; 4] = [PROFILE_POSITION, VELOCITY, HOMING, INTERPOLATION];
 }
 
 /// How long each overload has lasted.
@@ -66,26 +58,23 @@ struct LoadMonitor {
 #[derive(Clone, Debug)]
 pub struct YzAimJoint {
     parameters: YzAimParameters,
-    dictionary: SimulatedDictionary,
-    network: Network,
-    /// True if the next boot sends a boot-up message.
-    is_boot_announced: bool,
+    canopen: CanopenNode,
+    places: Places,
     /// True if the heartbeat of the master has timed out.
     is_master_lost: bool,
-    sdo: SdoServer,
-    pdos: PdoEngine,
-    transmission: Transmission,
     device: YzAimDevice,
     alarms: Alarms,
     motion: YzAimMotion,
     homing: Homing,
+    /// How long the homing has run.
+    homing_s: f64,
     servo: Servo,
     joint: Joint,
     load_monitor: LoadMonitor,
     bit_rate_change: BitRateChange,
     random: Random,
-    /// The node ID in use.
-    node: u8,
+    /// The mode that has taken effect.
+    last_mode: i64,
     /// The bit rate in use, and the one after the next power-up.
     bit_rate: u32,
     next_bit_rate: u32,
@@ -104,49 +93,47 @@ pub struct YzAimJoint {
     /// True if 260Ah = 60006 has been written.
     is_zero_armed: bool,
     injected: Option<DriveFault>,
-    defects: FeedbackDefects,
     joint_defects: JointDefects,
-    save_ns: Nanoseconds,
     /// The time up to which the loops have run.
     stepped_ns: Nanoseconds,
     now_ns: Nanoseconds,
-    wake_ns: Nanoseconds,
 }
 
 impl YzAimJoint {
     /// A servo whose supply is switched on at time 0.
     pub fn new(parameters: YzAimParameters) -> Self {
-        let mut dictionary = SimulatedDictionary::of_table(&OBJECTS, parameters.node);
-        dictionary.set_factory(at::NODE_ADDRESS, parameters.node.into());
-        dictionary.set_factory(at::SPECIAL_FUNCTION, parameters.special_function.into());
-        dictionary.set_factory(at::ACCELERATION, parameters.acceleration.into());
-        dictionary.set_factory(at::TEMPERATURE, 35);
-        if parameters.quirks.reports_state_first {
-            report_state_first(&mut dictionary);
+        let mut dictionary = dictionary_by(&parameters.sheet, parameters.node, &parameters.device);
+        let places = Places::of(&dictionary, 0);
+        for (place, value) in [
+            (places.node_address, parameters.node.into()),
+            (places.special_function, parameters.special_function.into()),
+            (places.acceleration, parameters.acceleration.into()),
+        ] {
+            if let Some(place) = place {
+                dictionary.set_factory(place, value);
+            }
         }
         let random = Random::new(parameters.seed, parameters.node);
         let highest_speed = parameters.highest_speed();
         let velocity_limit = SPEED_RESERVE * highest_speed / parameters.encoder.counts_per_unit.abs();
         let joint = Joint::new(parameters.joint, parameters.initial_position).between(parameters.end_stops);
+        let (power_up_ns, feedback_ns) = (parameters.power_up_ns, parameters.feedback_delay_ns);
+        let quirks = parameters.device.clone();
         let mut unit = Self {
-            parameters,
-            network: Network::starting(&dictionary, NEVER, PowerUpState::PreOperational),
-            is_boot_announced: false,
+            canopen: CanopenNode::new(parameters.node, dictionary, quirks, random, power_up_ns, feedback_ns),
+            places,
             is_master_lost: false,
-            sdo: SdoServer::new(random, SDO_LATENCY_NS, SdoFeatures::Expedited),
-            pdos: PdoEngine::new(&dictionary, PDO_FEATURES),
-            transmission: Transmission::at_rest(),
-            dictionary,
             device: YzAimDevice::cold(),
             alarms: Alarms::default(),
             motion: YzAimMotion::new(highest_speed),
             homing: Homing::idle(),
+            homing_s: 0.0,
             servo: Servo::new(parameters.joint.inertia, parameters.peak_torque, velocity_limit),
             joint,
             load_monitor: LoadMonitor::default(),
             bit_rate_change: BitRateChange::None,
             random,
-            node: parameters.node,
+            last_mode: 0,
             bit_rate: parameters.bit_rate,
             next_bit_rate: parameters.bit_rate,
             special_function: 0,
@@ -159,12 +146,10 @@ impl YzAimJoint {
             was_energised: false,
             is_zero_armed: false,
             injected: None,
-            defects: FeedbackDefects::default(),
             joint_defects: JointDefects::default(),
-            save_ns: NEVER,
             stepped_ns: 0,
             now_ns: 0,
-            wake_ns: 0,
+            parameters,
         };
         unit.power_up(0);
         unit
@@ -173,6 +158,18 @@ impl YzAimJoint {
     /// The bit rate in use: bit/s. At another bit rate than its bus, it neither receives nor sends.
     pub fn bit_rate(&self) -> u32 {
         self.bit_rate
+    }
+
+    fn number(&self, place: Option<usize>) -> i64 {
+        self.canopen.dictionary.number_at(place).unwrap_or(0)
+    }
+
+    fn real(&self, place: Option<usize>) -> f64 {
+        self.number(place) as f64
+    }
+
+    fn has_battery(&self) -> bool {
+        !self.canopen.quirks.simulated.lacks_battery
     }
 
     fn is_on_bus(&self) -> bool {
@@ -205,7 +202,7 @@ impl YzAimJoint {
     }
 
     fn mode(&self) -> i64 {
-        self.dictionary.number(at::OPERATION_MODE)
+        self.number(self.places.operation_mode)
     }
 
     fn is_in_mode(&self, mode: i64) -> bool {
@@ -223,7 +220,7 @@ impl YzAimJoint {
             || self.mode() == mode::HOMING && self.homing.is_begun();
         self.has_started
             && is_commanded
-            && self.dictionary.number(at::OUTPUT_ENABLE) == 1
+            && self.number(self.places.output_enable) == 1
             && !self.alarms.is_stopped()
     }
 
@@ -249,49 +246,78 @@ impl YzAimJoint {
     /// Raises an alarm that stops the motor: the output is off until it is cleared.
     fn fail(&mut self, now_ns: Nanoseconds, alarm: StoppingAlarm) {
         self.alarms.raise(now_ns, alarm);
-        self.dictionary.set(at::OUTPUT_ENABLE, 0);
+        self.canopen.dictionary.set_at(self.places.output_enable, 0);
     }
 
     /// Powers up.
     fn power_up(&mut self, now_ns: Nanoseconds) {
         self.alarms = self.alarms.after_power_up();
-        self.node = self.dictionary.saved(at::NODE_ADDRESS) as u8;
-        for (place, object) in OBJECTS.iter().enumerate().filter(|(_, object)| object.adds_node) {
-            self.dictionary.set_factory(place, object.default_of(self.node));
+        let CanopenNode { id, dictionary, .. } = &mut self.canopen;
+        let saved = |place: Option<usize>| place.map_or(0, |place| dictionary.saved(place));
+        self.special_function = saved(self.places.special_function);
+        let node = saved(self.places.node_address) as u8;
+        if node != *id {
+            *id = node;
+            dictionary.set_node(&self.parameters.sheet, node);
         }
         self.bit_rate = self.next_bit_rate;
-        self.special_function = self.dictionary.saved(at::SPECIAL_FUNCTION);
-        if !self.parameters.has_battery || self.alarms.has_lost_battery {
+        if !self.has_battery() || self.alarms.has_lost_battery {
             let counts = self.encoder_counts();
             self.counts_offset = counts.rem_euclid(COUNTS_PER_TURN as i32).wrapping_sub(counts);
         }
-        let state = if self.parameters.starts_operational {
-            PowerUpState::Operational
-        } else {
-            PowerUpState::PreOperational
-        };
-        self.start(now_ns, state, self.parameters.quirks.announces_power_up);
+        self.restart(now_ns);
+        self.canopen.is_boot_silent = self.canopen.quirks.simulated.is_power_up_silent;
+        self.canopen.network.set_power_up(self.canopen.quirks.power_up);
         self.is_starting_cold = true;
     }
+}
 
-    /// Common part of power-up and NMT "reset node": stored values are restored, and the drive is not enabled.
-    fn start(&mut self, now_ns: Nanoseconds, state: PowerUpState, is_announced: bool) {
-        self.dictionary.restore(0..=u16::MAX);
-        if self.dictionary.number(at::GEAR_NUMERATOR) == 0 {
-            self.dictionary.set(at::MODBUS_ENABLE, 1);
+impl CanopenDevice for YzAimJoint {
+    fn canopen(&mut self) -> &mut CanopenNode {
+        &mut self.canopen
+    }
+
+    fn measure(&mut self) {
+        self.measure_all();
+    }
+
+    fn measure_for_pdos(&mut self) {
+        self.measure_all();
+        self.measure_velocity_of_pdo();
+    }
+
+    /// No TPDO has a mode, and their mapping is fixed.
+    fn shown(&self) -> ShownObjects {
+        let Places { statusword, position, .. } = self.places;
+        ShownObjects { statusword, mode_display: None, position, instead_of_position: None }
+    }
+
+    fn is_faulted(&self) -> bool {
+        self.shows_alarm()
+    }
+
+    /// After power-up and "reset node" the motor is energised.
+    fn started(&mut self, _now_ns: Nanoseconds) {
+        self.has_started = true;
+        if std::mem::take(&mut self.is_starting_cold) {
+            self.move_after_power_up();
+        }
+    }
+
+    /// Stored values are restored, and the drive is not enabled.
+    fn restart(&mut self, now_ns: Nanoseconds) {
+        self.canopen.restart(now_ns);
+        self.canopen.network.set_power_up(PowerUpState::PreOperational);
+        if self.number(self.places.gear_numerator) == 0 {
+            self.canopen.dictionary.set_at(self.places.modbus_enable, 1);
         }
         if self.alarms.is_stopped() {
-            self.dictionary.set(at::OUTPUT_ENABLE, 0);
+            self.canopen.dictionary.set_at(self.places.output_enable, 0);
         }
-        self.network.set_power_up(state);
-        self.network.restart(now_ns + self.parameters.power_up_ns);
-        self.is_boot_announced = is_announced;
         self.is_master_lost = false;
-        self.sdo.reset();
-        self.pdos.compile(&self.dictionary);
-        self.transmission = Transmission::at_rest();
         self.device = YzAimDevice::cold();
         self.homing = Homing::idle();
+        self.last_mode = self.mode();
         self.bit_rate_change = BitRateChange::None;
         self.has_started = false;
         self.was_energised = false;
@@ -299,54 +325,64 @@ impl YzAimJoint {
         self.power_up_speed = None;
         self.is_zero_armed = false;
         self.ignores_target = false;
-        self.save_ns = NEVER;
     }
 
-    fn schedule(&mut self, now_ns: Nanoseconds) {
-        let due_ns = [
-            now_ns + IDLE_NS,
-            self.network.due_ns(),
-            self.sdo.due_ns().unwrap_or(NEVER),
-            self.pdos.due_ns(),
-            self.transmission.due_ns(),
-            self.save_ns,
-        ];
-        self.wake_ns = due_ns.into_iter().min().unwrap_or(NEVER).max(now_ns + 1);
+    fn reset_communication(&mut self) {
+        self.canopen.network.set_power_up(PowerUpState::PreOperational);
+        self.is_master_lost = false;
+    }
+
+    fn lose_master(&mut self) {
+        self.is_master_lost = true;
+    }
+
+    /// A heartbeat after a loss ends the alarm.
+    fn hear_master(&mut self) {
+        self.is_master_lost = false;
+    }
+
+    fn written(&mut self, address: ObjectAddress, now_ns: Nanoseconds) {
+        self.apply_written(address, now_ns);
+    }
+
+    fn rpdo_applied(&mut self, now_ns: Nanoseconds, number: usize, is_by_sync: bool) {
+        self.apply_rpdo(now_ns, number, is_by_sync);
     }
 }
 
 impl Drive for YzAimJoint {
     fn node(&self) -> u8 {
-        self.node
+        self.canopen.id
     }
 
-    fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, _mailbox: &mut Mailbox) {
+    fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
+        if self.canopen.passes_by(now_ns, frame) {
+            return;
+        }
         self.run_loops(now_ns);
         if self.is_on_bus() {
-            self.receive_frame(now_ns, frame);
+            self.receive_frame(now_ns, frame, mailbox);
         }
-        self.schedule(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
+    /// At a wrong bit rate nothing is sent.
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.now_ns = now_ns;
         self.run_loops(now_ns);
         if let Some(fault) = self.injected.take() {
             self.apply_fault(now_ns, fault);
         }
-        self.is_master_lost |= self.network.has_lost_master(now_ns);
-        if now_ns >= self.save_ns {
-            self.save_ns = NEVER;
-            self.dictionary.save();
-            self.dictionary.set(at::SAVE_FLAG, 2);
+        self.advance_node(now_ns, mailbox);
+        if !self.is_on_bus() {
+            mailbox.clear();
         }
-        self.send_due(now_ns, mailbox);
-        self.schedule(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     fn wake_ns(&self) -> Nanoseconds {
-        self.wake_ns
+        self.canopen.wake_ns()
     }
 
     fn observe(&mut self, now_ns: Nanoseconds) -> Observation {
@@ -361,21 +397,21 @@ impl Drive for YzAimJoint {
             statusword: self.statusword(),
             error_code: self.alarm_code(),
             operation_mode: self.mode() as i8,
-            nmt: self.network.state(),
+            nmt: self.canopen.network.state(),
             is_braked: false,
         }
     }
 
     fn inject_fault(&mut self, fault: DriveFault) {
         self.injected = Some(fault);
-        self.wake_ns = self.now_ns + 1;
+        self.canopen.wake_after(self.now_ns);
     }
 
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_loops(now_ns);
         mailbox.clear();
         self.power_up(now_ns);
-        self.schedule(now_ns);
+        self.canopen.schedule(now_ns);
     }
 
     fn set_gravity(&mut self, gravity: Gravity) {
@@ -394,7 +430,7 @@ impl Drive for YzAimJoint {
     ) -> Result<(), Unsupported> {
         self.run_loops(now_ns);
         check_possible(defect)?;
-        self.defects.set(defect, is_present);
+        self.canopen.defects.set(defect, is_present);
         self.joint_defects.set(defect, is_present);
         match defect {
             Defect::EncoderJump { distance } if is_present => {
@@ -404,7 +440,7 @@ impl Drive for YzAimJoint {
             Defect::Alarm { code } if is_present => self.raise(now_ns, code)?,
             _ => {}
         }
-        self.wake_ns = self.now_ns + 1;
+        self.canopen.wake_after(self.now_ns);
         Ok(())
     }
 }

@@ -3,14 +3,12 @@
 //! velocity, homing and interpolated position, alarms, and the joint behind a gear.
 //!
 //! ```text
-//! objects ── object_dictionary ──┬── sdo_server     SDO: expedited
-//!                                ├── pdo_engine     RPDO, TPDO; process_data: when a TPDO is sent
-//!                                ├── network        NMT, heartbeat producer and consumer
-//!                                ├── bit_rate       the procedure that changes the bit rate
-//!                                ├── device         controlword → statusword
-//!                                ├── alarms         260Eh
-//!                                ├── defects        defects that such a unit can have
-//!                                └── homing, motion → servo → plant
+//! data sheet, quirks ── cia402::node, cia402::services   SDO, PDO, NMT, heartbeat producer and consumer
+//!                            ├── bit_rate    the procedure that changes the bit rate
+//!                            ├── device      controlword → statusword
+//!                            ├── alarms      260Eh
+//!                            ├── defects     defects that such a unit can have
+//!                            └── cia402::homing, motion → servo → plant
 //! ```
 //!
 //! Choices where neither the manual nor traces give an answer:
@@ -37,13 +35,10 @@ mod alarms;
 mod bit_rate;
 mod defects;
 mod device;
-mod homing;
 mod joint;
 mod motion;
-mod objects;
 mod parameters;
-mod process_data;
+mod places;
 
 pub use joint::YzAimJoint;
-pub use objects::OBJECTS;
 pub use parameters::{COUNTS_PER_TURN, Gearing, HomingBehaviour, Model, Quirks, Ratings, YzAimParameters};

@@ -1,8 +1,11 @@
 //! The parameters of one YZ-AIM servo and its joint.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use takt_rt::Nanoseconds;
+use takt_wire::canopen::eds;
+use takt_wire::quirks as wire;
 
 use crate::homing_switches::HomingSwitches;
 use crate::plant::{Encoder, EndStops, JointParameters};
@@ -86,11 +89,9 @@ impl Gearing {
     }
 }
 
-/// Deviations of real units from the manual. Each can be switched off.
+/// Deviations of real units from the manual that only such a unit has. Each can be switched off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Quirks {
-    /// An SDO request for an unknown object gets no response.
-    pub is_silent_on_unknown_objects: bool,
     /// After power-up, 0007h and 000Fh are ignored before 0006h.
     pub needs_shutdown_first: bool,
     /// A controlword that raises the level is ignored sooner than this after the last one.
@@ -99,30 +100,19 @@ pub struct Quirks {
     pub ignores_first_target: bool,
     /// True if statusword and heartbeat report the battery alarm 10h, which does not stop the motor.
     pub shows_battery_alarm: bool,
-    /// True if sub-indices 02, 03 and 05 of 14xxh and 18xxh are writable.
-    pub has_settable_pdos: bool,
     /// True if TPDO3 has 0.1 r/min per bit like 606Ch by SDO, instead of 1 r/min as in the manual's example.
     pub has_fine_velocity_in_tpdo3: bool,
-    /// TPDO1, 2 and 4 have the statusword before the position, and TPDO3 has velocity and statusword instead of
-    /// position and velocity. The mapping objects contain this order.
-    pub reports_state_first: bool,
-    /// True if power-up sends a boot-up message, not only NMT 81h and 82h.
-    pub announces_power_up: bool,
 }
 
 impl Default for Quirks {
     /// The behaviour of real units.
     fn default() -> Self {
         Self {
-            is_silent_on_unknown_objects: true,
             needs_shutdown_first: true,
             controlword_interval_ns: 20_000_000,
             ignores_first_target: true,
             shows_battery_alarm: true,
-            has_settable_pdos: true,
             has_fine_velocity_in_tpdo3: false,
-            reports_state_first: false,
-            announces_power_up: true,
         }
     }
 }
@@ -131,7 +121,6 @@ impl Quirks {
     /// The behaviour in the manual's examples.
     pub fn none() -> Self {
         Self {
-            is_silent_on_unknown_objects: false,
             needs_shutdown_first: false,
             controlword_interval_ns: 0,
             ignores_first_target: false,
@@ -158,8 +147,12 @@ impl Default for HomingBehaviour {
 }
 
 /// The parameters of one servo.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct YzAimParameters {
+    /// Its data sheet.
+    pub sheet: Arc<eds::ObjectDictionary>,
+    /// In what its communication deviates from the data sheet and from CiA 301.
+    pub device: wire::Quirks,
     /// Node ID, 1 to 127, stored in 2615h.
     pub node: u8,
     /// Bit rate of the bus: bit/s. The drive starts with the same one.
@@ -184,16 +177,12 @@ pub struct YzAimParameters {
     pub maximum_speed_rpm: f64,
     /// Supply voltage: V.
     pub supply_voltage: f64,
-    /// True if a battery keeps the turn count; without it the position after power-up is within one turn.
-    pub has_battery: bool,
     /// The value stored in 2619h; interpolation needs 7.
     pub special_function: u16,
     /// The value stored in 6083h: (r/min)/s; at 60000 and above there is no ramp.
     pub acceleration: u16,
     /// Boot time after power-up or "reset node".
     pub power_up_ns: Nanoseconds,
-    /// True if the drive boots into NMT operational instead of pre-operational.
-    pub starts_operational: bool,
     /// Time from a frame until the PDO that replies to it is ready to send.
     pub feedback_delay_ns: Nanoseconds,
     /// The homing parameters.
@@ -205,13 +194,22 @@ pub struct YzAimParameters {
 }
 
 impl YzAimParameters {
-    /// A new unit of a model on a bus at 1 Mbit/s, with a gear and a joint. The peak torque is three times the rated
+    /// A new unit of a model, by its data sheet and its quirks, on a bus at 1 Mbit/s, with a gear and a joint. The peak torque is three times the rated
     /// torque.
-    pub fn new(node: u8, model: Model, gearing: Gearing, joint: JointParameters) -> Self {
+    pub fn new(
+        (sheet, mut device): (Arc<eds::ObjectDictionary>, wire::Quirks),
+        node: u8,
+        model: Model,
+        gearing: Gearing,
+        joint: JointParameters,
+    ) -> Self {
         let ratings = model.ratings();
+        device.simulated.lacks_battery = !ratings.has_battery;
         let direction = if gearing.is_reversed { -1.0 } else { 1.0 };
         let torque = ratings.torque * gearing.turns_per_unit() * TAU;
         Self {
+            sheet,
+            device,
             node,
             bit_rate: 1_000_000,
             joint,
@@ -227,11 +225,9 @@ impl YzAimParameters {
             rated_current: ratings.current,
             maximum_speed_rpm: ratings.maximum_speed_rpm,
             supply_voltage: ratings.supply_voltage,
-            has_battery: ratings.has_battery,
             special_function: 0,
             acceleration: 20_000,
             power_up_ns: 100_000_000,
-            starts_operational: false,
             feedback_delay_ns: 50_000,
             homing: HomingBehaviour::default(),
             quirks: Quirks::default(),
@@ -247,27 +243,5 @@ impl YzAimParameters {
     /// Torque at the joint for one ampere.
     pub(super) fn torque_per_ampere(&self) -> f64 {
         self.rated_torque / self.rated_current
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::plant::FrictionShape;
-
-    #[test]
-    fn a_gear_converts_counts_and_torque_to_the_joint() {
-        let joint = JointParameters {
-            inertia: 1.0,
-            viscous_friction: 0.0,
-            coulomb_friction: 0.0,
-            friction_shape: FrictionShape::Constant,
-            brake_torque: 0.0,
-        };
-        let screw = Gearing { ratio: 2.0, travel_per_turn: 0.005, is_reversed: true, zero_counts: 7.0 };
-        let parameters = YzAimParameters::new(3, Model::Aim57x30C, screw, joint);
-        assert_eq!(parameters.encoder.counts(0.005), -65_536 + 7);
-        // 0.96 N·m over 2π rad do the same work as the force over 2.5 mm.
-        assert!((parameters.rated_torque * 0.0025 - 0.96 * TAU).abs() < 1e-9);
     }
 }

@@ -9,14 +9,31 @@ mod position;
 mod set_up;
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use takt::sim::plant::JointParameters;
 use takt::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
+
+use takt_wire::canopen::eds::ObjectDictionary;
+use takt_wire::quirks::Quirks as DriveQuirks;
 
 use super::bench::{Bench, MILLISECOND_NS, NODE};
 
 /// Gear ratio of the joint.
 const RATIO: f64 = 10.0;
+
+/// Its data sheet and its quirks.
+pub fn description() -> (Arc<ObjectDictionary>, DriveQuirks) {
+    let device = takt::family::yz_aim::device();
+    (Arc::new(device.dictionary.clone()), device.quirks.clone())
+}
+
+/// The drive with other quirks of its node.
+fn with_quirks(parameters: YzAimParameters, change: impl FnOnce(&mut DriveQuirks)) -> YzAimParameters {
+    let mut device = parameters.device.clone();
+    change(&mut device);
+    YzAimParameters { device, ..parameters }
+}
 
 /// A 57AIM30C behind a gear of 10:1, which boots in 5 ms.
 fn parameters(node: u8) -> YzAimParameters {
@@ -31,13 +48,14 @@ fn parameters(node: u8) -> YzAimParameters {
     YzAimParameters {
         power_up_ns: 5 * MILLISECOND_NS,
         seed: 7,
-        ..YzAimParameters::new(node, Model::Aim57x30C, gearing, joint)
+        ..YzAimParameters::new(description(), node, Model::Aim57x30C, gearing, joint)
     }
 }
 
 /// The same drive without the behaviour of real units that the manual does not describe.
 fn by_the_manual(node: u8) -> YzAimParameters {
-    YzAimParameters { quirks: Quirks::none(), ..parameters(node) }
+    let by_the_manual = YzAimParameters { quirks: Quirks::none(), ..parameters(node) };
+    with_quirks(by_the_manual, |device| device.is_silent_if_absent = false)
 }
 
 fn bench(parameters: YzAimParameters) -> Bench {

@@ -5,9 +5,12 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use takt::sim::plant::JointParameters;
-use takt::sim::yz_aim::{Gearing, Model, OBJECTS, Quirks, YzAimJoint, YzAimParameters};
+use takt::sim::yz_aim::{Gearing, Model, Quirks, YzAimJoint, YzAimParameters};
 use takt::sim::{Drive, DriveFault, SimulatedBus, WireBitRates};
 use takt_rt::{BusPort, Frame, Id, ReceiveBatch};
+use takt_wire::canopen::eds::DataTypeCode;
+
+use super::yz_aim::description;
 
 const VECTORS: &str = include_str!("../../../../tests/vectors/yz-aim-vectors.csv");
 const DICTIONARY: &str = include_str!("../../../../tests/vectors/yz-aim-objects.csv");
@@ -55,11 +58,13 @@ fn servo(node: u8, counts: f64) -> YzAimParameters {
         friction_shape: takt::config::FrictionShape::Constant,
         brake_torque: 0.0,
     };
+    let (sheet, mut device) = description();
+    device.is_silent_if_absent = false;
     YzAimParameters {
         initial_position: counts / 32_768.0 * TAU,
         power_up_ns: 5 * MILLISECOND_NS,
         quirks: Quirks::none(),
-        ..YzAimParameters::new(node, Model::Aim57x15C, gearing, joint)
+        ..YzAimParameters::new((sheet, device), node, Model::Aim57x15C, gearing, joint)
     }
 }
 
@@ -75,7 +80,7 @@ impl Conversation {
     fn with(servos: &[YzAimParameters]) -> Self {
         let mut drives: Vec<Box<dyn Drive>> = vec![];
         for servo in servos {
-            drives.push(Box::new(YzAimJoint::new(*servo)));
+            drives.push(Box::new(YzAimJoint::new(servo.clone())));
         }
         let rates = WireBitRates { nominal: 1_000_000, data: None };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, drives);
@@ -319,32 +324,39 @@ fn every_row_of_the_vectors_is_taken_and_answered_by_the_simulated_servo() {
 }
 
 #[test]
-fn the_dictionary_is_the_one_of_the_manual() {
+fn the_data_sheet_is_that_of_the_manual() {
     let number = |text: &str| match text.strip_prefix("0x") {
-        Some(digits) => i64::from_str_radix(digits, 16).ok(),
+        Some(digits) => i128::from_str_radix(digits, 16).ok(),
         None => text.parse().ok(),
     };
     // Where the manual's text goes beyond the range that its table prints.
     let wider = [0x2600, 0x2615, 0x2619, 0x6098];
+    let sheet = description().0;
     let lines = DICTIONARY.lines().skip(1);
-    assert_eq!(lines.clone().count(), OBJECTS.len());
-    for (line, object) in lines.zip(OBJECTS) {
+    assert_eq!(lines.clone().count(), sheet.entries().count());
+    for (line, entry) in lines.zip(sheet.entries()) {
         let columns: Vec<&str> = line.split(',').collect();
-        let [index, subindex, bits, access, savable, _, lowest, highest, default, ..] = columns[..] else {
+        let [index, subindex, bits, access, _, _, lowest, highest, default, ..] = columns[..] else {
             panic!("{line}");
         };
-        assert_eq!(u16::from_str_radix(index, 16), Ok(object.index), "{line}");
-        assert_eq!(u8::from_str_radix(subindex, 16), Ok(object.subindex), "{line}");
-        assert_eq!(number(bits), object.data_type.bits().map(Into::into), "{line}");
-        assert!(access == "unspecified" || (access == "rw") == object.access.is_writable(), "{line}");
-        assert!(savable == "unknown" || (savable == "yes") == object.is_saved, "{line}");
-        if !wider.contains(&object.index) {
-            assert!(number(lowest).is_none_or(|lowest| lowest == object.lowest), "{line}");
-            assert!(number(highest).is_none_or(|highest| highest == object.highest), "{line}");
+        assert_eq!(u16::from_str_radix(index, 16), Ok(entry.address.index), "{line}");
+        assert_eq!(u8::from_str_radix(subindex, 16), Ok(entry.address.subindex), "{line}");
+        // TPDO3 has 32 bits of the velocity, the table 16.
+        let by_sheet = entry.data_type.and_then(DataTypeCode::bits).map(i128::from);
+        assert!(number(bits) == by_sheet || entry.address.index == 0x606C, "{line}");
+        assert!(access == "unspecified" || (access == "rw") == entry.access.is_writable(), "{line}");
+        // The sheet has no range of 1016:1.
+        if !wider.contains(&entry.address.index) && entry.address.index != 0x1016 {
+            let (low, high) = entry.data_type.and_then(DataTypeCode::range).unwrap();
+            for (printed, limit, of_type) in [(lowest, &entry.low, low), (highest, &entry.high, high)] {
+                let limit = limit.as_ref().and_then(|limit| limit.number(None)).unwrap_or(of_type);
+                assert!(number(printed).is_none_or(|printed| limit == printed), "{line}");
+            }
         }
+        let value = |node| entry.value().and_then(|value| value.number(Some(node)));
         let from_node = default.strip_prefix("$NODEID+");
-        assert_eq!(from_node.is_some(), object.adds_node, "{line}");
+        assert_eq!(from_node.is_some(), value(1) != value(2), "{line}");
         let printed = number(from_node.unwrap_or(default));
-        assert!(printed.is_none_or(|default| default == object.default), "{line}");
+        assert!(printed.is_none_or(|printed| value(0) == Some(printed)), "{line}");
     }
 }

@@ -6,7 +6,6 @@ use super::{LoadMonitor, YzAimJoint};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::DriveFault;
 use crate::yz_aim::alarms::{BATTERY, COMMUNICATION_LOST, StoppingAlarm};
-use crate::yz_aim::objects::at;
 
 /// How long the speed may stay behind before it is a stall.
 const STALL_S: f64 = 0.5;
@@ -20,7 +19,7 @@ const FULL_STANDSTILL_OUTPUT: f64 = 600.0;
 impl YzAimJoint {
     /// The torque limit by 261Dh.
     fn current_limit(&self) -> f64 {
-        let amperes = self.dictionary.real(at::MAXIMUM_CURRENT) / 1000.0;
+        let amperes = self.real(self.places.maximum_current) / 1000.0;
         amperes * self.parameters.torque_per_ampere()
     }
 
@@ -28,7 +27,7 @@ impl YzAimJoint {
     pub(super) fn torque_limit(&self) -> f64 {
         let limit = self.parameters.peak_torque.min(self.current_limit());
         if self.is_at_rest() {
-            limit * (self.dictionary.real(at::STANDSTILL_OUTPUT) / FULL_STANDSTILL_OUTPUT).min(1.0)
+            limit * (self.real(self.places.standstill_output) / FULL_STANDSTILL_OUTPUT).min(1.0)
         } else {
             limit
         }
@@ -49,8 +48,8 @@ impl YzAimJoint {
             behind_s: after(self.load_monitor.behind_s, is_behind || self.motion.is_limited()),
         };
         let now_ns = self.stepped_ns;
-        let is_blocked = is_over(self.load_monitor.blocked_s, self.dictionary.number(at::STANDSTILL_OUTPUT))
-            || is_over(self.load_monitor.at_current_limit_s, self.dictionary.number(at::MAXIMUM_CURRENT));
+        let is_blocked = is_over(self.load_monitor.blocked_s, self.number(self.places.standstill_output))
+            || is_over(self.load_monitor.at_current_limit_s, self.number(self.places.maximum_current));
         if is_blocked {
             self.fail(now_ns, StoppingAlarm::BlockedRotor);
         } else if self.load_monitor.behind_s >= STALL_S {
@@ -66,7 +65,7 @@ impl YzAimJoint {
             }
             DriveFault::Stall => self.fail(now_ns, StoppingAlarm::Stall),
             DriveFault::OverVoltage => self.fail(now_ns, StoppingAlarm::OverVoltage),
-            DriveFault::MultiTurnBattery if self.parameters.has_battery => {
+            DriveFault::MultiTurnBattery if self.has_battery() => {
                 self.alarms.has_lost_battery = true;
             }
             DriveFault::MultiTurnBattery
@@ -82,9 +81,9 @@ impl YzAimJoint {
     /// [`Unsupported`] when the drive has no alarm with this code.
     pub(super) fn raise(&mut self, now_ns: Nanoseconds, code: u16) -> Result<(), Unsupported> {
         match code {
-            BATTERY if self.parameters.has_battery => self.alarms.has_lost_battery = true,
+            BATTERY if self.has_battery() => self.alarms.has_lost_battery = true,
             COMMUNICATION_LOST => {
-                self.network.stop_master_monitor();
+                self.canopen.network.stop_master_monitor();
                 self.is_master_lost = true;
             }
             _ => {

@@ -3,7 +3,7 @@
 use takt::sim::Defect;
 
 use super::alarms::{speed_rpm, turning};
-use super::{Bench, NODE, YzAimParameters, bench, by_the_manual, decoded};
+use super::{Bench, NODE, bench, by_the_manual, decoded, with_quirks};
 
 impl Bench {
     fn inject_defect(&mut self, defect: Defect) {
@@ -115,7 +115,7 @@ fn the_alarm_of_the_lost_communication_ends_with_the_next_heartbeat_of_the_maste
 
 #[test]
 fn an_unknown_alarm_code_is_refused_and_changes_nothing() {
-    let without_battery = YzAimParameters { has_battery: false, ..by_the_manual(NODE) };
+    let without_battery = with_quirks(by_the_manual(NODE), |device| device.simulated.lacks_battery = true);
     for (parameters, code) in
         [(by_the_manual(NODE), 0), (by_the_manual(NODE), 0x7500), (without_battery, 0x10)]
     {

@@ -3,8 +3,9 @@
 use takt::sim::yz_aim::YzAimJoint;
 use takt::sim::{Drive, Mailbox, NodeState, QueueOrder};
 use takt_rt::{Frame, Id};
+use takt_wire::quirks::{ObjectPattern, PowerUpState};
 
-use super::{Bench, MILLISECOND_NS, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
+use super::{Bench, MILLISECOND_NS, NODE, bench, by_the_manual, parameters, with_quirks};
 
 fn host_heartbeat(bench: &mut Bench) {
     bench.send_data(0x77F, [5]);
@@ -47,8 +48,10 @@ fn resets_send_one_boot_up_message_and_lead_to_pre_operational() {
 
 #[test]
 fn the_state_after_power_up_and_its_boot_up_message_differ_between_units() {
-    let quirks = Quirks { announces_power_up: false, ..Quirks::default() };
-    let unit = YzAimParameters { starts_operational: true, quirks, ..parameters(NODE) };
+    let unit = with_quirks(parameters(NODE), |device| {
+        device.power_up = PowerUpState::Operational;
+        device.simulated.is_power_up_silent = true;
+    });
     let mut unit = bench(unit);
     assert_eq!(unit.observe().nmt, NodeState::Operational);
     unit.run_ms(1_000);
@@ -147,8 +150,9 @@ fn an_event_timer_set_before_operational_has_no_effect_until_then() {
 
 #[test]
 fn a_unit_may_refuse_other_pdo_parameters() {
-    let quirks = Quirks { has_settable_pdos: false, ..Quirks::default() };
-    let mut bench = bench(YzAimParameters { quirks, ..parameters(NODE) });
+    let mut bench = bench(with_quirks(parameters(NODE), |device| {
+        device.constant.push(ObjectPattern::Index(0x1801));
+    }));
     assert_eq!(bench.write(0x1801, 2, 1, 255), Err(0x0601_0002));
     assert_eq!(bench.read(0x1801, 2), Ok(1));
 }

@@ -3,7 +3,7 @@
 use takt::sim::plant::JointParameters;
 use takt::sim::yz_aim::{Gearing, Model};
 
-use super::{Bench, NODE, Quirks, YzAimParameters, bench, by_the_manual, parameters};
+use super::{NODE, Quirks, YzAimParameters, bench, by_the_manual, description, parameters, with_quirks};
 
 #[test]
 fn an_absolute_target_is_followed_at_once_with_bit_5() {
@@ -63,7 +63,7 @@ fn a_move_runs_at_6081_limited_to_the_highest_motor_speed() {
         bench.control(0x2F);
         bench.write(0x607A, 0, 4, 3_276_800).unwrap();
         bench.run_ms(500);
-        let tenths = bench.read(0x606C, 0).unwrap() as u16 as i16;
+        let tenths = bench.read(0x606C, 0).unwrap() as i32;
         assert!((f64::from(tenths) / 10.0 - expected).abs() < 2.0, "{tenths}");
     }
 }
@@ -105,7 +105,7 @@ fn a_reversed_spindle_counts_in_the_other_direction() {
         friction_shape: takt::config::FrictionShape::Constant,
         brake_torque: 0.0,
     };
-    let servo = YzAimParameters::new(NODE, Model::Aim57x30C, spindle, nut);
+    let servo = YzAimParameters::new(description(), NODE, Model::Aim57x30C, spindle, nut);
     let mut bench = bench(YzAimParameters { power_up_ns: 1_000_000, quirks: Quirks::none(), ..servo });
     assert_eq!(bench.position(), 1_000);
     bench.control(0x2F);
@@ -113,6 +113,16 @@ fn a_reversed_spindle_counts_in_the_other_direction() {
     bench.run_ms(1_500);
     assert_eq!((bench.position(), bench.statusword()), (66_536, 0x0437));
     assert!((bench.observe().position + 0.005).abs() < 1e-7);
+}
+
+#[test]
+fn a_gear_converts_counts_and_torque_to_the_joint() {
+    let screw = Gearing { ratio: 2.0, travel_per_turn: 0.005, is_reversed: true, zero_counts: 7.0 };
+    let joint = parameters(NODE).joint;
+    let parameters = YzAimParameters::new(description(), NODE, Model::Aim57x30C, screw, joint);
+    assert_eq!(parameters.encoder.counts(0.005), -65_536 + 7);
+    // 0.96 N·m over 2π rad do the same work as the force over 2.5 mm.
+    assert!((parameters.rated_torque * 0.0025 - 0.96 * super::TAU).abs() < 1e-9);
 }
 
 #[test]
@@ -188,7 +198,7 @@ fn tpdo3_contains_the_velocity_in_r_min_or_tenths_depending_on_the_unit() {
         }
         let answer = bench.take(0x385).pop().unwrap();
         assert_eq!(answer[4..], i32::to_le_bytes(expected));
-        assert_eq!(bench.read(0x606C, 0), Ok(-6_000i16 as u16 as u32));
+        assert_eq!(bench.read(0x606C, 0), Ok(-6_000i32 as u32));
     }
 }
 
@@ -209,9 +219,6 @@ fn a_change_of_mode_during_a_move_ends_it() {
 
 #[test]
 fn without_its_quirks_a_drive_answers_unknown_objects_with_an_abort() {
-    let mut bench: Bench = bench(YzAimParameters {
-        quirks: Quirks { is_silent_on_unknown_objects: false, ..Quirks::default() },
-        ..parameters(NODE)
-    });
+    let mut bench = bench(with_quirks(parameters(NODE), |device| device.is_silent_if_absent = false));
     assert_eq!(bench.read(0x6084, 0), Err(0x0602_0000));
 }

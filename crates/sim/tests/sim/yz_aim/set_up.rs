@@ -4,7 +4,7 @@ use takt::sim::yz_aim::{Model, YzAimJoint};
 use takt::sim::{Drive, Mailbox, QueueOrder};
 use takt_rt::{Frame, Id};
 
-use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters};
+use super::{Bench, MILLISECOND_NS, NODE, YzAimParameters, bench, by_the_manual, parameters, with_quirks};
 
 #[test]
 fn parameters_survive_a_power_cycle_only_after_storing_has_finished() {
@@ -75,8 +75,8 @@ fn after_a_change_of_bit_rate_the_drive_is_unreachable_on_the_old_bus() {
 
 #[test]
 fn without_a_battery_the_position_after_power_up_is_within_one_turn() {
-    let single_turn = YzAimParameters { has_battery: false, initial_position: -3.0, ..by_the_manual(NODE) };
-    let mut single = bench(single_turn);
+    let single_turn = YzAimParameters { initial_position: -3.0, ..by_the_manual(NODE) };
+    let mut single = bench(with_quirks(single_turn, |device| device.simulated.lacks_battery = true));
     let first = single.position();
     assert!((0..32_768).contains(&first));
     single.write(0x260C, 0, 4, 5 * 8192).unwrap();
@@ -164,7 +164,7 @@ fn writes_that_the_dictionary_does_not_allow_are_aborted() {
     assert_eq!(bench.write(0x6064, 0, 4, 0), Err(0x0601_0002));
     assert_eq!(bench.write(0x1400, 1, 4, 0x206), Err(0x0601_0002));
     assert_eq!(bench.write(0x1600, 0, 1, 0), Err(0x0601_0002));
-    assert_eq!(bench.write(0x6083, 0, 2, 100), Err(0x0607_0010));
+    assert_eq!(bench.write(0x6083, 0, 2, 100), Err(0x0607_0013));
     for (index, bytes, value) in [
         (0x6060, 1, 8),
         (0x6060, 1, 2),

@@ -1,6 +1,7 @@
 //! Commissioning of the simulated YZ-AIM, compared with the frames in its manual.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use takt::config::{Limits, Travel};
 use takt::family;
@@ -38,7 +39,9 @@ fn parameters() -> YzAimParameters {
         friction_shape: takt::config::FrictionShape::Constant,
         brake_torque: 0.0,
     };
-    YzAimParameters { seed: 7, ..YzAimParameters::new(NODE, Model::Aim57x30C, gearing, joint) }
+    let device = family::yz_aim::device();
+    let description = (Arc::new(device.dictionary.clone()), device.quirks.clone());
+    YzAimParameters { seed: 7, ..YzAimParameters::new(description, NODE, Model::Aim57x30C, gearing, joint) }
 }
 
 fn limits() -> Limits {
