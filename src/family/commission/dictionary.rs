@@ -51,6 +51,7 @@ impl ObjectUnit {
             "position" => Self::Position,
             "distance" => Self::Distance,
             "velocity" => Self::Velocity,
+            "0.1 velocity" => Self::VelocityTenth,
             "acceleration" => Self::Acceleration,
             "torque" => Self::Torque,
             words => {

@@ -19,11 +19,12 @@ use takt_rt::Frame;
 use takt_wire::canopen::object::Object;
 
 use super::scan::{FoundDevice, StartingKeys};
-use super::{Family, MappingMatch, SettingUp};
+use super::cia402::Device;
+use super::{DataSheet, Family, MappingMatch, SettingUp};
 use crate::config::{Axis, Config, ConfiguredFamily, DriveFamily, FamilyKeys};
 use crate::family::bring_up::{AxisSession, ProcessData};
 use crate::family::commission::dictionary::ObjectEntry;
-use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo};
+use crate::family::commission::{DriveTask, Failure, TargetDrive, Task, over_sdo, profile};
 use crate::procedure::SdoQuirks;
 use crate::words::Words;
 use takt_sim::Drive;
@@ -100,13 +101,17 @@ impl Family for YzAim {
             gap_ns: 2_000_000,
             has_short_replies: true,
             has_other_lengths: true,
-            is_silent_if_absent: device().quirks.is_silent_if_absent,
             ..SdoQuirks::standard()
         }
     }
 
+    fn data_sheet<'d>(&self, drive: &'d DriveFamily) -> Option<&'d dyn DataSheet> {
+        let device: &Device = drive.description()?;
+        Some(device)
+    }
+
     fn objects(&self) -> &'static [ObjectEntry] {
-        commission::OBJECTS
+        profile::objects::STANDARD
     }
 
     fn meaning(&self, _: &DriveFamily, object: &Object, value: i64) -> Option<String> {

@@ -13,7 +13,7 @@ mod settings;
 mod storing;
 mod words;
 
-pub use objects::{OBJECTS, meaning};
+pub use objects::meaning;
 pub use process_data::words as process_data_words;
 
 use crate::family::commission::failure::Failure;
