@@ -2,8 +2,11 @@
 
 mod compile;
 mod read;
+mod read_registers;
 mod read_scan;
+mod shipped;
 mod values;
 
 pub use compile::{check_command, check_reply, compile, most, position_range, step};
 pub use read::{load, parse};
+pub use shipped::{DESCRIPTIONS, other_modes, shipped};

@@ -169,6 +169,7 @@ tables! {
         EXTENDED "extended": Boolean, Comment("true"), "only with \"hollow-can\"; default: false; whether the motor is in extended mode";
         MASTER_ID "master_id": integer(0, 0x7FF), Comment("0x65"), "only with \"bit-fields\": the identifier by which the motor replies";
         BIT_RATE_SWITCH "bit_rate_switch": Boolean, Comment("true"), "only with \"bit-fields\" on CAN FD; default: false; whether frames switch to data_bit_rate";
+        OLD_FIRMWARE "old_firmware": Boolean, Comment("true"), "only with \"bit-fields\"; default: false; whether the motor takes enable, disable and zero by the identifier of its mode";
         QUIRKS "quirks": Text, Comment("\"my-drive.toml\""), "only with \"cia402\": in what the drive deviates from its data sheet (see drives/)";
     }
 

@@ -8,17 +8,18 @@ use takt_rt::{
 };
 use takt_wire::bit_fields::{
     Amount, BesideTargetKind, DescribedFrames, DescribedHeartbeat, DescribedLifeCycle, DescribedScale,
-    Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription, PayloadByte,
-    ReplyMoment, Setting, Settings, SetupFrame, SetupNumber,
+    DescribedScan, Description, FieldDescription, FieldDevice, FieldUnit, FixedFrame, FrameDescription,
+    PayloadByte, ReplyMoment, Setting, Settings, SetupFrame, SetupNumber, Zeroing,
 };
 use toml::de::DeTable;
 
 use super::compile::{check_command, check_reply};
 use super::read_scan;
+use super::shipped;
 use super::values::{expression, two};
 use crate::config::ConfigError;
 use crate::config::bounds::Bounds;
-use crate::config::data_file::{self, each_of_some, optional};
+use crate::config::data_file::{self, each, each_of_some, optional};
 use crate::config::read::document;
 use crate::config::read::entry::Entry;
 use crate::config::read::section::Section;
@@ -67,6 +68,11 @@ const REFERENCES: [(&str, PositionReference); 2] =
     [("zero", PositionReference::Zero), ("present", PositionReference::Present)];
 const BESIDE_TARGET: [(&str, BesideTargetKind); 2] =
     [("feed-forward", BesideTargetKind::FeedForward), ("limits", BesideTargetKind::Limits)];
+pub(super) const ZEROING: [(&str, Zeroing); 3] = [
+    ("when stopped", Zeroing::WhenStopped),
+    ("always", Zeroing::Always),
+    ("with target", Zeroing::WithTarget),
+];
 const ERROR_CODES: &str = "an error code, in decimal: 3 = \"over-voltage\"";
 
 /// Reads a description.
@@ -87,7 +93,10 @@ pub fn parse(source_name: &str, text: &str) -> Result<Description, ConfigError> 
 
 /// Reads every section, even after one has failed.
 fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Description> {
-    let mut root = Section::new("", 0..0, table, problems);
+    let name = Section::new("", 0..0, table, problems).get("like").and_then(|entry| shipped::name(&entry));
+    let base = name.map(shipped::table);
+    let mut root = Section::new("", 0..0, table, problems).with_defaults(base.as_ref());
+    let _ = root.own("like");
     let mut drive_section = root.section("drive");
     let drive = data_file::drive(&mut drive_section);
     drive_section.finish();
@@ -108,6 +117,12 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
     );
     let has_watchdog = watchdog.and_then(|entry| entry.boolean());
     let reply_moment = reply_moment(&mut root);
+    let deaf = optional(root.get("deaf_until_reply"), |entry| entry.boolean());
+    let hears = optional(root.get("hears"), |entry| each(&entry, |entry| expression(entry, false)));
+    let zeroing = optional(root.get("zeroing"), |entry| entry.choice(&ZEROING));
+    let clear_stops = optional(root.get("clear_stops"), |entry| entry.boolean());
+    let forgets = optional(root.get("forgets_command"), |entry| entry.boolean());
+    let messages = optional(root.get("messages"), |entry| entry.choice(&[("CAN Simple", ())]));
     let has_heartbeat = root.get("heartbeat").is_some();
     let heartbeat = has_heartbeat.then(|| heartbeat(root.section("heartbeat")));
     let states = root.get("states").is_some().then(|| states(root.section("states")));
@@ -129,6 +144,15 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
     let errors = data_file::errors(root.get("errors"), problems, error_code, ERROR_CODES);
     root.finish();
     let (lowest, highest) = motor_ids?;
+    let scan = match scan {
+        None => None,
+        Some(scan) => Some(scan?),
+    };
+    let registers = match &scan {
+        Some(DescribedScan::Registers(scan)) => shipped::register_file(&scan.protocol.name),
+        _ => None,
+    };
+    let of_make = registers.as_ref();
     let description = Description {
         drive: drive?,
         motor_ids: u8::try_from(lowest).ok()?..=u8::try_from(highest).ok()?,
@@ -143,10 +167,15 @@ fn read<'a>(table: &'a DeTable<'a>, problems: &'a Problems) -> Option<Descriptio
             None => None,
             Some(heartbeat) => Some(heartbeat?),
         },
-        scan: match scan {
-            None => None,
-            Some(scan) => Some(scan?),
-        },
+        scan,
+        hears: hears?.or_else(|| of_make.map(|file| file.hears.clone())).unwrap_or_default(),
+        is_deaf_until_reply: deaf?.unwrap_or(false),
+        zeroing: zeroing?.or_else(|| of_make.map(|file| file.zeroing)).unwrap_or(Zeroing::WhenStopped),
+        clear_stops: clear_stops?.or_else(|| of_make.map(|file| file.clear_stops)).unwrap_or(false),
+        forgets_command: forgets?.or_else(|| of_make.map(|file| file.forgets_command)).unwrap_or(false),
+        speaks_can_simple: messages?.is_some(),
+        registers,
+        other_modes: vec![],
         life_cycle: life_cycle?,
         setup: setup.into_iter().collect::<Option<_>>()?,
         bytes_before_setup: bytes_before_setup?,
@@ -346,7 +375,7 @@ fn life_cycle(mut section: Section<'_>) -> Option<DescribedLifeCycle> {
     let by = by.and_then(|entry| entry.choice(&[("fields", false), ("frames", true)]));
     let Some(is_by_frames) = by else {
         // What else is there belongs to one of the two.
-        for key in OWN_FRAMES {
+        for key in OWN_FRAMES.into_iter().chain(["old_id"]) {
             let _ = section.get(key);
         }
         section.finish();
@@ -377,7 +406,9 @@ fn frames(section: &mut Section<'_>) -> Option<DescribedFrames> {
         None => Some(None),
         Some(frame) => frame.map(Some),
     };
+    let old_id = data_file::optional(section.get("old_id"), |entry| expression(&entry, false));
     Some(DescribedFrames {
+        old_id: old_id?,
         start: start??,
         stop: stop??,
         zero: optional(zero)?,

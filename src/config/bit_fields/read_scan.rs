@@ -6,6 +6,7 @@ use takt_wire::bit_fields::{
     RegisterScan, Setting,
 };
 
+use super::shipped::register_file;
 use super::values::{expression, two};
 use crate::config::data_file::each;
 use crate::config::read::entry::Entry;
@@ -19,6 +20,8 @@ const BYTES: std::ops::Range<i64> = 0..256;
 const VALUES: std::ops::Range<i64> = 0..1 << 32;
 /// The keys of the two ways to be found.
 const OF_REGISTERS: [&str; 7] = ["request", "reply", "master_id", "mode", "mode_is", "firmware", "settings"];
+/// The keys of registers that takt does not know.
+const OF_PROTOCOL: [&str; 6] = ["request", "reply", "master_id", "mode", "firmware", "settings"];
 const OF_HEARTBEAT: [&str; 3] = ["bytes", "identifiers", "harmed_by"];
 
 #[derive(Clone, Copy)]
@@ -59,33 +62,25 @@ fn register(entry: &Entry<'_>) -> Option<u8> {
 }
 
 fn registers(section: &mut Section<'_>, name: Option<String>) -> Option<RegisterScan> {
-    section.require("request", "the frame that reads a register: request = { id = \"0x7FF\", bytes = […] }");
-    section.require("reply", "the answer: reply = { id = \"master\", bytes = […] }");
-    let mut frame = |key| section.get(key).is_some().then(|| register_frame(section.section(key)));
-    let [request, reply] = ["request", "reply"].map(&mut frame);
-    let master_id = section.require("master_id", "the register with the master ID: master_id = 7");
-    let mode = section.require("mode", "the register with the mode: mode = 10");
     let mode_is =
         section.require("mode_is", "what that register has in the mode of this description: mode_is = 1");
     let mode_is = mode_is.and_then(|entry| entry.integer(VALUES)).and_then(|value| u32::try_from(value).ok());
+    // The registers of a make that takt knows need not be said again.
+    if let Some(file) = name.as_deref().and_then(register_file)
+        && !OF_PROTOCOL.into_iter().any(|key| section.get(key).is_some())
+    {
+        return Some(RegisterScan { protocol: file.protocol, mode_is: mode_is? });
+    }
+    section.require("request", "the frame that reads a register: request = { id = \"0x7FF\", bytes = […] }");
+    section.require("reply", "the answer: reply = { id = \"master\", bytes = […] }");
+    let [request, reply] = exchange(section);
+    let master_id = section.require("master_id", "the register with the master ID: master_id = 7");
+    let mode = section.require("mode", "the register with the mode: mode = 10");
     let firmware = section.get("firmware").map(|entry| register(&entry));
     let [master_id, mode] = [master_id, mode].map(|entry| entry.and_then(|entry| register(&entry)));
     let settings = settings(section.section("settings"));
     let (request, reply) = (request??, reply??);
-    if !tells(&request, RegisterByte::Register, 1) || tells(&request, RegisterByte::Value, 1) {
-        section.spot("request").report_range(
-            "bytes without \"register\", or with \"value\"".to_owned(),
-            "a frame that reads: \"register\" once, and no \"value\"".to_owned(),
-        );
-    }
-    let has_all =
-        [RegisterByte::Motor, RegisterByte::Register].into_iter().all(|byte| tells(&reply, byte, 1));
-    if !has_all || !tells(&reply, RegisterByte::Value, 4) {
-        section.spot("reply").report_range(
-            "bytes that do not tell which drive and register they are of, and what it has".to_owned(),
-            "\"motor\", \"register\" and four times \"value\"".to_owned(),
-        );
-    }
+    check_reading(section, &request, &reply);
     let protocol = RegisterProtocol {
         name: name?,
         request,
@@ -101,12 +96,35 @@ fn registers(section: &mut Section<'_>, name: Option<String>) -> Option<Register
     Some(RegisterScan { protocol, mode_is: mode_is? })
 }
 
+/// The frames `request` and `reply`, as far as they are there.
+pub(super) fn exchange(section: &mut Section<'_>) -> [Option<Option<RegisterFrame>>; 2] {
+    let mut frame = |key| section.get(key).is_some().then(|| register_frame(section.section(key)));
+    ["request", "reply"].map(&mut frame)
+}
+
+/// Reports frames by which no register is read.
+pub(super) fn check_reading(section: &Section<'_>, request: &RegisterFrame, reply: &RegisterFrame) {
+    if !tells(request, RegisterByte::Register, 1) || tells(request, RegisterByte::Value, 1) {
+        section.spot("request").report_range(
+            "bytes without \"register\", or with \"value\"".to_owned(),
+            "a frame that reads: \"register\" once, and no \"value\"".to_owned(),
+        );
+    }
+    let has_all = [RegisterByte::Motor, RegisterByte::Register].into_iter().all(|byte| tells(reply, byte, 1));
+    if !has_all || !tells(reply, RegisterByte::Value, 4) {
+        section.spot("reply").report_range(
+            "bytes that do not tell which drive and register they are of, and what it has".to_owned(),
+            "\"motor\", \"register\" and four times \"value\"".to_owned(),
+        );
+    }
+}
+
 /// Returns `true` if so many bytes of a frame tell this.
 fn tells(frame: &RegisterFrame, what: RegisterByte, times: usize) -> bool {
     frame.payload.iter().filter(|byte| **byte == what).count() == times
 }
 
-fn register_frame(mut section: Section<'_>) -> Option<RegisterFrame> {
+pub(super) fn register_frame(mut section: Section<'_>) -> Option<RegisterFrame> {
     let id = section.require("id", "its identifier: id = \"0x7FF\"");
     let id = id.and_then(|entry| expression(&entry, false));
     let bytes = section
@@ -121,6 +139,7 @@ fn payload(entry: &Entry<'_>) -> Option<[RegisterByte; 8]> {
         ("motor", RegisterByte::Motor),
         ("register", RegisterByte::Register),
         ("value", RegisterByte::Value),
+        ("any", RegisterByte::Any),
     ];
     let read = |entry: &Entry<'_>| match entry.is_bare_number() {
         true => byte(entry).map(RegisterByte::Byte),

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use takt_rt::{Nanoseconds, OperationMode};
+use takt_rt::{FrameFormat, Nanoseconds, OperationMode};
 use takt_wire::bit_fields::FieldDevice;
 use takt_wire::canopen::object::{DataType, ObjectAddress};
 
-use crate::config::Axis;
+use crate::config::{Axis, Bus};
 use crate::family::DataSheet;
 use takt_sim::bit_fields::FieldSimulationParameters;
 use takt_sim::plant::JointParameters;
@@ -43,7 +43,7 @@ impl DataSheet for FieldDevice {
 }
 
 /// The simulated drive of an axis.
-pub fn parameters(axis: &Axis, device: &FieldDevice) -> FieldSimulationParameters {
+pub fn parameters(axis: &Axis, device: &FieldDevice, bus: Option<&Bus>) -> FieldSimulationParameters {
     let direction = if axis.reversed { -1.0 } else { 1.0 };
     FieldSimulationParameters {
         device: device.clone(),
@@ -62,5 +62,9 @@ pub fn parameters(axis: &Axis, device: &FieldDevice) -> FieldSimulationParameter
         shaft_per_joint: direction * axis.gear_ratio * TAU / axis.travel.per_turn(),
         zero_turns: f64::from(axis.zero_counts) / axis.counts_per_turn,
         power_up_ns: axis.power_up_ns,
+        bit_rates: bus.map(|bus| {
+            let is_classic = device.description.command.format == FrameFormat::Classic;
+            [bus.bit_rate, bus.data_bit_rate.filter(|_| !is_classic).unwrap_or(bus.bit_rate)]
+        }),
     }
 }

@@ -14,12 +14,16 @@ use takt_rt::{
     CommandValue, FieldDriveParameters, FieldMode, Frame, FrameFormat, Id, ModeCondition, Nanoseconds,
     OperationMode,
 };
-use takt_wire::bit_fields::{BesideTargetKind, Description, FieldDevice, ReplyMoment, Setting, Settings};
+use takt_wire::bit_fields::{
+    BesideTargetKind, DescribedLifeCycle, Description, FieldDevice, ReplyMoment, Setting, Settings,
+};
 
 use super::bring_up::{AxisSession, ProcessData};
 use super::commission::{DriveTask, Failure, PulseWidth, Report, TargetDrive, Task};
 use super::scan::{FoundDevice, OwnProtocol, StartingKeys};
 use super::{DataSheet, Family, LookingAtSlave, SettingUp, SignOfLife, Unwatched, Watchdog};
+use crate::config::bit_fields::DESCRIPTIONS;
+pub use crate::config::bit_fields::shipped;
 use crate::config::{
     Axis, Config, ConfiguredFamily, Control, DriveFacts, DriveFamily, ErrorControl, FamilyKeys,
     ModeChangeRule, ModeSet, Protocol, Quantity, bit_fields,
@@ -79,45 +83,24 @@ pub static FROM_FILE: BitFieldFamily = BitFieldFamily {
     found_by: Some(FoundBy { protocols: scan::protocols, on_line: None, starting_keys: scan::starting_keys }),
 };
 
-/// The descriptions that come with takt.
-const SHIPPED: [(&str, &str); 7] = [
-    ("damiao-dm-mit", include_str!("../../../drives/bit-fields/damiao-dm-mit.toml")),
-    (
-        "damiao-dm-position-velocity",
-        include_str!("../../../drives/bit-fields/damiao-dm-position-velocity.toml"),
-    ),
-    ("damiao-dm-velocity", include_str!("../../../drives/bit-fields/damiao-dm-velocity.toml")),
-    ("mini-cheetah", include_str!("../../../drives/bit-fields/mini-cheetah.toml")),
-    ("t-motor-ak-mit", include_str!("../../../drives/bit-fields/t-motor-ak-mit.toml")),
-    ("odrive-can-simple", include_str!("../../../drives/bit-fields/odrive-can-simple.toml")),
-    (
-        "odrive-can-simple-velocity",
-        include_str!("../../../drives/bit-fields/odrive-can-simple-velocity.toml"),
-    ),
-];
-
-/// A description that comes with takt.
-///
-/// # Panics
-/// It is wrong; a test reads each of them.
-pub fn shipped(name: &str, text: &str) -> Description {
-    bit_fields::parse(name, text).expect("the descriptions that come with takt are right")
-}
-
 /// The description that the key `description` names: one that comes with takt, or a file.
 fn described(keys: &mut FamilyKeys<'_, '_>) -> Option<Description> {
-    let names = SHIPPED.map(|(name, _)| format!("\"{name}\"")).join(", ");
+    let names = DESCRIPTIONS.map(|(name, _)| format!("\"{name}\"")).join(", ");
     keys.require(
         "description",
         "the description of the drive: description = \"damiao-dm-mit\", or the path of a file",
     );
     let name = keys.text("description")?;
-    if let Some((name, text)) = SHIPPED.iter().find(|(shipped, _)| *shipped == name) {
-        return Some(shipped(name, text));
+    let with_modes = |description: Description| {
+        let other_modes = bit_fields::other_modes(&description);
+        Description { other_modes, ..description }
+    };
+    if let Some((name, text)) = DESCRIPTIONS.iter().find(|(shipped, _)| *shipped == name) {
+        return Some(with_modes(shipped(name, text)));
     }
     let path = keys.path("description")?;
     match bit_fields::load(&path) {
-        Ok(description) => Some(description),
+        Ok(description) => Some(with_modes(description)),
         Err(reason) => {
             let allowed = format!("one of {names}, or the path of a description:\n{reason:?}");
             keys.refuse("description", format!("{name:?}"), allowed);
@@ -254,10 +237,17 @@ impl ConfiguredFamily for BitFieldFamily {
         let Some(description) = (self.describe)(keys) else {
             // Which of these the drive has is not known.
             Setting::ALL.into_iter().for_each(|(key, _)| keys.pass_over(key));
-            ["master_id", "bit_rate_switch"].into_iter().for_each(|key| keys.pass_over(key));
+            ["master_id", "bit_rate_switch", "old_firmware"].into_iter().for_each(|key| keys.pass_over(key));
             return None;
         };
+        let mut description = description;
         let settings = settings(keys, &description)?;
+        if let DescribedLifeCycle::ByFrames(frames) = &mut description.life_cycle
+            && frames.old_id.is_some()
+            && keys.boolean("old_firmware")?
+        {
+            **frames = frames.of_old_firmware();
+        }
         let device = FieldDevice { description, settings };
         Some(DriveFamily::of_drive(self.facts(&device), device))
     }
@@ -379,20 +369,8 @@ impl Family for BitFieldFamily {
         self.pulse_width.map(|pulse_width| pulse_width(model, asked))
     }
 
-    fn simulated(&self, axis: &Axis, _: &Config) -> Box<dyn Drive> {
-        Box::new(FieldSimulation::new(device::parameters(axis, device(axis))))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_description_that_comes_with_takt_is_right_and_says_where_it_is_from() {
-        for (name, text) in SHIPPED {
-            let description = shipped(name, text);
-            assert!(!description.drive.sources.is_empty() && !description.modes.is_empty(), "{name}");
-        }
+    fn simulated(&self, axis: &Axis, config: &Config) -> Box<dyn Drive> {
+        let bus = config.buses.get(axis.bus);
+        Box::new(FieldSimulation::new(device::parameters(axis, device(axis), bus)))
     }
 }

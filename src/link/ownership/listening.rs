@@ -31,6 +31,9 @@ pub struct CommandedDrive {
     pub feedback: Vec<Id>,
 }
 
+const NMT: Id = Id::canopen(function_code::NMT, 0);
+/// The length of an NMT command.
+const NMT_BYTES: usize = 2;
 /// The highest node ID.
 const HIGHEST_NODE: u8 = 127;
 
@@ -43,6 +46,8 @@ pub struct MasterTraffic {
     drives: Vec<u8>,
     /// Identifiers of set-points, with the node ID of the drive that obeys them.
     set_points: Vec<(Id, u8)>,
+    /// True if a drive replies by the identifier of NMT, as it may where no CANopen is on the bus.
+    has_reply_by_nmt: bool,
     /// How long to listen.
     duration_ns: Nanoseconds,
 }
@@ -67,6 +72,7 @@ impl MasterTraffic {
             master,
             drives: drives.iter().map(|drive| drive.node).collect(),
             set_points,
+            has_reply_by_nmt: drives.iter().any(|drive| drive.feedback.contains(&NMT)),
             duration_ns: sync_ns.max(heartbeat_ns).clamp(SHORTEST_NS, LONGEST_NS),
         }
     }
@@ -77,6 +83,7 @@ impl MasterTraffic {
             master: defaults::MASTER_NODE,
             drives: node.into_iter().collect(),
             set_points: node.into_iter().flat_map(rpdos).collect(),
+            has_reply_by_nmt: false,
             duration_ns: SHORTEST_NS,
         }
     }
@@ -89,6 +96,7 @@ impl MasterTraffic {
             master: defaults::MASTER_NODE,
             set_points: drives.iter().flat_map(|node| rpdos(*node)).collect(),
             drives,
+            has_reply_by_nmt: false,
             duration_ns: SHORTEST_NS,
         }
     }
@@ -101,7 +109,9 @@ impl MasterTraffic {
         }
         let activity = if id == Id::canopen(function_code::SYNC, 0) {
             MasterActivity::Sync
-        } else if id == Id::canopen(function_code::NMT, 0) {
+        } else if id == NMT && self.has_reply_by_nmt && frame.payload().len() != NMT_BYTES {
+            return None;
+        } else if id == NMT {
             MasterActivity::Nmt(NmtCommand::decode(frame))
         } else if id.value() == LSS_REQUEST {
             MasterActivity::LayerSetting

@@ -38,7 +38,6 @@ fn two_motors_with_one_motor_id_are_refused() {
 #[test]
 fn identifiers_of_nmt_and_of_other_drives_are_refused() {
     for (first, second, words) in [
-        ("master_id = 0\n", "master_id = 0x65\n", ["0x000", "NMT"]),
         ("master_id = 0x80\n", "master_id = 0x65\n", ["0x080", "SYNC"]),
         ("master_id = 0x77F\n", "master_id = 0x65\n", ["0x77F", "the heartbeat of the controller"]),
         // The commands to the second motor.
@@ -47,7 +46,12 @@ fn identifiers_of_nmt_and_of_other_drives_are_refused() {
     ] {
         assert_says(&two(first, second), &words);
     }
+    // Where no CANopen is on the bus, a motor may reply by the identifier of NMT.
+    Config::parse("right.toml", &two("master_id = 0\n", "master_id = 0x65\n")).unwrap();
     let erob = "drive = \"erob-canopen\"\nnode = 5\n".to_owned();
+    let by_nmt = format!("{HOLLOW}node = 1\nmaster_id = 0\n");
+    assert_says(&text("1 ms", "", &[by_nmt.clone(), erob.clone()]), &["axis.bus", "0x000", "NMT"]);
+    assert_says(&text("1 ms", "", &[erob.clone(), by_nmt]), &["master_id", "0x000", "NMT"]);
     let text = text("1 ms", "", &[erob, hollow("master_id = 0x185\nnode = 2\n")]);
     assert_says(&text, &["0x185", "`joint1`"]);
     // Node 12 of ODrive sends its heartbeat by the identifier of the feedback of node 1.
@@ -164,8 +168,10 @@ fn a_description_is_read_strictly_and_its_problems_are_named() {
 
 #[test]
 fn what_is_said_of_how_a_drive_is_found_is_read_strictly_too() {
-    let without = changed("firmware = 14\n", "");
-    assert_eq!(without, "");
+    let known = "by = \"registers\"\nname = \"Damiao registers\"\nmode_is = 1\n";
+    assert_eq!(changed(known, REGISTERS), "");
+    let changed = |from: &str, to: &str| changed(known, &REGISTERS.replacen(from, to, 1));
+    assert_eq!(changed("firmware = 14\n", ""), "");
     for (from, to, word) in [
         ("by = \"registers\"", "by = \"magic\"", "heartbeat"),
         ("by = \"registers\"", "by = \"heartbeat\"", "identifiers"),
@@ -176,10 +182,23 @@ fn what_is_said_of_how_a_drive_is_found_is_read_strictly_too() {
         ("\"value\", \"value\"]", "\"value\", 0]", "four times"),
         ("settings = {", "settingz = {", "settings"),
     ] {
+        assert!(REGISTERS.contains(from), "{from}");
         let problems = changed(from, to);
         assert!(problems.contains(word), "{to}: {problems}");
     }
 }
+
+/// How drives with registers are found that takt does not know.
+const REGISTERS: &str = r#"by = "registers"
+name = "Acme registers"
+request = { id = "0x7FF", bytes = ["motor", 0, 0x33, "register", 0, 0, 0, 0] }
+reply = { id = "master", bytes = ["motor", 0, 0x33, "register", "value", "value", "value", "value"] }
+master_id = 7
+mode = 10
+mode_is = 1
+firmware = 14
+settings = { position_full_scale = 21, velocity_full_scale = 22, torque_full_scale = 23 }
+"#;
 
 /// Descriptions that are right.
 const RIGHT: [&str; 5] = [

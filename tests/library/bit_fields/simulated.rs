@@ -49,6 +49,7 @@ impl Bench {
             shaft_per_joint: 1.0,
             zero_turns: 0.0,
             power_up_ns: 5 * MILLISECOND_NS,
+            bit_rates: None,
         });
         let rates = WireBitRates { nominal: 1_000_000, data: Some(5_000_000) };
         let bus = SimulatedBus::with_drives(rates, u64::MAX, vec![Box::new(motor)]);

@@ -1,20 +1,24 @@
 //! Drives that are spoken to by bit fields, simulated from the description of their make: hollow-shaft motors, and every drive with a
 //! description file.
 //!
-//! A drive takes commands and frames with a meaning of their own, and answers each with a reply, as late as its description says. It has no
-//! watchdog: without commands it goes on with the last one. What it was told beside that, it forgets with its power.
+//! A drive takes commands and frames with a meaning of their own, and answers each with a reply, as late as its description says. Without
+//! commands it continues with the last one, unless a register has a time-out. It forgets with its power what is not stored.
 
 mod bits;
+mod can_simple;
 mod current_loop;
 mod registers;
 mod shaft;
 
+use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use takt_rt::{
-    DriveState, FieldMode, Frame, Id, ModeCodes, Nanoseconds, OperationMode, OwnFrame, PositionReference,
-    ReplyValue,
+    CommandValue, DriveState, FieldMode, Frame, FrameFormat, FrameKind, ModeCodes, Nanoseconds,
+    OperationMode, OwnFrame, PositionReference, ReplyValue,
 };
+
+use can_simple::{CanSimple, Condition, Deed};
 
 use super::defect::{Defect, Unsupported, shorter};
 use super::drive::{Drive, DriveFault, NodeState, Observation};
@@ -23,10 +27,11 @@ use super::motion::{Actual, Generator};
 use super::plant::{Gravity, Joint, JointParameters};
 use super::servo::{LoopFactors, Servo};
 use current_loop::CurrentLoop;
-use registers::RegisterServer;
+use registers::{Asked, RegisterAnswer, RegisterServer};
 pub use shaft::{Command, Reply};
 use takt_wire::bit_fields::{
-    BesideTargetKind, DescribedLifeCycle, DescribedScan, FieldDevice, ReplyMoment, Setting, SetupFrame,
+    BesideTargetKind, DescribedLifeCycle, DescribedScan, FieldDevice, FieldUnit, FixedFrame, RegisterRole,
+    ReplyMoment, Setting, SetupFrame, Zeroing,
 };
 
 /// The period of the drive's loops.
@@ -35,6 +40,8 @@ const STEP_S: f64 = STEP_NS as f64 * 1e-9;
 /// Commands further apart are not those of a cycle.
 const LONGEST_PERIOD_S: f64 = 0.1;
 const TEMPERATURE: f64 = 30.0;
+/// Answers that wait at most.
+const MAX_ANSWERS: usize = 32;
 
 /// What a simulated drive is made with.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,6 +64,8 @@ pub struct FieldSimulationParameters {
     pub zero_turns: f64,
     /// From power-on until it answers.
     pub power_up_ns: Nanoseconds,
+    /// The bit rates of its bus, in the arbitration and in the data phase, where they are known.
+    pub bit_rates: Option<[u32; 2]>,
 }
 
 /// A frame with a meaning of its own.
@@ -76,6 +85,20 @@ enum Power {
     On,
     /// Off, by an error.
     Fault(u16),
+}
+
+/// Something that is under way to the master.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Answer {
+    due_ns: Nanoseconds,
+    told: Told,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Told {
+    /// The reply as it is when it leaves.
+    Reply,
+    Frame(Frame),
 }
 
 /// Defects that last.
@@ -119,10 +142,11 @@ impl ShownMode {
 /// A simulated drive.
 #[derive(Clone, Debug)]
 pub struct FieldSimulation {
+    /// The device in them is as the registers have set it.
     parameters: FieldSimulationParameters,
-    command_id: Id,
-    reply_id: Id,
-    orders: Vec<(OwnFrame, Order)>,
+    /// The motor ID that it listens to now.
+    motor_id: u8,
+    orders: Vec<(FixedFrame, Order)>,
     /// The frames that set it up, and whether each has been taken. Those that carry a number need not be taken.
     setup: Vec<(SetupFrame, OwnFrame, bool)>,
     power: Power,
@@ -140,8 +164,14 @@ pub struct FieldSimulation {
     /// What is taken from the position of the shaft: rad. It comes from zeroing, and from defects.
     offset: f64,
     defects: Defects,
-    reply_ns: Option<Nanoseconds>,
+    /// When it reports by itself.
+    report_ns: Option<Nanoseconds>,
+    /// What is under way to the master, in the order in which it was asked for.
+    answers: VecDeque<Answer>,
+    /// When it last heard a frame that was meant for it.
+    heard_ns: Nanoseconds,
     registers: RegisterServer,
+    can_simple: Option<CanSimple>,
     heartbeat_ns: Option<Nanoseconds>,
     ready_ns: Nanoseconds,
     stepped_ns: Nanoseconds,
@@ -151,11 +181,10 @@ impl FieldSimulation {
     /// A drive whose supply is switched on at time 0.
     pub fn new(parameters: FieldSimulationParameters) -> Self {
         let FieldSimulationParameters { device, motor_id, joint, .. } = &parameters;
-        let (orders, mode) = (orders(device, *motor_id), device.description.modes.first().copied());
+        let (orders, mode) = (orders(device), device.description.modes.first().copied());
         let fixed = |setup: &SetupFrame| (*setup, device.fixed(&setup.frame, *motor_id), false);
         let mut drive = Self {
-            command_id: device.id(&device.description.command.id, *motor_id),
-            reply_id: device.reply_id(*motor_id),
+            motor_id: *motor_id,
             orders,
             setup: device.description.setup.iter().map(fixed).collect(),
             power: Power::Off,
@@ -170,8 +199,11 @@ impl FieldSimulation {
             torque: 0.0,
             offset: 0.0,
             defects: Defects::default(),
-            reply_ns: None,
-            registers: RegisterServer::new(device),
+            report_ns: None,
+            answers: VecDeque::with_capacity(MAX_ANSWERS),
+            heard_ns: 0,
+            registers: RegisterServer::new(device, *motor_id, parameters.bit_rates),
+            can_simple: device.description.speaks_can_simple.then(|| CanSimple::new(*motor_id)),
             heartbeat_ns: None,
             ready_ns: parameters.power_up_ns,
             stepped_ns: 0,
@@ -185,14 +217,19 @@ impl FieldSimulation {
     fn boot(&mut self, now_ns: Nanoseconds) {
         self.power = Power::Off;
         (self.command, self.torque) = (None, 0.0);
-        self.registers.reset();
+        self.answers.clear();
+        self.registers.boot();
+        self.adopt_registers();
+        if let Some(can_simple) = &mut self.can_simple {
+            can_simple.boot();
+        }
         self.setup.iter_mut().for_each(|(_, _, is_taken)| *is_taken = false);
         // It forgets every gain with its power.
         self.factors = LoopFactors::PRESET;
         self.servo.set_factors(self.factors);
         self.current_loop = CurrentLoop::default();
         self.ready_ns = now_ns.saturating_add(self.parameters.power_up_ns);
-        self.reply_ns = match self.parameters.device.description.reply_moment {
+        self.report_ns = match self.parameters.device.description.reply_moment {
             ReplyMoment::AfterCommand { .. } => None,
             ReplyMoment::Cyclic { period_ns } => Some(self.ready_ns.saturating_add(period_ns)),
         };
@@ -227,6 +264,9 @@ impl FieldSimulation {
     }
 
     fn stop(&mut self) {
+        if self.parameters.device.description.forgets_command {
+            self.command = None;
+        }
         let is_cleared_by_stop = !self.orders.iter().any(|(_, order)| *order == Order::Clear);
         if self.power == Power::On || is_cleared_by_stop {
             self.power = Power::Off;
@@ -235,8 +275,16 @@ impl FieldSimulation {
     }
 
     fn zero(&mut self) {
-        if self.power == Power::Off {
-            self.offset += self.shaft();
+        let zeroing = self.parameters.device.description.zeroing;
+        if zeroing == Zeroing::WhenStopped && self.power != Power::Off {
+            return;
+        }
+        self.offset += self.shaft();
+        if zeroing == Zeroing::WithTarget {
+            if let Some(command) = &mut self.command {
+                command.position = 0.0;
+            }
+            self.rest();
         }
     }
 
@@ -246,6 +294,7 @@ impl FieldSimulation {
             Order::Stop => self.stop(),
             Order::Zero => self.zero(),
             Order::Clear if self.power != Power::On => self.power = Power::Off,
+            Order::Clear if self.parameters.device.description.clear_stops => self.stop(),
             Order::Clear => {}
             Order::Mode(mode) => self.set_mode(mode),
         }
@@ -259,7 +308,11 @@ impl FieldSimulation {
     }
 
     fn take_command(&mut self, now_ns: Nanoseconds, payload: &[u8]) {
-        let mut command = Command::read(&self.parameters.device, payload);
+        let command = Command::read(&self.parameters.device, payload);
+        self.follow(now_ns, command);
+    }
+
+    fn follow(&mut self, now_ns: Nanoseconds, mut command: Command) {
         if self.parameters.device.description.position_reference == PositionReference::Present {
             command.position += self.shaft();
         }
@@ -331,6 +384,12 @@ impl FieldSimulation {
     fn run_until(&mut self, now_ns: Nanoseconds) {
         while self.stepped_ns + STEP_NS <= now_ns {
             self.stepped_ns += STEP_NS;
+            if let Some((longest_ns, error)) = self.registers.time_out()
+                && self.power == Power::On
+                && self.stepped_ns.saturating_sub(self.heard_ns) > longest_ns
+            {
+                self.fail(error);
+            }
             self.torque = match (self.power, self.command) {
                 (Power::On, Some(command)) => {
                     let demand = self.step(&command);
@@ -361,8 +420,8 @@ impl FieldSimulation {
         let has_limits = device.description.beside_target == BesideTargetKind::Limits;
         let has = |value| device.description.command.field(value).is_some();
         let limit = |value, limit: f64| if has_limits && has(value) { limit.abs() } else { f64::INFINITY };
-        let torque_limit = limit(takt_rt::CommandValue::Torque, command.torque * per_joint);
-        let velocity_limit = limit(takt_rt::CommandValue::Velocity, command.velocity / per_joint);
+        let torque_limit = limit(CommandValue::Torque, command.torque * per_joint);
+        let velocity_limit = limit(CommandValue::Velocity, command.velocity / per_joint);
         let (position, velocity) = (self.joint.position(), self.joint.velocity());
         let (forward_torque, wanted) = (command.torque * per_joint, command.velocity / per_joint);
         let forward_torque = if has_limits { 0.0 } else { forward_torque };
@@ -385,7 +444,8 @@ impl FieldSimulation {
     }
 
     fn reply(&self) -> Option<Frame> {
-        let FieldSimulationParameters { device, motor_id, shaft_per_joint, .. } = &self.parameters;
+        let FieldSimulationParameters { device, shaft_per_joint, .. } = &self.parameters;
+        let reply_id = device.reply_id(self.motor_id);
         let mode = match &device.description.life_cycle {
             DescribedLifeCycle::ByFields(ModeCodes { torque, velocity, position }) => {
                 match self.defects.shown_mode.unwrap_or(ShownMode::Known(self.mode)) {
@@ -413,12 +473,12 @@ impl FieldSimulation {
                 Power::On => states.running.into(),
                 Power::Fault(code) => code,
             }),
-            motor_id: *motor_id,
+            motor_id: self.motor_id,
         };
-        let frame = reply.frame(device, self.reply_id)?;
+        let frame = reply.frame(device, reply_id)?;
         let length = device.description.bytes_before_setup.filter(|_| !self.is_set_up());
         match length.and_then(|length| frame.payload().get(..length)) {
-            Some(payload) => Frame::data(self.reply_id, payload).ok(),
+            Some(payload) => Frame::data(reply_id, payload).ok(),
             None => Some(if self.defects.is_short { shorter(frame) } else { frame }),
         }
     }
@@ -426,14 +486,202 @@ impl FieldSimulation {
     /// The heartbeat that is due. Each byte of it is the lowest that the description allows.
     fn take_heartbeat(&mut self, now_ns: Nanoseconds) -> Option<Frame> {
         let due_ns = self.heartbeat_ns.filter(|due_ns| *due_ns <= now_ns)?;
-        let FieldSimulationParameters { device, motor_id, .. } = &self.parameters;
+        let device = &self.parameters.device;
         let heartbeat = device.description.heartbeat?;
         self.heartbeat_ns = Some(due_ns.saturating_add(heartbeat.period_ns));
+        if self.can_simple.is_some() {
+            return CanSimple::heartbeat(&self.condition());
+        }
         let bytes: Vec<u8> = match &device.description.scan {
             Some(DescribedScan::Heartbeat(scan)) => scan.bytes.iter().map(|range| *range.start()).collect(),
             Some(DescribedScan::Registers(_)) | None => vec![0; heartbeat.bytes],
         };
-        Frame::data(device.id(&heartbeat.id, *motor_id), &bytes).ok()
+        Frame::data(device.id(&heartbeat.id, self.motor_id), &bytes).ok()
+    }
+
+    /// What the messages of CAN Simple show.
+    fn condition(&self) -> Condition {
+        let FieldSimulationParameters { device, shaft_per_joint, .. } = &self.parameters;
+        let torque = self.torque / shaft_per_joint;
+        Condition {
+            node: self.motor_id,
+            runs: self.power == Power::On,
+            error: match self.power {
+                Power::Fault(code) => Some(code),
+                Power::Off | Power::On => None,
+            },
+            position: self.shaft() / TAU,
+            velocity: self.joint.velocity() * shaft_per_joint / TAU,
+            torque,
+            current: torque / device.settings.get(Setting::TorqueConstant).unwrap_or(1.0),
+            temperature: TEMPERATURE,
+        }
+    }
+
+    /// Does what a message of CAN Simple asks.
+    fn do_deed(&mut self, now_ns: Nanoseconds, deed: Deed) {
+        let mut command = self.command.unwrap_or(Command { position: self.shaft(), ..Command::default() });
+        match deed {
+            Deed::Position(position, velocity, torque) => {
+                (command.position, command.velocity, command.torque) =
+                    (position * TAU, velocity * TAU, torque);
+            }
+            Deed::Velocity(velocity, torque) => {
+                (command.velocity, command.torque) = (velocity * TAU, torque);
+            }
+            Deed::Torque(torque) => command.torque = torque,
+            Deed::Start => return self.obey(Order::Start),
+            Deed::Stop => return self.obey(Order::Stop),
+            Deed::Clear => return self.obey(Order::Clear),
+            Deed::Mode(mode) => return self.obey(Order::Mode(mode)),
+            Deed::Fail(error) => return self.fail(error),
+            Deed::Place(turns) => {
+                self.offset += self.shaft() - turns * TAU;
+                return self.rest();
+            }
+            Deed::Reboot => return self.boot(now_ns),
+            Deed::Node(node) => {
+                self.motor_id = node;
+                return;
+            }
+            Deed::Send(frame) => return self.promise(now_ns, self.delay_ns(), Told::Frame(frame)),
+            Deed::Nothing => return,
+        }
+        self.follow(now_ns, command);
+    }
+
+    fn delay_ns(&self) -> Nanoseconds {
+        match self.parameters.device.description.reply_moment {
+            ReplyMoment::AfterCommand { delay_ns } => delay_ns.max(1),
+            ReplyMoment::Cyclic { .. } => 1,
+        }
+    }
+
+    /// Sends something later. More than fits is lost, as in a drive that is asked faster than it can send.
+    fn promise(&mut self, now_ns: Nanoseconds, delay_ns: Nanoseconds, told: Told) {
+        if self.answers.len() < MAX_ANSWERS {
+            let last_ns = self.answers.back().map_or(0, |answer| answer.due_ns);
+            let due_ns = now_ns.saturating_add(delay_ns).max(last_ns);
+            self.answers.push_back(Answer { due_ns, told });
+        }
+    }
+
+    /// Returns `true` if the drive answers a frame by its identifier alone.
+    fn is_heard(&self, frame: &Frame) -> bool {
+        let FieldDevice { description, .. } = &self.parameters.device;
+        let device = &self.parameters.device;
+        description.hears.iter().any(|id| device.id(id, self.motor_id) == frame.id())
+    }
+
+    /// The order of a frame.
+    fn order(&self, frame: &Frame, is_heard: bool) -> Option<Order> {
+        let is_it = |(described, _): &&(FixedFrame, Order)| {
+            let own = self.parameters.device.fixed(described, self.motor_id);
+            let has_payload = match is_heard {
+                true => frame.payload().starts_with(&own.payload),
+                false => frame.payload() == own.payload,
+            };
+            has_payload && (is_heard || own.id == frame.id())
+        };
+        self.orders.iter().find(is_it).map(|(_, order)| *order)
+    }
+
+    /// Returns `true` if a frame is the command of the mode. A drive that looks at identifiers alone takes a longer one, too.
+    fn is_command(&self, frame: &Frame) -> bool {
+        let FieldDevice { description, .. } = &self.parameters.device;
+        let command = &description.command;
+        let is_fd = command.format != FrameFormat::Classic;
+        let (length, is_open) = (frame.payload().len(), !description.hears.is_empty());
+        frame.id() == self.parameters.device.id(&command.id, self.motor_id)
+            && (length == command.bytes || is_open && length > command.bytes)
+            && (frame.is_fd() == is_fd || is_open)
+    }
+
+    /// Does what is asked of the registers, and answers it.
+    fn answer(&mut self, now_ns: Nanoseconds, asked: Asked) {
+        let delay_ns = self.delay_ns();
+        let answer = match asked {
+            Asked::Status => {
+                self.promise(now_ns, delay_ns, Told::Reply);
+                return;
+            }
+            Asked::Read { register } => {
+                let live = self.live(register);
+                self.registers.read(register, live)
+            }
+            Asked::Write { register, value } => {
+                if self.registers.write(register, value) {
+                    self.adopt_registers();
+                }
+                let live = self.live(register);
+                self.registers.written(register, live)
+            }
+            Asked::Store if self.power == Power::On => None,
+            Asked::Store => self.registers.store(),
+        };
+        let Some(RegisterAnswer { id, payload, bytes, extra_ns }) = answer else { return };
+        let device = &self.parameters.device;
+        let format = device.format(device.description.reply.format);
+        let id = device.id(&id, self.motor_id);
+        let frame = payload.get(..bytes).and_then(|payload| shaft::framed(id, format, payload));
+        if let Some(frame) = frame {
+            self.promise(now_ns, delay_ns.saturating_add(extra_ns), Told::Frame(frame));
+        }
+    }
+
+    /// What a register shows that is measured.
+    fn live(&self, register: u8) -> Option<f64> {
+        match self.registers.role(register)? {
+            RegisterRole::Position => Some(self.shaft()),
+            RegisterRole::MotorPosition => Some(self.shaft() * self.registers.gear_ratio()),
+            RegisterRole::Temperature => Some(TEMPERATURE),
+            _ => None,
+        }
+    }
+
+    /// Takes the numbers of the registers over.
+    fn adopt_registers(&mut self) {
+        let Some(adopted) = self.registers.adopted() else { return };
+        self.motor_id = adopted.motor_id.unwrap_or(self.motor_id);
+        if let Some(mode) = adopted.mode {
+            self.change_description(mode);
+        }
+        for (setting, value, of_new) in self.registers.settings().into_iter().flatten() {
+            match setting {
+                Setting::VelocityLoopKp
+                | Setting::VelocityLoopKi
+                | Setting::CurrentLoopKp
+                | Setting::CurrentLoopKi => self.multiply(setting, value / of_new),
+                _ => self.parameters.device.settings.set(setting, value),
+            }
+        }
+        if adopted.master_id.is_some() {
+            self.parameters.device.settings.master_id = adopted.master_id;
+        }
+    }
+
+    /// Puts what differs from mode to mode in the place of that of the mode before.
+    fn change_description(&mut self, mode: u32) {
+        let description = &mut self.parameters.device.description;
+        let Some(DescribedScan::Registers(scan)) = &mut description.scan else { return };
+        let other = description.other_modes.iter_mut().find(|other| other.mode_is == mode);
+        let Some(other) = other.filter(|_| scan.mode_is != mode) else { return };
+        std::mem::swap(&mut other.mode_is, &mut scan.mode_is);
+        std::mem::swap(&mut other.command, &mut description.command);
+        std::mem::swap(&mut other.modes, &mut description.modes);
+        std::mem::swap(&mut other.beside_target, &mut description.beside_target);
+        let needed = description.command.field(CommandValue::Torque).map(|field| field.scale.unit);
+        self.mode = description.modes.first().copied().unwrap_or(self.mode);
+        self.command = None;
+        self.rest();
+        let settings = &mut self.parameters.device.settings;
+        // The axis does not say what only this mode needs.
+        if needed == Some(FieldUnit::Amperes) && settings.get(Setting::TorqueConstant).is_none() {
+            let most = self.registers.most_current();
+            settings.set(Setting::CurrentFullScale, most);
+            let shaft_torque = self.parameters.peak_torque / self.parameters.shaft_per_joint.abs();
+            settings.set(Setting::TorqueConstant, shaft_torque / most);
+        }
     }
 
     fn shows_mode(&self) -> bool {
@@ -457,7 +705,7 @@ fn mode_of(codes: ModeCodes, code: u8) -> Option<FieldMode> {
 }
 
 /// The frames with a meaning of their own.
-fn orders(device: &FieldDevice, motor_id: u8) -> Vec<(OwnFrame, Order)> {
+fn orders(device: &FieldDevice) -> Vec<(FixedFrame, Order)> {
     let DescribedLifeCycle::ByFrames(frames) = &device.description.life_cycle else { return vec![] };
     let order = |name| match name {
         "start" => Order::Start,
@@ -468,7 +716,7 @@ fn orders(device: &FieldDevice, motor_id: u8) -> Vec<(OwnFrame, Order)> {
         "velocity" => Order::Mode(FieldMode::Velocity),
         _ => Order::Mode(FieldMode::Position),
     };
-    frames.all().map(|(name, frame)| (device.fixed(frame, motor_id), order(name))).collect()
+    frames.all().map(|(name, frame)| (*frame, order(name))).collect()
 }
 
 impl Drive for FieldSimulation {
@@ -477,61 +725,75 @@ impl Drive for FieldSimulation {
     }
 
     fn receive(&mut self, now_ns: Nanoseconds, frame: &Frame, _: &mut Mailbox) {
-        let answers =
-            matches!(self.parameters.device.description.reply_moment, ReplyMoment::AfterCommand { .. });
-        // A motor that is about to reply takes nothing else: the manual asks for 500 µs between two frames.
-        let is_busy = answers && (self.reply_ns.is_some() || self.registers.due_ns().is_some());
-        if now_ns < self.ready_ns || is_busy {
+        let FieldDevice { description, .. } = &self.parameters.device;
+        let is_deaf = description.is_deaf_until_reply && !self.answers.is_empty();
+        let is_fd = description.command.format != FrameFormat::Classic;
+        let is_foreign = frame.is_fd() && !is_fd;
+        if now_ns < self.ready_ns || is_deaf || is_foreign || !self.registers.is_on_bus() {
             return;
         }
         self.run_until(now_ns);
-        let own = self.orders.iter().find(|(own, _)| own.id == frame.id() && own.payload == frame.payload());
-        let own = own.map(|(_, order)| *order);
-        let FieldDevice { description, .. } = &self.parameters.device;
-        let is_fd = description.command.format != takt_rt::FrameFormat::Classic;
-        let is_command = frame.id() == self.command_id
-            && frame.payload().len() == description.command.bytes
-            && frame.is_fd() == is_fd;
-        let delay_ns = match description.reply_moment {
-            ReplyMoment::AfterCommand { delay_ns } => Some(delay_ns.max(1)),
-            ReplyMoment::Cyclic { .. } => None,
-        };
-        let FieldSimulationParameters { device, motor_id, .. } = &self.parameters;
-        let answered_ns = now_ns.saturating_add(delay_ns.unwrap_or(1));
-        if self.registers.take(frame, device, *motor_id, answered_ns) {
+        let condition = self.condition();
+        if let Some(can_simple) = &mut self.can_simple {
+            if let Some(deed) = can_simple.take(&condition, frame) {
+                self.do_deed(now_ns, deed);
+            }
             return;
         }
-        if let Some(order) = own {
+        if frame.kind() == FrameKind::Remote {
+            return;
+        }
+        if let Some(asked) = self.registers.asked(&self.parameters.device, frame, self.motor_id) {
+            self.answer(now_ns, asked);
+            return;
+        }
+        let is_heard = self.is_heard(frame);
+        if is_heard {
+            self.heard_ns = now_ns;
+        }
+        let is_answered = if let Some(order) = self.order(frame, is_heard) {
             self.obey(order);
-        } else if is_command {
+            true
+        } else if self.is_command(frame) {
             self.take_command(now_ns, frame.payload());
-        } else if !self.take_setup(frame) {
-            return;
-        }
-        if let Some(delay_ns) = delay_ns {
-            self.reply_ns = Some(now_ns.saturating_add(delay_ns));
+            true
+        } else {
+            self.take_setup(frame) || is_heard
+        };
+        if is_answered
+            && let ReplyMoment::AfterCommand { .. } = self.parameters.device.description.reply_moment
+        {
+            self.promise(now_ns, self.delay_ns(), Told::Reply);
         }
     }
 
     fn advance(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_until(now_ns);
-        if let Some(due_ns) = self.reply_ns.filter(|due_ns| *due_ns <= now_ns) {
+        while let Some(Answer { told, .. }) = self.answers.pop_front_if(|answer| answer.due_ns <= now_ns) {
+            let frame = match told {
+                Told::Reply => self.reply(),
+                Told::Frame(frame) => Some(frame),
+            };
+            if let Some(frame) = frame {
+                mailbox.push(frame);
+            }
+        }
+        if let ReplyMoment::Cyclic { period_ns } = self.parameters.device.description.reply_moment
+            && let Some(due_ns) = self.report_ns.filter(|due_ns| *due_ns <= now_ns)
+        {
             if let Some(frame) = self.reply() {
                 mailbox.push(frame);
             }
-            self.reply_ns = match self.parameters.device.description.reply_moment {
-                ReplyMoment::AfterCommand { .. } => None,
-                ReplyMoment::Cyclic { period_ns } => Some(due_ns.saturating_add(period_ns)),
-            };
+            self.report_ns = Some(due_ns.saturating_add(period_ns));
         }
-        for frame in [self.registers.poll(now_ns), self.take_heartbeat(now_ns)].into_iter().flatten() {
+        if let Some(frame) = self.take_heartbeat(now_ns) {
             mailbox.push(frame);
         }
     }
 
     fn wake_ns(&self) -> Nanoseconds {
         let step_ns = self.stepped_ns + STEP_NS;
-        [self.reply_ns, self.registers.due_ns(), self.heartbeat_ns]
+        [self.answers.front().map(|answer| answer.due_ns), self.report_ns, self.heartbeat_ns]
             .into_iter()
             .flatten()
             .fold(step_ns, Nanoseconds::min)
@@ -577,10 +839,13 @@ impl Drive for FieldSimulation {
     fn power_cycle(&mut self, now_ns: Nanoseconds, mailbox: &mut Mailbox) {
         self.run_until(now_ns);
         mailbox.clear();
-        // Neither its zero nor its count of turns outlives the power: it finds itself within half a turn of the zero of its encoder.
-        self.offset = 0.0;
+        // Its count of turns does not outlive the power: it finds itself within half a turn of its zero, which is that of its encoder
+        // unless it stores it.
+        if self.parameters.device.description.zeroing != Zeroing::WithTarget {
+            self.offset = 0.0;
+        }
         let turns = self.shaft() / TAU;
-        self.offset = turns.round() * TAU;
+        self.offset += turns.round() * TAU;
         self.boot(now_ns);
     }
 

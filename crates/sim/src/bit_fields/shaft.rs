@@ -130,11 +130,16 @@ impl Reply {
             let wrapped = wrapped(code, field, device.description.wraps);
             bits::write(field, *order, wrapped, payload);
         }
-        match device.format(*format) {
-            FrameFormat::Classic => Frame::data(id, payload).ok(),
-            FrameFormat::Fd => Frame::fd(id, payload, false).ok(),
-            FrameFormat::FdBitRateSwitch => Frame::fd(id, payload, true).ok(),
-        }
+        framed(id, device.format(*format), payload)
+    }
+}
+
+/// A frame of this kind.
+pub(super) fn framed(id: Id, format: FrameFormat, payload: &[u8]) -> Option<Frame> {
+    match format {
+        FrameFormat::Classic => Frame::data(id, payload).ok(),
+        FrameFormat::Fd => Frame::fd(id, payload, false).ok(),
+        FrameFormat::FdBitRateSwitch => Frame::fd(id, payload, true).ok(),
     }
 }
 

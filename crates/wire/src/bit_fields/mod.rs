@@ -4,6 +4,7 @@
 //! A description is data alone. The cycle gets it compiled; the simulated drive reads the same data by itself.
 
 mod expression;
+mod registers;
 mod scan;
 mod settings;
 
@@ -17,6 +18,9 @@ use takt_rt::{
 use crate::described_drive::DescribedDrive;
 
 pub use expression::{IdExpression, PayloadByte};
+pub use registers::{
+    Interval, Register, RegisterExchange, RegisterFile, RegisterRequest, RegisterRole, StoreExchange,
+};
 pub use scan::{DescribedScan, HeartbeatScan, RegisterByte, RegisterFrame, RegisterProtocol, RegisterScan};
 pub use settings::{Setting, Settings};
 
@@ -48,6 +52,23 @@ pub struct Description {
     pub heartbeat: Option<DescribedHeartbeat>,
     /// How it is found on a bus, where that can be without a command to it.
     pub scan: Option<DescribedScan>,
+    /// The identifiers by which it answers every frame, whatever it carries, and takes the frames of its life cycle. Empty: it answers
+    /// nothing but what is described.
+    pub hears: Vec<IdExpression>,
+    /// True if it takes no frame while a reply is under way.
+    pub is_deaf_until_reply: bool,
+    /// What zeroing does to a running drive.
+    pub zeroing: Zeroing,
+    /// True if clearing faults takes the torque of a running drive away.
+    pub clear_stops: bool,
+    /// True if it forgets its last command when its torque is taken away.
+    pub forgets_command: bool,
+    /// True if it has the messages of ODrive's protocol CAN Simple. The cycle uses those that are described alone.
+    pub speaks_can_simple: bool,
+    /// Its registers, and what goes with them.
+    pub registers: Option<RegisterFile>,
+    /// The modes that it may be set to by the register of the mode, beside the one that this description is about.
+    pub other_modes: Vec<ModeDescription>,
     /// How the drive is started and stopped.
     pub life_cycle: DescribedLifeCycle,
     /// The frames that set it up before it is used, in their order.
@@ -66,6 +87,30 @@ pub struct Description {
     pub has_watchdog: bool,
     /// Its error codes in words.
     pub errors: Vec<(u16, String)>,
+}
+
+/// What differs from mode to mode in drives whose mode is a register.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModeDescription {
+    /// What the register of the mode has.
+    pub mode_is: u32,
+    /// The command of a cycle.
+    pub command: FrameDescription<CommandValue>,
+    /// What the drive follows.
+    pub modes: Vec<FieldMode>,
+    /// What velocity and torque are beside a target that is not theirs.
+    pub beside_target: BesideTargetKind,
+}
+
+/// What zeroing does to a running drive.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Zeroing {
+    /// It is ignored.
+    WhenStopped,
+    /// The position becomes zero, and the target keeps its number.
+    Always,
+    /// Position and target become zero, and the zero is stored.
+    WithTarget,
 }
 
 /// A frame of bit fields.
@@ -238,6 +283,8 @@ pub enum DescribedLifeCycle {
 /// The frames of a life cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DescribedFrames {
+    /// The identifier by which old firmware takes them, where that differs.
+    pub old_id: Option<IdExpression>,
     /// The drive gets torque.
     pub start: FixedFrame,
     /// It has none.
@@ -461,6 +508,23 @@ impl FieldDevice {
 }
 
 impl DescribedFrames {
+    /// The same for old firmware.
+    #[must_use]
+    pub fn of_old_firmware(self) -> Self {
+        let Some(id) = self.old_id else { return self };
+        let to_old = |frame: FixedFrame| FixedFrame { id, ..frame };
+        Self {
+            old_id: None,
+            start: to_old(self.start),
+            stop: to_old(self.stop),
+            zero: self.zero.map(to_old),
+            clear: self.clear.map(to_old),
+            torque: self.torque.map(to_old),
+            velocity: self.velocity.map(to_old),
+            position: self.position.map(to_old),
+        }
+    }
+
     /// All of them, with their names.
     pub fn all(&self) -> impl Iterator<Item = (&'static str, &FixedFrame)> {
         let optional = [

@@ -71,6 +71,8 @@ pub enum RegisterByte {
     Register,
     /// One of four bytes with what the register has, the lowest one first.
     Value,
+    /// Whatever the master sends: zero.
+    Any,
 }
 
 /// Drives that are known by their heartbeats. The identifier and the period of a heartbeat are those of the description.

@@ -11,7 +11,7 @@ use std::sync::LazyLock;
 
 use takt_rt::{CommandValue, FieldMode};
 
-use super::{FROM_FILE, SHIPPED, shipped};
+use super::{DESCRIPTIONS, FROM_FILE, shipped};
 use crate::family::scan::{FoundDevice, OwnProtocol, StartingKeys};
 use heartbeat::HeartbeatDrives;
 use registers::RegisterDrives;
@@ -69,7 +69,7 @@ pub fn protocols() -> &'static [&'static dyn OwnProtocol] {
 
 /// The makes whose description says how they are found.
 fn makes() -> impl Iterator<Item = (Make, DescribedScan)> {
-    SHIPPED.into_iter().filter_map(|(name, text)| {
+    DESCRIPTIONS.into_iter().filter_map(|(name, text)| {
         let mut description = shipped(name, text);
         let scan = description.scan.take()?;
         Some((Make { name, device: FieldDevice { description, settings: Settings::default() } }, scan))

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use takt_rt::{Frame, FrameKind, Id, Nanoseconds};
+use takt_rt::{Frame, FrameFormat, FrameKind, Id, Nanoseconds};
 use takt_wire::bit_fields::{
     FieldDevice, RegisterByte, RegisterFrame, RegisterProtocol, RegisterScan, Setting,
 };
@@ -40,21 +40,21 @@ fn request(frame: &RegisterFrame, motor: u8, register: u8) -> Option<Frame> {
         RegisterByte::Byte(byte) => byte,
         RegisterByte::Motor => motor,
         RegisterByte::Register => register,
-        RegisterByte::Value => 0,
+        RegisterByte::Value | RegisterByte::Any => 0,
     });
     Some(Frame::of(frame.id.id(motor, 0)?, payload))
 }
 
 /// What a frame tells, if it has the bytes of an answer.
 fn told(frame: &RegisterFrame, received: &Frame) -> Option<Told> {
-    let is_classic = received.kind() == FrameKind::Data && !received.id().is_extended();
-    let payload: [u8; 8] = received.payload().try_into().ok().filter(|_| is_classic)?;
+    let is_data = received.kind() != FrameKind::Remote && !received.id().is_extended();
+    let payload: [u8; 8] = received.payload().try_into().ok().filter(|_| is_data)?;
     let mut told = Told { motor: 0, register: 0, value: 0 };
     let mut shift = 0;
     for (byte, has) in frame.payload.into_iter().zip(payload) {
         match byte {
             RegisterByte::Byte(byte) if byte != has => return None,
-            RegisterByte::Byte(_) => {}
+            RegisterByte::Byte(_) | RegisterByte::Any => {}
             RegisterByte::Motor => told.motor = has,
             RegisterByte::Register => told.register = has,
             RegisterByte::Value => {
@@ -140,7 +140,10 @@ impl RegisterDrives {
         if OF_CANOPEN.into_iter().any(|id| u32::from(id) == master) {
             device.remark("CANopen nodes take such replies for commands of their master: give it a master ID of its own");
         }
-        match self.makes.iter().find(|(mode_is, _)| *mode_is == mode) {
+        // A motor that is set to CAN FD replies by such frames.
+        let is_described =
+            |make: &Make| (make.description().command.format != FrameFormat::Classic) == reply.is_fd();
+        match self.makes.iter().find(|(mode_is, make)| *mode_is == mode && is_described(make)) {
             Some((_, make)) => {
                 make.name(&mut device);
                 device.axis_keys =
