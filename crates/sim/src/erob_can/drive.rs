@@ -4,7 +4,7 @@ use takt_rt::{Frame, Nanoseconds};
 use takt_wire::erob_can::error_code::ErrorCode;
 use takt_wire::erob_can::frame::{ReceivedRequest, Reply, reply_id};
 
-use super::settings::{CAN_ADDRESS, Settings, Writable};
+use super::settings::{CAN_ADDRESS, OPERATING_MODE, OPERATING_MODES, Settings, Writable};
 use crate::commanded_module::{CommandedModule, ModuleParameters, NotEnabled, NotStarted};
 use crate::defect::{Defect, Unsupported};
 use crate::drive::{Drive, DriveFault, Observation};
@@ -119,6 +119,8 @@ impl ErobCanDrive {
             None => return Err(None),
             Some(Writable::Disabled) if self.module.is_enabled() => return Err(Some(ErrorCode::ENABLED)),
             Some(Writable::AtRest) if self.module.is_moving() => return Err(Some(ErrorCode::MOVING)),
+            // It has no other modes; the manual lists no code for that.
+            Some(_) if index == OPERATING_MODE && !OPERATING_MODES.contains(&value) => return Err(None),
             Some(Writable::Always | Writable::AtRest | Writable::Disabled) => {}
         }
         self.settings.set(index, value);

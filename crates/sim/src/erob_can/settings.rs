@@ -19,6 +19,8 @@ type Factory = (u16, i32, Writable);
 
 pub const CAN_ADDRESS: u16 = 0x0043;
 pub const OPERATING_MODE: u16 = 0x004E;
+/// Torque, velocity, position, and what the manual calls a pure loader model.
+pub const OPERATING_MODES: std::ops::RangeInclusive<i32> = 1..=4;
 pub const MAXIMUM_VELOCITY: u16 = 0x0050;
 pub const POSITION_MINIMUM: u16 = 0x0052;
 pub const POSITION_MAXIMUM: u16 = 0x0053;

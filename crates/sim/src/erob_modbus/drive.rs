@@ -2,7 +2,7 @@
 
 use takt_rt::{Frame, Nanoseconds};
 use takt_wire::modbus::exception::ExceptionCode;
-use takt_wire::modbus::frame::{ReceivedRequest, RegisterRange, Request, Values, reply_frame};
+use takt_wire::modbus::frame::{LongRead, ReceivedRequest, RegisterRange, Request, Values, reply_frame};
 
 use super::registers::{
     BIT_RATE, COMMUNICATION_TIMEOUT, OPERATION_MODE, SLAVE_ADDRESS, Settings, TARGET_CURRENT, TARGET_VELOCITY,
@@ -15,6 +15,8 @@ use crate::plant::Gravity;
 
 /// From enabling until a motion can start: until then a start is taken and does nothing.
 const ENABLING_NS: Nanoseconds = 500_000_000;
+/// Behind the last register.
+const FIRST_BEYOND: u16 = 0x0100;
 /// The fault of a master that is silent.
 const TIMEOUT_FAULT: u16 = 0x0FA2;
 
@@ -69,6 +71,18 @@ impl ErobModbusDrive {
     /// Takes a request whose last byte has come. Those of other slaves are ignored.
     pub fn receive(&mut self, now_ns: Nanoseconds, frame: &[u8]) {
         self.run_until(now_ns);
+        // 1 to 127 registers (manual 1.5, reading of registers).
+        if let Some(read) = LongRead::decode(frame).filter(|read| read.slave.number() == self.address) {
+            self.heard_ns = Some(now_ns);
+            let addresses = read.start..=read.start + (read.count - 1);
+            // No such range is without gaps: these are zero.
+            let value = |address| self.shown(address).or((address < FIRST_BEYOND).then_some(0));
+            let values: Option<Values> = addresses.map(value).collect();
+            if let Some(values) = values.filter(|_| !self.module.is_silent()) {
+                self.reply = Some((now_ns.saturating_add(self.parameters.reply_ns), read.reply(&values)));
+                return;
+            }
+        }
         let Some(ReceivedRequest { address, request }) = ReceivedRequest::decode(frame) else { return };
         let is_for_all = address == 0;
         if !is_for_all && address != self.address {

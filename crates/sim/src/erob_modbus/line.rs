@@ -209,4 +209,17 @@ mod tests {
         line.send(50 * MS, &question(1));
         assert_eq!(line.receive(60 * MS).len(), 7);
     }
+
+    /// 1 to 127 registers (manual 1.5), of which those that it does not have are zero. 128 are too many.
+    #[test]
+    fn a_drive_reads_127_registers_at_once_in_a_reply_that_is_longer_than_the_standard_has() {
+        let mut line = SimulatedLine::new(LINE, vec![drive(1, 4)]);
+        line.send(10 * MS, &[1, 3, 0, 0, 0, 127, 0x04, 0x2A]);
+        let reply = line.receive(100 * MS);
+        assert_eq!((reply.len(), &reply[..5]), (259, &[1, 3, 254, 0, 1][..]));
+        // Register 0x0040: position control.
+        assert_eq!(reply[3 + 2 * 0x40..][..2], [0, 3]);
+        line.send(200 * MS, &[1, 3, 0, 0, 0, 128, 0x44, 0x6A]);
+        assert_eq!(line.receive(300 * MS)[..3], [1, 0x83, 3]);
+    }
 }

@@ -320,6 +320,50 @@ pub fn reply_frame(request: &[u8], outcome: Result<&[u16], ExceptionCode>) -> Op
     Some(reply)
 }
 
+/// A read of more registers than the standard has room for, as some slaves take it: a frame of 126 or 127 registers has up to 259 bytes,
+/// not 256.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LongRead {
+    /// The slave that it is for.
+    pub slave: SlaveAddress,
+    /// The first register.
+    pub start: u16,
+    /// How many registers.
+    pub count: u16,
+}
+
+impl LongRead {
+    /// The most registers: the length of a reply is one byte.
+    const MOST: u16 = 127;
+
+    /// The request of a frame; `None` if it is another one, or damaged.
+    pub fn decode(bytes: &[u8]) -> Option<Self> {
+        let [address, function, a, b, c, d, _, _] = *bytes else { return None };
+        let (start, count) = (u16::from_be_bytes([a, b]), u16::from_be_bytes([c, d]));
+        let is_it = function == ModbusFunction::GetHoldings.byte()
+            && (MOST_READ as u16 + 1..=Self::MOST).contains(&count)
+            && start.checked_add(count - 1).is_some()
+            && has_valid_crc(bytes);
+        let slave = SlaveAddress::new(address)?;
+        is_it.then_some(Self { slave, start, count })
+    }
+
+    /// The reply with these values.
+    pub fn reply(&self, values: &[u16]) -> Vec<u8> {
+        let mut reply = vec![self.slave.number(), ModbusFunction::GetHoldings.byte(), (2 * self.count) as u8];
+        let words = values.iter().take(usize::from(self.count));
+        reply.extend(words.flat_map(|value| value.to_be_bytes()));
+        let crc = reply.iter().fold(u16::MAX, |crc, byte| {
+            (0..8).fold(crc ^ u16::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { POLYNOMIAL } else { 0 })
+        });
+        reply.extend(crc.to_le_bytes());
+        reply
+    }
+}
+
+/// Of the CRC (Modbus over Serial Line 1.02, 6.2.2).
+const POLYNOMIAL: u16 = 0xA001;
+
 /// Fills in the reply of a slave that has carried out the request.
 fn answer(frame: &mut ModbusFrame<'_, Vec<u8>>, values: &[u16]) -> Option<()> {
     if !frame.readonly {
@@ -502,5 +546,29 @@ mod tests {
             let received = ReceivedRequest::decode(&frame(body)).unwrap();
             assert_eq!(received.request, Err(ExceptionCode::ILLEGAL_VALUE), "{body:02X?}");
         }
+    }
+
+    #[test]
+    fn a_read_of_more_registers_than_the_standard_has_is_seen_and_answered_with_a_right_crc() {
+        let made = |count: u16| {
+            let [high, low] = count.to_be_bytes();
+            let body = LongRead { slave: SlaveAddress::new(2).unwrap(), start: 0, count: 2 };
+            // The CRC of the body of a request is that of a reply with the same bytes.
+            let mut bytes = vec![2, 3, 0, 0, high, low];
+            let crc = bytes.iter().fold(u16::MAX, |crc, byte| {
+                (0..8).fold(crc ^ u16::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xA001 } else { 0 })
+            });
+            bytes.extend(crc.to_le_bytes());
+            assert!(has_valid_crc(&body.reply(&[1, 2])));
+            bytes
+        };
+        for (count, is_long) in [(125, false), (126, true), (127, true), (128, false)] {
+            assert_eq!(LongRead::decode(&made(count)).is_some(), is_long, "{count}");
+        }
+        let reply = LongRead::decode(&made(127)).unwrap().reply(&[7; 127]);
+        assert_eq!((reply.len(), reply[2]), (259, 254));
+        let mut damaged = made(127);
+        damaged[7] ^= 1;
+        assert_eq!(LongRead::decode(&damaged), None);
     }
 }
